@@ -1,0 +1,46 @@
+# Everything a person types here. `make help` lists it.
+SHELL := /bin/bash
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+BIN := .venv/bin
+PACKAGES := operator trainer sim_image
+SOURCES := operator/src trainer/src sim_image/src
+JOB := manifests/examples/move-to-target.yaml
+
+.PHONY: help setup run test check format bench golden lock
+
+help: ## list the verbs
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/\1\t\2/' | expand -t 10
+
+setup: .venv/ready ## install ROS from the distribution and everything else into .venv
+
+.venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh
+	@tools/setup.sh
+
+run: setup ## train move-to-target on this machine, from a TrainingJob to a policy
+	@$(BIN)/palaestra run $(JOB)
+
+test: setup ## run every test
+	@$(BIN)/pytest
+
+check: setup ## lint, types, the allowed imports, and that generated files are current
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check --quiet
+	@$(BIN)/mypy
+	@$(BIN)/pyright --warnings
+	@$(BIN)/lint-imports
+
+format: setup ## rewrite the sources in the common format
+	@$(BIN)/ruff check --fix --quiet || true
+	@$(BIN)/ruff format
+
+bench: setup ## measure what the project promises; prints JSON
+	@$(BIN)/python -m tests.bench
+
+golden: setup ## record the plans of the examples and other generated files anew
+	@$(BIN)/python -m tests.golden
+
+lock: setup ## resolve the dependencies again, within the bounds of the pyproject files
+	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
+	  --no-emit-package palaestra-sim --group dev $(PACKAGES:%=%/pyproject.toml) -o requirements.lock

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Install what Palaestra needs on a Debian 12 or 13 machine: ROS from the distribution, the rest into .venv.
+# Safe to repeat; a failed run leaves no .venv/ready behind, so the next one starts over.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+ros_packages=(python3-rospy python3-rosmaster python3-venv)
+
+ros_is_installed() {
+  /usr/bin/python3 -c 'import ensurepip, rospy, rosmaster' 2>/dev/null
+}
+
+if ! ros_is_installed; then
+  install="apt-get install -y --no-install-recommends ${ros_packages[*]}"
+  if [[ $EUID -ne 0 ]]; then
+    echo "ROS is missing. Type this line, then repeat the command:"
+    echo "  sudo apt-get update && sudo $install"
+    exit 1
+  fi
+  echo "setup: installing ${ros_packages[*]}"
+  apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive $install -qq >/dev/null
+fi
+
+# Debian's rospy lives in /usr/lib/python3, so the environment is made from Debian's interpreter and sees it.
+uv_pin=$(grep -oE '^uv==[0-9.]+' requirements.lock)
+rm -f .venv/ready
+if [[ ! -x .venv/bin/uv ]]; then
+  echo "setup: making .venv"
+  /usr/bin/python3 -m venv --clear --system-site-packages .venv
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check "$uv_pin"
+fi
+echo "setup: installing the locked packages (PyTorch with CUDA is 3 GB; the first time takes minutes)"
+export VIRTUAL_ENV="$PWD/.venv" UV_LINK_MODE="${UV_LINK_MODE:-hardlink}"
+.venv/bin/uv pip install --quiet --require-hashes -r requirements.lock
+.venv/bin/uv pip install --quiet --no-deps --no-build-isolation -e operator -e trainer -e sim_image
+touch .venv/ready
