@@ -1,0 +1,229 @@
+"""The ROS types of the interface: md5 sums, and values to and from bytes.
+
+The definitions stand in `ros_definitions.txt`; genmsg computes the md5 sums that peers compare and genpy
+writes the classes that serialise. Classes are made in memory when first asked for: Debian's own packages
+hold few of these types, and genpy's dynamic loader would leave files behind after a SIGKILL.
+
+Messages of fixed-size numbers alone (every motor command and step) skip genpy for one precompiled struct.
+"""
+
+from __future__ import annotations
+
+import io
+import keyword
+import struct
+from collections import namedtuple
+from functools import cache
+from importlib import resources
+from types import SimpleNamespace
+from typing import Any, NamedTuple, Protocol
+
+import genmsg
+import genmsg.gentools
+import genmsg.msg_loader
+import genpy
+import genpy.generator
+
+_STRUCT_CODES = {
+    "bool": "?",
+    "int8": "b",
+    "uint8": "B",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
+
+
+class Codec(Protocol):
+    """Turns the values of one message into bytes and back."""
+
+    def encode(self, fields: dict[str, Any]) -> bytes:
+        """Return the bytes of a message; absent fields are zero, empty or False."""
+        ...
+
+    def decode(self, payload: bytes) -> Any:
+        """Return an object with one attribute a field.
+
+        Raises:
+            ValueError: the bytes are not such a message.
+        """
+        ...
+
+
+class MessageType(NamedTuple):
+    """One topic type: its name, the md5 that peers compare, its definition, its codec."""
+
+    name: str
+    md5: str
+    definition: str
+    codec: Codec
+
+
+class ServiceType(NamedTuple):
+    """One service type: its name, the md5 that peers compare, and the two codecs."""
+
+    name: str
+    md5: str
+    request: Codec
+    response: Codec
+
+
+@cache
+def message_type(name: str) -> MessageType:
+    """Return the message type `package/Name`.
+
+    Raises:
+        KeyError: `ros_definitions.txt` has no such message.
+    """
+    spec = _message_spec(name, _definition_lines()[name])
+    context = _context_for(spec)
+    return MessageType(
+        name,
+        genmsg.gentools.compute_md5(context, spec),
+        genmsg.gentools.compute_full_text(context, spec),
+        _codec(spec),
+    )
+
+
+@cache
+def service_type(name: str) -> ServiceType:
+    """Return the service type `package/name`.
+
+    Raises:
+        KeyError: `ros_definitions.txt` has no such service.
+    """
+    request, response = _definition_lines()[name].split("---")
+    specs = (_message_spec(name + "Request", request), _message_spec(name + "Response", response))
+    service = genmsg.SrvSpec(specs[0], specs[1], "", name)
+    md5 = genmsg.gentools.compute_md5(_context_for(*specs), service)
+    return ServiceType(name, md5, _codec(specs[0]), _codec(specs[1]))
+
+
+def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of all messages and of all services."""
+    lines = _definition_lines()
+    services = tuple(name for name, line in lines.items() if "---" in line)
+    return tuple(name for name in lines if name not in services), services
+
+
+@cache
+def _definition_lines() -> dict[str, str]:
+    text = resources.files(__package__).joinpath("ros_definitions.txt").read_text("utf-8")
+    lines = (line for line in text.splitlines() if line and not line.startswith("#"))
+    return {name: fields for name, _, fields in (line.partition(":") for line in lines)}
+
+
+def _message_spec(name: str, fields: str) -> Any:
+    text = "\n".join(field.strip() for field in fields.split(";"))
+    return genmsg.msg_loader.load_msg_from_string(genmsg.MsgContext.create_default(), text, name)
+
+
+def _nested(spec: Any) -> list[str]:
+    bare = (genmsg.msgs.bare_msg_type(type_) for type_ in spec.types)
+    return [
+        "std_msgs/Header" if type_ == "Header" else type_
+        for type_ in bare
+        if not genmsg.msgs.is_builtin(type_)
+    ]
+
+
+def _context_for(*specs: Any) -> Any:
+    context = genmsg.MsgContext.create_default()
+    waiting = [name for spec in specs for name in _nested(spec)]
+    while waiting:
+        name = waiting.pop()
+        spec = _message_spec(name, _definition_lines()[name])
+        context.register(name, spec)
+        waiting += _nested(spec)
+    for spec in specs:
+        context.register(spec.full_name, spec)
+        genmsg.msg_loader.load_depends(context, spec, {})
+    return context
+
+
+def _codec(spec: Any) -> Codec:
+    if spec.types and all(type_ in _STRUCT_CODES for type_ in spec.types):
+        return _StructCodec(spec)
+    return _GenpyCodec(spec)
+
+
+class _StructCodec:
+    """A message of fixed-size numbers: one precompiled struct, about ten times as fast."""
+
+    def __init__(self, spec: Any) -> None:
+        self._struct = struct.Struct("<" + "".join(_STRUCT_CODES[type_] for type_ in spec.types))
+        # As in genpy: a field called `from` is an attribute called `from_`.
+        self._names = tuple(name + "_" * keyword.iskeyword(name) for name in spec.names)
+        self._make = namedtuple(spec.short_name, self._names)._make  # noqa: PYI024 - made at run time
+
+    def encode(self, fields: dict[str, Any]) -> bytes:
+        return self._struct.pack(*[fields.get(name, 0) for name in self._names])
+
+    def decode(self, payload: bytes) -> Any:
+        try:
+            return self._make(self._struct.unpack(payload))
+        except struct.error as error:
+            raise ValueError(f"{len(payload)} bytes for {self._struct.size}") from error
+
+
+class _GenpyCodec:
+    """A message with strings, lists or messages inside: the class that genpy writes."""
+
+    def __init__(self, spec: Any) -> None:
+        self._class = _genpy_class(spec)
+
+    def encode(self, fields: dict[str, Any]) -> bytes:
+        buffer = io.BytesIO()
+        try:
+            _fill(self._class(), fields).serialize(buffer)
+        except (genpy.SerializationError, AttributeError) as error:
+            raise ValueError(f"{self._class.__name__}: {error}") from error
+        return buffer.getvalue()
+
+    def decode(self, payload: bytes) -> Any:
+        try:
+            return self._class().deserialize(payload)
+        except genpy.DeserializationError as error:
+            raise ValueError(f"{self._class.__name__}: {error}") from error
+
+
+def _fill(message: Any, fields: dict[str, Any]) -> Any:
+    for name, value in fields.items():
+        if isinstance(value, dict):
+            _fill(getattr(message, name), value)
+        else:
+            setattr(message, name, value)
+    return message
+
+
+@cache
+def _class_of(name: str) -> Any:
+    return _genpy_class(_message_spec(name, _definition_lines()[name]))
+
+
+def _genpy_class(spec: Any) -> Any:
+    """Return the class for `spec`, with the classes of the messages inside it in reach of its code."""
+    lines = genpy.generator.msg_generator(_context_for(spec), spec, {})
+    source = "\n".join(line for line in lines if not line.startswith("import ") or "msg" not in line)
+    namespace: dict[str, Any] = {"genpy": genpy, "struct": struct}
+    for name in _all_nested(spec):
+        package, base = genmsg.package_resource_name(name)
+        module = namespace.setdefault(package, SimpleNamespace(msg=SimpleNamespace())).msg
+        setattr(module, base, _class_of(name))
+        setattr(module, f"_{base}", SimpleNamespace(**{base: _class_of(name)}))
+    exec(compile(source, f"<genpy {spec.full_name}>", "exec"), namespace)  # noqa: S102 - genpy's own output
+    return namespace[spec.short_name]
+
+
+def _all_nested(spec: Any) -> set[str]:
+    found: set[str] = set()
+    waiting = _nested(spec)
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += _nested(_message_spec(name, _definition_lines()[name]))
+    return found

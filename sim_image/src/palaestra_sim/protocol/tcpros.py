@@ -1,0 +1,75 @@
+"""The wire of ROS 1: connection headers and length-prefixed frames, as bytes.
+
+Pure: no socket is touched here, so both ends (the stub simulator and the trainer) share it.
+Source: http://wiki.ros.org/ROS/TCPROS and http://wiki.ros.org/ROS/Connection%20Header
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+
+LENGTH = struct.Struct("<I")
+
+# No message of the interface comes near this; a longer length means that the stream is out of step.
+MAX_FRAME_BYTES = 64 * 1024 * 1024
+
+
+class FramingError(ValueError):
+    """The bytes are not a header or frame of TCPROS."""
+
+
+def frame(payload: bytes) -> bytes:
+    """Return `payload` behind its little-endian 32-bit length."""
+    return LENGTH.pack(len(payload)) + payload
+
+
+def encode_header(fields: Mapping[str, str]) -> bytes:
+    """Return the connection header of `fields`, framed, ready to send."""
+    return frame(b"".join(frame(f"{name}={value}".encode()) for name, value in fields.items()))
+
+
+def decode_header(payload: bytes) -> dict[str, str]:
+    """Return the fields of a connection header, given without its outer length.
+
+    Raises:
+        FramingError: a length points past the end, or a field has no `=`.
+    """
+    fields: dict[str, str] = {}
+    at = 0
+    while at < len(payload):
+        start = at + LENGTH.size
+        if start > len(payload):
+            raise FramingError("the connection header ends inside a length")
+        at = start + int(LENGTH.unpack_from(payload, at)[0])
+        name, equals, value = payload[start:at].decode(errors="replace").partition("=")
+        if at > len(payload) or not equals:
+            raise FramingError(f"the connection header has a bad field {name[:40]!r}")
+        fields[name] = value
+    return fields
+
+
+class FrameReader:
+    """Cuts a stream into frames, however the network delivered it."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> Iterator[bytes]:
+        """Yield the payload of every frame that `data` completes.
+
+        Raises:
+            FramingError: a frame claims more than MAX_FRAME_BYTES.
+        """
+        buffer = self._buffer
+        buffer += data
+        while len(buffer) >= LENGTH.size:
+            (length,) = LENGTH.unpack_from(buffer)
+            if length > MAX_FRAME_BYTES:
+                raise FramingError(f"a frame of {length} bytes; the stream is out of step")
+            end = LENGTH.size + length
+            if len(buffer) < end:
+                return
+            payload = bytes(buffer[LENGTH.size : end])
+            del buffer[:end]
+            yield payload

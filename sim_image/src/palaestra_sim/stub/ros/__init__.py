@@ -1,0 +1,11 @@
+"""The ROS side of the stub: nodes that a client cannot tell from roscpp's, in one loop.
+
+rospy gives one node to a process and a thread to each connection; a stub has a node a robot and one hot path.
+So the stub speaks the wire itself: XML-RPC with the master (`master`), connections (`links`), one selector
+loop for everything that moves (`loop`), and names, services and topics on top (`node`).
+"""
+
+from palaestra_sim.stub.ros.loop import Loop
+from palaestra_sim.stub.ros.node import LATER, Publisher, RosNode, ServiceFailed
+
+__all__ = ["LATER", "Loop", "Publisher", "RosNode", "ServiceFailed"]

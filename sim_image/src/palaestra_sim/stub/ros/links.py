@@ -1,0 +1,126 @@
+"""One TCPROS connection each: a client of a service, or a subscriber of a topic.
+
+Sockets are non-blocking. A service client's answers are queued without loss; a subscriber that reads too
+slowly gets the newest message only, as with a publisher of queue size 1.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from palaestra_sim.protocol.tcpros import FrameReader, FramingError, decode_header, encode_header
+from palaestra_sim.stub.ros.loop import Loop
+
+_CHUNK_BYTES = 65536
+
+
+class Endpoint(Protocol):
+    """What a connection turns into once its header has been read."""
+
+    def receive(self, payload: bytes) -> None:
+        """Take one frame from the peer."""
+        ...
+
+    def lost(self) -> None:
+        """Hear that the connection is gone."""
+        ...
+
+
+class Refused(Exception):
+    """The header names nothing that is served here; the text goes to the peer."""
+
+
+Greet = Callable[["Link", Mapping[str, str]], Endpoint]
+
+
+class Link:
+    """A connection from accept to close; `greet` turns its header into an endpoint."""
+
+    def __init__(self, loop: Loop, connection: socket.socket, greet: Greet) -> None:
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._loop = loop
+        self._socket = connection
+        self._greet = greet
+        self._frames = FrameReader()
+        self._endpoint: Endpoint | None = None
+        self._unsent = b""
+        self._newest: bytes | None = None
+        self.closed = False
+        loop.watch(connection, self._ready)
+
+    def send(self, data: bytes) -> None:
+        """Send all of `data`, now or as soon as the peer reads."""
+        if self._unsent:
+            self._unsent += data
+        else:
+            self._write(data)
+
+    def send_newest(self, data: bytes) -> None:
+        """Send `data`, or, while the peer does not read, keep it in place of what was kept before."""
+        if self._unsent:
+            self._newest = data
+        else:
+            self._write(data)
+
+    def close(self) -> None:
+        """Close the connection; safe to repeat."""
+        if self.closed:
+            return
+        self.closed = True
+        self._loop.forget(self._socket)
+        self._socket.close()
+        if self._endpoint is not None:
+            self._endpoint.lost()
+
+    def _write(self, data: bytes) -> None:
+        try:
+            sent = self._socket.send(data)
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            self.close()
+            return
+        if sent < len(data):
+            self._unsent = data[sent:]
+            self._loop.watch(self._socket, self._ready, writing=True)
+        elif self._unsent:
+            self._unsent = b""
+
+    def _flush(self) -> None:
+        unsent, self._unsent = self._unsent, b""
+        self._write(unsent)
+        if not self._unsent and self._newest is not None:
+            newest, self._newest = self._newest, None
+            self._write(newest)
+        if not self._unsent and not self.closed:
+            self._loop.watch(self._socket, self._ready)
+
+    def _ready(self) -> None:
+        if self._unsent:
+            self._flush()
+        if self.closed:
+            return
+        try:
+            data = self._socket.recv(_CHUNK_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+            return
+        self._take(data)
+
+    def _take(self, data: bytes) -> None:
+        try:
+            for payload in self._frames.feed(data):
+                if self._endpoint is None:
+                    self._endpoint = self._greet(self, decode_header(payload))
+                elif not self.closed:
+                    self._endpoint.receive(payload)
+        except (Refused, FramingError) as error:
+            self._write(encode_header({"error": str(error)}))
+            self.close()

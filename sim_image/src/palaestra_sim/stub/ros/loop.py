@@ -1,0 +1,85 @@
+"""One selector loop for every socket and timer of the stub.
+
+Owns waiting. It knows no ROS: links register sockets, the simulator registers moments. Other threads may only
+call `post`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import itertools
+import os
+import selectors
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+Callback = Callable[[], None]
+
+
+class Loop:
+    """Runs callbacks when sockets are ready, moments have come, or other threads posted."""
+
+    def __init__(self) -> None:
+        self._selector = selectors.DefaultSelector()
+        self._timers: list[tuple[float, int, Callback]] = []
+        self._order = itertools.count()
+        self._posted: deque[Callback] = deque()
+        self._wake_read, self._wake_write = os.pipe()
+        os.set_blocking(self._wake_read, False)
+        os.set_blocking(self._wake_write, False)
+        self._selector.register(self._wake_read, selectors.EVENT_READ, self._run_posted)
+        self._running = False
+
+    def watch(self, file: Any, ready: Callback, *, writing: bool = False) -> None:
+        """Call `ready` whenever `file` can be read, or with `writing` also when it can be written."""
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writing else 0)
+        if file in self._selector.get_map():
+            self._selector.modify(file, events, ready)
+        else:
+            self._selector.register(file, events, ready)
+
+    def forget(self, file: Any) -> None:
+        """Stop watching `file`, before it is closed."""
+        if file in self._selector.get_map():
+            self._selector.unregister(file)
+
+    def later(self, delay_s: float, callback: Callback) -> None:
+        """Call `callback` once, `delay_s` seconds from now; 0 is after what is ready now."""
+        heapq.heappush(self._timers, (time.monotonic() + delay_s, next(self._order), callback))
+
+    def post(self, callback: Callback) -> None:
+        """Call `callback` in the loop's thread; the one method for other threads and signal handlers."""
+        self._posted.append(callback)
+        # A full pipe means that a wake-up is on its way already.
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._wake_write, b"\0")
+
+    def stop(self) -> None:
+        """Let `run` return after the callbacks that are ready."""
+        self._running = False
+
+    def run(self) -> None:
+        """Run until `stop`."""
+        self._running = True
+        while self._running:
+            for key, _ in self._selector.select(self._wait_s()):
+                key.data()
+            while self._timers and self._timers[0][0] <= time.monotonic():
+                heapq.heappop(self._timers)[2]()
+
+    def close(self) -> None:
+        """Close what the loop itself opened."""
+        self._selector.close()
+        os.close(self._wake_read)
+        os.close(self._wake_write)
+
+    def _wait_s(self) -> float | None:
+        return max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
+
+    def _run_posted(self) -> None:
+        os.read(self._wake_read, 4096)
+        while self._posted:
+            self._posted.popleft()()

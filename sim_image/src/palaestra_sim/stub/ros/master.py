@@ -1,0 +1,154 @@
+"""The XML-RPC side of a node: its calls to the ROS master, and the slave API that others call.
+
+Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Slave_API
+The slave API runs in a thread of its own, since nothing in it is hot, and hands all work to the loop.
+"""
+
+from __future__ import annotations
+
+import http.client
+import os
+import socket
+import threading
+import xmlrpc.client
+from collections.abc import Callable
+from socketserver import ThreadingMixIn
+from typing import Any
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+_OK = 1
+_FAILED = 0
+_TIMEOUT_S = 5.0
+_POLL_S = 0.05  # how soon `close` is noticed
+
+
+class MasterUnreachable(ConnectionError):
+    """The ROS master does not answer at its address."""
+
+
+class _Transport(xmlrpc.client.Transport):
+    """Keeps one connection and gives up on a master that does not answer."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        if self._connection is None or host != self._connection[0]:  # type: ignore[has-type]
+            self._connection = host, http.client.HTTPConnection(host, timeout=_TIMEOUT_S)
+        connection = self._connection[1]
+        if connection is None:
+            raise MasterUnreachable(str(host))
+        return connection
+
+
+class Master:
+    """The master, as one node sees it.
+
+    Args:
+        uri: its address, e.g. http://localhost:11311
+        node: the full name of the calling node, e.g. /robotino
+    """
+
+    def __init__(self, uri: str, node: str) -> None:
+        self._uri = uri
+        self._node = node
+        self._proxy = xmlrpc.client.ServerProxy(uri, transport=_Transport())
+
+    def call(self, method: str, *arguments: Any) -> Any:
+        """Return the value of a call in the node's name.
+
+        Raises:
+            MasterUnreachable: no answer, or none that is one.
+        """
+        try:
+            code, text, value = getattr(self._proxy, method)(self._node, *arguments)
+        except (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError) as error:
+            raise MasterUnreachable(f"no ROS master at {self._uri}: {error}") from error
+        if code != _OK:
+            raise MasterUnreachable(f"the ROS master refused {method}: {text}")
+        return value
+
+
+    def close(self) -> None:
+        """Close the connection to the master."""
+        self._proxy("close")()
+
+
+class _RequestHandler(SimpleXMLRPCRequestHandler):
+    rpc_paths = ()  # any path, as roscpp
+    timeout = _TIMEOUT_S
+
+
+class _Server(ThreadingMixIn, SimpleXMLRPCServer):
+    daemon_threads = True
+
+
+class SlaveApi:
+    """Answers the master, subscribers and tools on behalf of one node.
+
+    Args:
+        host: the name under which others reach this machine.
+        has_topic: whether the node publishes a topic of that full name.
+        tcpros_port: where the node's TCPROS listener is.
+        on_shutdown: called, in another thread, when the master asks the node to end.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        master_uri: str,
+        tcpros_port: int,
+        has_topic: Callable[[str], bool],
+        on_shutdown: Callable[[str], None],
+    ) -> None:
+        self._host = host
+        self._master_uri = master_uri
+        self._port = tcpros_port
+        self._has_topic = has_topic
+        self._on_shutdown = on_shutdown
+        self._server = _Server(
+            (bind_address(host), 0), _RequestHandler, logRequests=False, allow_none=True
+        )
+        for name, answer in self._answers().items():
+            self._server.register_function(answer, name)
+        self.uri = f"http://{host}:{self._server.server_address[1]}/"
+        self._thread = threading.Thread(
+            target=self._server.serve_forever, args=(_POLL_S,), daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop answering; the port is free afterwards."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join(_TIMEOUT_S)
+
+    def _answers(self) -> dict[str, Callable[..., list[Any]]]:
+        return {
+            "requestTopic": self._request_topic,
+            "getPid": lambda _caller: [_OK, "", os.getpid()],
+            "getMasterUri": lambda _caller: [_OK, "", self._master_uri],
+            "getBusStats": lambda _caller: [_OK, "", [[], [], []]],
+            "getBusInfo": lambda _caller: [_OK, "", []],
+            "getSubscriptions": lambda _caller: [_OK, "", []],
+            "getPublications": lambda _caller: [_OK, "", []],
+            "publisherUpdate": lambda _caller, _topic, _publishers: [_OK, "", 0],
+            "paramUpdate": lambda _caller, _key, _value: [_OK, "", 0],
+            "shutdown": self._shutdown,
+        }
+
+    def _request_topic(self, _caller: str, topic: str, _protocols: list[Any]) -> list[Any]:
+        if not self._has_topic(topic):
+            return [_FAILED, f"this node does not publish {topic}", 0]
+        return [_OK, "", ["TCPROS", self._host, self._port]]
+
+    def _shutdown(self, _caller: str, reason: str = "") -> list[Any]:
+        self._on_shutdown(reason)
+        return [_OK, "", 0]
+
+
+def host_name() -> str:
+    """Return the name that others are told, by the rules of ROS: ROS_HOSTNAME, ROS_IP, the host's name."""
+    return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
+
+
+def bind_address(host: str) -> str:
+    """Return the address to listen on: loopback when `host` is, else every interface."""
+    return "127.0.0.1" if host in {"localhost", "127.0.0.1"} else ""

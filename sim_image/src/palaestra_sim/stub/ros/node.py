@@ -1,0 +1,350 @@
+"""A ROS node: services that answer and topics that publish, under one name.
+
+The interface that the simulated robot's controller is written against. A handler gets the decoded request and
+returns the fields of the response; `LATER` when it will call `answer`, as a step does that waits for another
+robot or for the end of a pause.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from palaestra_sim.protocol.rostypes import MessageType, ServiceType, message_type, service_type
+from palaestra_sim.protocol.tcpros import LENGTH, encode_header, frame
+from palaestra_sim.stub.ros.links import Endpoint, Link, Refused
+from palaestra_sim.stub.ros.loop import Loop
+from palaestra_sim.stub.ros.master import Master, SlaveApi, bind_address, host_name
+
+LATER: Final = object()
+Handler = Callable[[Any], Any]
+
+_STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds
+_TRAILING_VALUES = {
+    "sensor_msgs/Range": struct.Struct("<f"),
+    "webots_ros/BoolStamped": struct.Struct("<?"),
+    "webots_ros/Float64Stamped": struct.Struct("<d"),
+}
+_BACKLOG = 128
+
+
+class ServiceFailed(Exception):
+    """The service cannot answer; the client sees the text as a ServiceException."""
+
+
+class RosNode:
+    """One node: serves, advertises, and is known to the master between `start` and `close`.
+
+    Args:
+        loop: where its sockets are watched.
+        name: the node's name and the prefix of its relative paths, e.g. "robotino".
+        master_uri: the master, e.g. http://localhost:11311
+    """
+
+    def __init__(self, loop: Loop, name: str, master_uri: str) -> None:
+        self.name = name
+        self.blocked: Callable[[], bool] = lambda: False
+        self.current_call: object | None = None
+        self._loop = loop
+        self._master = Master(master_uri, f"/{name}")
+        self._services: dict[str, tuple[ServiceType, Handler]] = {}
+        self._topics: dict[str, _Topic] = {}
+        self._links: set[Link] = set()
+        self._waiting: deque[tuple[_ServiceEnd, bytes]] = deque()
+        host = host_name()
+        self._listener = socket.create_server((bind_address(host), 0), backlog=_BACKLOG)
+        self._listener.setblocking(False)
+        port = self._listener.getsockname()[1]
+        self._rosrpc = f"rosrpc://{host}:{port}"
+        self._slave = SlaveApi(host, master_uri, port, self._topics.__contains__, self._asked_to_end)
+        loop.watch(self._listener, self._accept)
+
+    def resolve(self, path: str) -> str:
+        """Return the global name of `path`, which is relative to the node unless it begins with a slash."""
+        return path if path.startswith("/") else f"/{self.name}/{path}"
+
+    def serve(self, path: str, type_name: str, handler: Handler) -> None:
+        """Answer a service, registered at once.
+
+        Raises:
+            MasterUnreachable: the master did not take the registration.
+        """
+        name = self.resolve(path)
+        self._services[name] = (service_type(type_name), handler)
+        self._master.call("registerService", name, self._rosrpc, self._slave.uri)
+
+    def advertise(
+        self, path: str, type_name: str, *, latched: bool = False, template: Mapping[str, Any] | None = None
+    ) -> Publisher:
+        """Return a new publisher of a topic; several of one topic share its subscribers.
+
+        Args:
+            path: relative to the node, or global with a leading slash.
+            type_name: e.g. sensor_msgs/Range
+            latched: whether a late subscriber gets the last message.
+            template: the fields that stay the same, for `Publisher.send_value`.
+        """
+        name = self.resolve(path)
+        topic = self._topics.get(name)
+        if topic is None:
+            topic = self._topics[name] = _Topic(name, message_type(type_name), latched=latched)
+            self._master.call("registerPublisher", name, type_name, self._slave.uri)
+        topic.publishers += 1
+        return Publisher(topic, dict(template or {}))
+
+    def withdraw(self, publisher: Publisher) -> None:
+        """Take one publisher back; the last one of a topic closes it."""
+        topic = publisher.topic
+        topic.publishers -= 1
+        if topic.publishers == 0:
+            del self._topics[topic.name]
+            self._master.call("unregisterPublisher", topic.name, self._slave.uri)
+            for link in list(topic.links):
+                link.close()
+
+    def answer(self, call: object, fields: Mapping[str, Any]) -> None:
+        """Answer a call whose handler returned LATER, then the requests that waited behind it."""
+        if isinstance(call, _Call):
+            call.end.answer(call.type, dict(fields))
+        self._loop.later(0, self.take_waiting)
+
+    def later(self, delay_s: float, callback: Callable[[], None]) -> None:
+        """Call `callback` after `delay_s` seconds; 0 is after the answer of the present call was sent."""
+        self._loop.later(delay_s, callback)
+
+    def take_waiting(self) -> None:
+        """Handle the requests that came while the controller was blocked, in their order."""
+        while self._waiting and not self.blocked():
+            end, payload = self._waiting.popleft()
+            end.handle(payload)
+
+    def request(self, end: _ServiceEnd, payload: bytes) -> None:
+        """Take a request: handled now, or after the step that blocks the controller."""
+        if self.blocked():
+            self._waiting.append((end, payload))
+        else:
+            end.handle(payload)
+
+    def close(self) -> None:
+        """Unregister, as a controller that ends in good order does, and close every socket."""
+        for name in self._services:
+            self._master.call("unregisterService", name, self._rosrpc)
+        for name in self._topics:
+            self._master.call("unregisterPublisher", name, self._slave.uri)
+        self.abandon()
+
+    def abandon(self) -> None:
+        """Close every socket without a word to the master, as a controller that was killed."""
+        self._loop.forget(self._listener)
+        self._listener.close()
+        for link in list(self._links):
+            link.close()
+        self._slave.close()
+        self._master.close()
+
+    def check_master(self) -> None:
+        """Ask the master for a sign of life.
+
+        Raises:
+            MasterUnreachable: there is none.
+        """
+        self._master.call("getPid")
+
+    def on_end(self, callback: Callable[[], None]) -> None:
+        """Set what happens when the master asks this node to end, because a newer one has its name."""
+        self._ended = callback
+
+    def _asked_to_end(self, _reason: str) -> None:
+        self._loop.post(self._ended)
+
+    def _ended(self) -> None:
+        self.abandon()
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:
+            return  # the peer was gone before we looked
+        self._links.add(Link(self._loop, connection, self._greet))
+
+    def _greet(self, link: Link, header: Mapping[str, str]) -> Endpoint:
+        if "service" in header:
+            return self._greet_client(link, header)
+        return self._greet_subscriber(link, header)
+
+    def _greet_client(self, link: Link, header: Mapping[str, str]) -> Endpoint:
+        known = self._services.get(header["service"])
+        if known is None:
+            raise Refused(f"no such service {header['service']}")
+        service, handler = known
+        _check_md5(header, service.name, service.md5)
+        link.send(
+            encode_header(
+                {
+                    "callerid": f"/{self.name}",
+                    "md5sum": service.md5,
+                    "request_type": f"{service.name}Request",
+                    "response_type": f"{service.name}Response",
+                    "type": service.name,
+                }
+            )
+        )
+        return _ServiceEnd(self, link, service, handler, persistent=header.get("persistent") == "1")
+
+    def _greet_subscriber(self, link: Link, header: Mapping[str, str]) -> Endpoint:
+        topic = self._topics.get(header.get("topic", ""))
+        if topic is None:
+            raise Refused(f"no such topic {header.get('topic')}")
+        _check_md5(header, topic.type.name, topic.type.md5)
+        link.send(
+            encode_header(
+                {
+                    "callerid": f"/{self.name}",
+                    "latching": str(int(topic.latched)),
+                    "md5sum": topic.type.md5,
+                    "message_definition": topic.type.definition,
+                    "topic": topic.name,
+                    "type": topic.type.name,
+                }
+            )
+        )
+        return topic.connect(link, self.dropped)
+
+    def dropped(self, link: Link) -> None:
+        """Forget a connection that is closed."""
+        self._links.discard(link)
+
+
+def _check_md5(header: Mapping[str, str], type_name: str, md5: str) -> None:
+    theirs = header.get("md5sum", "*")
+    if theirs not in {"*", md5}:
+        raise Refused(f"client wants md5sum {theirs}, but {type_name} has {md5}")
+
+
+class _Call:
+    """A call that waits for its answer."""
+
+    __slots__ = ("end", "type")
+
+    def __init__(self, end: _ServiceEnd, service: ServiceType) -> None:
+        self.end = end
+        self.type = service
+
+
+class _ServiceEnd:
+    """The server's end of one client's connection to one service."""
+
+    def __init__(
+        self, node: RosNode, link: Link, service: ServiceType, handler: Handler, *, persistent: bool
+    ) -> None:
+        self._node = node
+        self._link = link
+        self._service = service
+        self._handler = handler
+        self._persistent = persistent
+
+    def receive(self, payload: bytes) -> None:
+        self._node.request(self, payload)
+
+    def handle(self, payload: bytes) -> None:
+        self._node.current_call = _Call(self, self._service)
+        try:
+            fields = self._handler(self._service.request.decode(payload))
+        except (ServiceFailed, ValueError) as error:
+            self._send(b"\0" + frame(str(error).encode()))
+            return
+        if fields is not LATER:
+            self.answer(self._service, fields)
+
+    def answer(self, service: ServiceType, fields: dict[str, Any]) -> None:
+        self._send(b"\1" + frame(service.response.encode(fields)))
+
+    def lost(self) -> None:
+        self._node.dropped(self._link)
+
+    def _send(self, data: bytes) -> None:
+        self._link.send(data)
+        if not self._persistent:
+            self._link.close()
+
+
+class _Topic:
+    """A published topic and the connections of its subscribers."""
+
+    def __init__(self, name: str, type_: MessageType, *, latched: bool) -> None:
+        self.name = name
+        self.type = type_
+        self.latched = latched
+        self.links: list[Link] = []
+        self.publishers = 0
+        self._last: bytes | None = None
+
+    def connect(self, link: Link, dropped: Callable[[Link], None]) -> Endpoint:
+        self.links.append(link)
+        if self._last is not None:
+            link.send(self._last)
+        return _SubscriberEnd(self, link, dropped)
+
+    def send(self, data: bytes) -> None:
+        if self.latched:
+            self._last = data
+        for link in self.links:
+            link.send_newest(data)
+
+
+class _SubscriberEnd:
+    """The publisher's end of one subscriber's connection, which only ever closes."""
+
+    def __init__(self, topic: _Topic, link: Link, dropped: Callable[[Link], None]) -> None:
+        self._topic = topic
+        self._link = link
+        self._dropped = dropped
+
+    def receive(self, payload: bytes) -> None:
+        """Ignore it: a subscriber has nothing to say after its header."""
+
+    def lost(self) -> None:
+        self._topic.links.remove(self._link)
+        self._dropped(self._link)
+
+
+class Publisher:
+    """Sends messages to the subscribers that are connected at that moment, queue size 1."""
+
+    def __init__(self, topic: _Topic, template: dict[str, Any]) -> None:
+        self.topic = topic
+        self._template = template
+        self._sequence = 0
+        self._frame: bytearray | None = None
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers are connected."""
+        return len(self.topic.links)
+
+    def send(self, fields: Mapping[str, Any]) -> None:
+        """Send a message of `fields`, over the template's."""
+        payload = self.topic.type.codec.encode({**self._template, **fields})
+        self.topic.send(frame(payload))
+
+    def send_value(self, value: float, stamp_ns: int | None = None) -> None:
+        """Send a stamped message whose last field is `value`, the rest as in the template.
+
+        Args:
+            value: the reading.
+            stamp_ns: nanoseconds of the header's time; the wall clock by default.
+        """
+        data = self._frame
+        if data is None:
+            empty = self.topic.type.codec.encode(self._template)
+            data = self._frame = bytearray(frame(empty))
+        self._sequence += 1
+        seconds, nanoseconds = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 1_000_000_000)
+        _STAMP.pack_into(data, LENGTH.size, self._sequence, seconds, nanoseconds)
+        trailing = _TRAILING_VALUES[self.topic.type.name]
+        trailing.pack_into(data, len(data) - trailing.size, value)
+        self.topic.send(bytes(data))

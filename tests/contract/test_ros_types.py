@@ -1,0 +1,58 @@
+"""The ROS types are those of webots_ros, or no peer would talk to us."""
+
+import json
+from pathlib import Path
+
+import pytest
+from palaestra_sim.protocol.rostypes import message_type, service_type, type_names
+
+MD5 = json.loads(Path(__file__).with_name("ros_md5.json").read_text())
+MESSAGES, SERVICES = type_names()
+
+
+@pytest.mark.parametrize("name", sorted(MD5))
+def test_every_type_of_webots_ros_has_its_md5(name):
+    """Peers compare the md5 of a definition before the first byte of data."""
+    type_ = message_type(name) if name in MESSAGES else service_type(name)
+
+    assert type_.md5 == MD5[name]
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_an_empty_message_survives_the_wire(name):
+    """Zero, empty and False are what ROS sends for fields nobody set."""
+    codec = message_type(name).codec
+
+    assert codec.encode({}) == codec.encode({})
+    codec.decode(codec.encode({}))
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_request_and_response_of_every_service_survive_the_wire(name):
+    """A service whose types cannot be read would only fail when first called."""
+    type_ = service_type(name)
+
+    type_.request.decode(type_.request.encode({}))
+    type_.response.decode(type_.response.encode({}))
+
+
+def test_fields_are_named_as_in_the_definition():
+    """Handlers and facades read values by these names."""
+    codec = service_type("webots_ros/field_set_vec3f").request
+
+    request = codec.decode(codec.encode({"field": 7, "index": -1, "value": {"x": 1.5, "z": -2.0}}))
+
+    assert (request.field, request.index, request.value.x, request.value.z) == (7, -1, 1.5, -2.0)
+
+
+def test_a_field_that_python_reserves_gets_an_underscore():
+    """As genpy does it: `from` cannot be an attribute."""
+    codec = service_type("webots_ros/node_set_visibility").request
+
+    assert codec.decode(codec.encode({"from_": 3})).from_ == 3
+
+
+def test_bytes_of_another_length_are_refused():
+    """A peer of another version must not be misread as zeros."""
+    with pytest.raises(ValueError, match="3 bytes for 4"):
+        service_type("webots_ros/set_int").request.decode(b"abc")

@@ -1,0 +1,63 @@
+"""A real ROS master, and a node of the stub's kind in a thread."""
+
+import os
+import threading
+
+import pytest
+from palaestra_sim.stub.ros import LATER, Loop, RosNode, ServiceFailed
+from palaestra_trainer.simulators.master import ensure_master
+
+
+@pytest.fixture(scope="session", autouse=True)
+def master():
+    """One master a process: rospy registers once."""
+    os.environ["ROS_HOSTNAME"] = "localhost"
+    os.environ["ROS_MASTER_URI"] = "http://localhost:1"
+    ensure_master()
+    return os.environ["ROS_MASTER_URI"]
+
+
+class Peer:
+    """A node whose services answer, fail, or never answer; it runs in a thread of its own."""
+
+    def __init__(self, name, master_uri):
+        self.name = name
+        self.loop = Loop()
+        self.node = RosNode(self.loop, name, master_uri)
+        self.asked = []
+        self.node.serve("double", "webots_ros/set_float", self._double)
+        self.node.serve("get_time", "webots_ros/get_float", lambda _: {"value": 1.25})
+        self.node.serve("fail", "webots_ros/get_float", self._fail)
+        self.node.serve("never", "webots_ros/get_float", lambda _: LATER)
+        self.publisher = self.node.advertise("ir1/value", "sensor_msgs/Range")
+        self.thread = threading.Thread(target=self.loop.run)
+        self.thread.start()
+
+    def _double(self, request):
+        self.asked.append(request.value)
+        return {"success": request.value > 0}
+
+    def _fail(self, _request):
+        raise ServiceFailed("the handle is 0")
+
+    def do(self, action):
+        """Run `action` in the node's thread and wait for its end."""
+        done = threading.Event()
+        self.loop.post(lambda: (action(), done.set()))
+        assert done.wait(5)
+
+    def end(self, last=None):
+        """Stop the thread, after `last`, by default a close in good order."""
+        if self.thread.is_alive():
+            self.do(last or self.node.close)
+            self.loop.post(self.loop.stop)
+            self.thread.join(5)
+            self.loop.close()
+
+
+@pytest.fixture
+def peer(master, request):
+    """A fresh node, named after the test."""
+    node = Peer(request.node.name[:50].rstrip("_"), master)
+    yield node
+    node.end()

@@ -1,0 +1,114 @@
+"""Services over a real master and real sockets: they answer, or the fault has a kind."""
+
+import pytest
+from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
+from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
+
+
+@pytest.fixture
+def service(peer):
+    """Makes services of the peer, closed when the test ends."""
+    made = []
+
+    def make(path, type_name="webots_ros/get_float", **options):
+        made.append(RosService(f"/{peer.name}/{path}", type_name, **options))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+def test_a_call_returns_the_response(service):
+    """The response's fields are attributes."""
+    assert service("get_time")(ask=True).value == 1.25
+
+
+def test_one_connection_serves_all_calls(peer, service):
+    """Looking the service up anew each time would cost forty times as much."""
+    double = service("double", "webots_ros/set_float")
+
+    assert [double(value=value).success for value in (1.0, -1.0, 2.0)] == [True, False, True]
+    assert peer.asked == [1.0, -1.0, 2.0]
+
+
+def test_calls_together_are_all_answered(service):
+    """Three wheels get their commands in one round trip's time."""
+    double = service("double", "webots_ros/set_float")
+    time = service("get_time")
+
+    first, second = call_together([(double, {"value": 1.0}), (time, {"ask": True})])
+
+    assert (first.success, second.value) == (True, 1.25)
+
+
+def test_a_service_nobody_offers_means_a_dead_simulator(service):
+    """The master has no such name."""
+    with pytest.raises(SimulatorDead, match="no node serves"):
+        service("nothing")(ask=True)
+
+
+def test_a_failed_call_is_wrong_data_with_the_servers_words(service):
+    """It answered, so it neither hangs nor is dead."""
+    with pytest.raises(WrongData, match="the handle is 0"):
+        service("fail")(ask=True)
+
+
+def test_a_service_that_does_not_answer_hangs(service):
+    """rospy's proxy would wait for ever here."""
+    with pytest.raises(SimulatorHung, match="does not answer within 0.2 s"):
+        service("never", deadline_s=0.2)(ask=True)
+
+
+def test_a_killed_node_is_dead(peer, service):
+    """Its sockets are closed without a word; the master still lists it."""
+    get_time = service("get_time")
+    get_time(ask=True)
+    peer.end(peer.node.abandon)
+
+    with pytest.raises(SimulatorDead):
+        get_time(ask=True)
+    with pytest.raises(SimulatorDead):
+        get_time(ask=True)
+
+
+def test_after_a_failure_the_connection_is_made_anew(peer, master, service):
+    """A restarted simulator has another port under the same name."""
+    get_time = service("get_time")
+    get_time(ask=True)
+    peer.end(peer.node.abandon)
+    with pytest.raises(SimulatorDead):
+        get_time(ask=True)
+    again = type(peer)(peer.name, master)
+
+    answer = get_time(ask=True)
+
+    again.end()
+    assert answer.value == 1.25
+
+
+def test_another_type_is_refused(service):
+    """The md5 of the definition is compared before the first call."""
+    with pytest.raises(WrongData, match="md5sum"):
+        service("get_time", "webots_ros/set_int")(value=1)
+
+
+def test_a_service_known_to_the_master_can_be_asked_for_its_type(peer):
+    """`rosservice type` probes with the md5 `*`."""
+    host, port = Master("/probe").service_address(f"/{peer.name}/double")
+
+    assert (host, port > 0) == ("localhost", True)
+
+
+def test_the_node_is_listed_by_the_master(peer):
+    """What `rosnode list` prints."""
+    names = Master(ensure_node()).node_names()
+
+    assert f"/{peer.name}" in names
+
+
+def test_a_node_that_ends_in_good_order_is_unregistered(peer):
+    """Else the next simulator of that name would be found at the old address."""
+    peer.end()
+
+    assert Master("/probe").service_address(f"/{peer.name}/double") is None

@@ -1,0 +1,102 @@
+"""Topics over a real master and real sockets: one message when it is wanted."""
+
+import struct
+
+import pytest
+from palaestra_trainer.errors import SimulatorDead, SimulatorHung
+from palaestra_trainer.ros import RosSubscriber
+
+
+@pytest.fixture
+def ranges(peer):
+    """A connected subscriber of the peer's distance sensor."""
+    subscriber = RosSubscriber(f"/{peer.name}/ir1/value", "sensor_msgs/Range", deadline_s=0.3)
+    subscriber.connect()
+    yield subscriber
+    subscriber.close()
+
+
+def send(peer, *values):
+    peer.do(lambda: [peer.publisher.send_value(value) for value in values])
+
+
+def test_connected_means_that_the_publisher_sends_to_us(peer, ranges):
+    """A message sent before would be lost."""
+    assert ranges.connected
+    assert peer.publisher.subscribers == 1
+
+
+def test_the_next_message_is_the_oldest_unread(peer, ranges):
+    """Nothing is skipped: one step, one message."""
+    send(peer, 0.25, 0.5)
+
+    assert [ranges.next().range for _ in range(2)] == [0.25, 0.5]
+
+
+def test_the_newest_message_ends_a_backlog(peer, ranges):
+    """After a late message the last one describes now."""
+    send(peer, 0.25, 0.5, 0.75)
+    ranges.next()
+
+    assert ranges.newest(None).range == 0.75
+
+
+def test_with_nothing_new_the_old_value_stays(ranges):
+    """It does not wait."""
+    assert ranges.newest("old") == "old"
+
+
+def test_a_message_that_does_not_come_is_told_in_time(peer, ranges):
+    """The connection stays, since a message may be late."""
+    with pytest.raises(SimulatorHung):
+        ranges.next()
+    send(peer, 1.0)
+
+    assert ranges.next().range == 1.0
+
+
+def test_a_killed_publisher_is_dead(peer, ranges):
+    """Its connection is closed."""
+    peer.end(peer.node.abandon)
+
+    with pytest.raises(SimulatorDead):
+        ranges.next()
+
+
+def test_a_topic_nobody_publishes_is_told_at_once(peer):
+    """The sensor was never enabled."""
+    with pytest.raises(SimulatorDead, match="no node publishes"):
+        RosSubscriber(f"/{peer.name}/ir2/value", "sensor_msgs/Range").connect()
+
+
+def test_a_decoder_of_ones_own_gets_the_bytes(peer):
+    """The reading is the message's last field; decoding the rest costs more than it tells."""
+    last = struct.Struct("<f")
+    subscriber = RosSubscriber(
+        f"/{peer.name}/ir1/value", "sensor_msgs/Range", lambda data: last.unpack(data[-4:])[0]
+    )
+    subscriber.connect()
+    send(peer, 0.125)
+
+    value = subscriber.next()
+
+    subscriber.close()
+    assert value == 0.125
+
+
+def test_stamps_and_numbers_of_messages_advance(peer, ranges):
+    """Subscribers that match by stamp rely on it."""
+    peer.do(lambda: [peer.publisher.send_value(0.0, stamp_ns=ns) for ns in (1, 2_000_000_003)])
+
+    first, second = ranges.next().header, ranges.next().header
+
+    assert (first.seq, first.stamp.secs, first.stamp.nsecs) == (1, 0, 1)
+    assert (second.seq, second.stamp.secs, second.stamp.nsecs) == (2, 2, 3)
+
+
+def test_a_withdrawn_topic_closes_its_connections(peer, ranges):
+    """As `enable(0)` does with a sensor's topic."""
+    peer.do(lambda: peer.node.withdraw(peer.publisher))
+
+    with pytest.raises(SimulatorDead):
+        ranges.next()

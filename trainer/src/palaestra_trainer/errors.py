@@ -1,0 +1,70 @@
+"""What can go wrong in a trainer, and whether trying again can help.
+
+    TrainerError
+    ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
+    ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
+    ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
+    ├── NoSuchSensor         this robot does not have it
+    └── SimulatorFault       one simulator broke; restart it and go on
+        ├── SimulatorDead    its connections are refused or were closed
+        ├── SimulatorHung    it is connected and does not answer in time
+        └── WrongData        it answered, with something that cannot be right
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+FaultKind = Literal["dead", "hung", "wrong_data"]
+
+
+class TrainerError(Exception):
+    """Everything this package raises on purpose."""
+
+
+class ConfigurationError(TrainerError, ValueError):
+    """The configuration is wrong, so retrying cannot help."""
+
+
+class MasterLost(TrainerError, ConnectionError):
+    """The ROS master does not answer: names are lost and nothing registers again."""
+
+
+class FaultBudgetSpent(TrainerError, RuntimeError):
+    """A simulator failed more often than its restart limit allows."""
+
+
+class NoSuchSensor(TrainerError, NotImplementedError):
+    """The robot has no such sensor, e.g. no camera."""
+
+
+class SimulatorFault(TrainerError):
+    """One simulator broke; it alone is to be restarted.
+
+    Attributes:
+        simulator: the ROS name or group name of the simulator.
+    """
+
+    kind: ClassVar[FaultKind]
+
+    def __init__(self, simulator: str, fact: str) -> None:
+        super().__init__(f"{simulator}: {fact}")
+        self.simulator = simulator
+
+
+class SimulatorDead(SimulatorFault, ConnectionError):
+    """Its connections are refused or were closed."""
+
+    kind = "dead"
+
+
+class SimulatorHung(SimulatorFault, TimeoutError):
+    """It is connected and does not answer within the deadline."""
+
+    kind = "hung"
+
+
+class WrongData(SimulatorFault, ValueError):
+    """It answered with data that cannot be right."""
+
+    kind = "wrong_data"

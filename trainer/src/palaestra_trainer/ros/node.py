@@ -1,0 +1,37 @@
+"""This process as a ROS node, through rospy."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import rospy
+import rospy.core
+
+from palaestra_trainer.ros.master import Master
+
+_lock = threading.Lock()
+
+
+def ensure_node(name: str = "palaestra_trainer") -> str:
+    """Return the full name of this process's node, made now unless the program made one already.
+
+    Args:
+        name: the node's name; a number is added so that several programs may share a master.
+
+    Raises:
+        MasterLost: no master answers; rospy alone would wait for ever.
+    """
+    with _lock:
+        if not rospy.core.is_initialized():
+            Master(f"/{name}").ping()
+            # Signals, clock and log topic stay the program's: rospy only lends the name and the registration.
+            rospy.init_node(
+                f"{name}_{os.getpid()}", disable_signals=True, disable_rostime=True, disable_rosout=True
+            )
+    return str(rospy.get_name())
+
+
+def node_uri() -> str:
+    """Return the address under which this process's node answers other nodes."""
+    return str(rospy.core.get_node_uri())

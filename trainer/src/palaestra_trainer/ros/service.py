@@ -1,0 +1,122 @@
+"""A ROS service as a function with a deadline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from palaestra_sim.protocol.rostypes import service_type
+from palaestra_sim.protocol.tcpros import LENGTH, frame
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault, WrongData
+from palaestra_trainer.ros.master import Master
+from palaestra_trainer.ros.node import ensure_node
+from palaestra_trainer.ros.wire import Wire
+
+DEADLINE_S = 5.0
+_OK_BYTE = 1
+
+
+class RosService:
+    """One service over one persistent connection, made at the first call and again after a failure.
+
+    Args:
+        name: the full name, e.g. /robotino/robot/time_step
+        type_name: e.g. webots_ros/set_int
+        deadline_s: the longest wait for an answer.
+    """
+
+    def __init__(self, name: str, type_name: str, deadline_s: float = DEADLINE_S) -> None:
+        self.name = name
+        self.simulator = name.split("/")[1]
+        self._type = service_type(type_name)
+        self._deadline_s = deadline_s
+        self._wire: Wire | None = None
+
+    def __call__(self, **fields: Any) -> Any:
+        """Return the response, an object with the fields of the type.
+
+        Raises:
+            SimulatorDead: nobody serves it, or the connection broke.
+            SimulatorHung: no answer within the deadline.
+            WrongData: the service failed, or its answer cannot be read.
+        """
+        self.begin(**fields)
+        return self.finish()
+
+    def begin(self, **fields: Any) -> None:
+        """Send a request; exactly one `finish` must follow before the next.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as a call.
+        """
+        data = frame(self._type.request.encode(fields))
+        try:
+            self._connected().send(data)
+        except SimulatorFault:
+            self.close()
+            raise
+
+    def finish(self) -> Any:
+        """Return the response to the request that `begin` sent.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as a call.
+        """
+        if self._wire is None:
+            raise SimulatorDead(self.simulator, f"{self.name} has no request under way")
+        try:
+            answer = self._wire.receive(ahead=1)
+            payload = bytes(answer[1 + LENGTH.size :])
+            if answer[0] != _OK_BYTE:
+                raise WrongData(self.simulator, f"{self.name} failed: {payload.decode(errors='replace')}")
+            return self._decode(payload)
+        except SimulatorFault:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Drop the connection; the next call makes a new one."""
+        if self._wire is not None:
+            self._wire.close()
+            self._wire = None
+
+    def _decode(self, payload: bytes) -> Any:
+        try:
+            return self._type.response.decode(payload)
+        except ValueError as error:
+            raise WrongData(self.simulator, f"{self.name} answered with {error}") from error
+
+    def _connected(self) -> Wire:
+        if self._wire is None:
+            node = ensure_node()
+            address = Master(node).service_address(self.name)
+            if address is None:
+                raise SimulatorDead(self.simulator, f"no node serves {self.name}")
+            header = {
+                "callerid": node,
+                "md5sum": self._type.md5,
+                "persistent": "1",
+                "service": self.name,
+                "type": self._type.name,
+            }
+            self._wire = Wire(address, header, self.simulator, self._deadline_s)
+        return self._wire
+
+
+def call_together(calls: Iterable[tuple[RosService, dict[str, Any]]]) -> list[Any]:
+    """Return the responses of calls that are all sent before the first answer is awaited.
+
+    Raises:
+        SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the others' connections are
+            dropped, since their answers would come out of step.
+    """
+    sent: list[RosService] = []
+    try:
+        for service, fields in calls:
+            service.begin(**fields)
+            sent.append(service)
+        return [service.finish() for service in sent]
+    except SimulatorFault:
+        for service in sent:
+            service.close()
+        raise

@@ -1,0 +1,134 @@
+"""A ROS topic whose messages are read when they are wanted."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import struct
+import xmlrpc.client
+from collections.abc import Callable
+from typing import Any
+
+from palaestra_sim.protocol.rostypes import message_type
+from palaestra_trainer.errors import MasterLost, SimulatorDead, SimulatorFault, SimulatorHung, WrongData
+from palaestra_trainer.ros.master import Deadline, Master
+from palaestra_trainer.ros.node import ensure_node, node_uri
+from palaestra_trainer.ros.wire import Wire
+
+DEADLINE_S = 0.5
+_CONNECT_S = 5.0
+_OK = 1
+
+
+class RosSubscriber:
+    """One topic of one publisher over one connection, made by `connect` and dropped after a failure.
+
+    Args:
+        name: the full name, e.g. /robotino/ir1/value
+        type_name: e.g. sensor_msgs/Range
+        decode: reads the value out of a message's bytes; by default the whole message is decoded.
+        deadline_s: the longest wait for a message.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        type_name: str,
+        decode: Callable[[memoryview], Any] | None = None,
+        deadline_s: float = DEADLINE_S,
+    ) -> None:
+        self.name = name
+        self.simulator = name.split("/")[1]
+        self._type = message_type(type_name)
+        self._decode = decode or (lambda payload: self._type.codec.decode(bytes(payload)))
+        self._deadline_s = deadline_s
+        self._wire: Wire | None = None
+        self._registered = False
+
+    @property
+    def connected(self) -> bool:
+        """Whether a publisher is connected; messages sent before that are lost."""
+        return self._wire is not None
+
+    def connect(self) -> None:
+        """Connect to the publisher; it sees this subscriber when `connect` returns.
+
+        Raises:
+            SimulatorDead: nobody publishes the topic, or the publisher cannot be reached.
+            SimulatorHung: the publisher does not answer in time.
+        """
+        self._drop()
+        node = ensure_node()
+        publishers = Master(node).register_subscriber(self.name, self._type.name, node_uri())
+        self._registered = True
+        if not publishers:
+            raise SimulatorDead(self.simulator, f"no node publishes {self.name}")
+        address = self._ask_for_address(publishers[-1], node)
+        header = {
+            "callerid": node,
+            "md5sum": self._type.md5,
+            "message_definition": self._type.definition,
+            "tcp_nodelay": "1",
+            "topic": self.name,
+            "type": self._type.name,
+        }
+        self._wire = Wire(address, header, self.simulator, self._deadline_s)
+
+    def next(self) -> Any:
+        """Return the value of the next message, waiting for it.
+
+        Raises:
+            SimulatorHung: none came within the deadline; the connection stays.
+            SimulatorDead: the connection broke, or `connect` was never called.
+            WrongData: the message cannot be read.
+        """
+        if self._wire is None:
+            raise SimulatorDead(self.simulator, f"{self.name} is not connected")
+        try:
+            return self._decode(self._wire.receive())
+        except SimulatorHung:
+            raise
+        except SimulatorFault:
+            self._drop()
+            raise
+        except (ValueError, struct.error) as error:
+            raise WrongData(self.simulator, f"{self.name} sent {error}") from error
+
+    def newest(self, default: Any) -> Any:
+        """Return the value of the last message that has arrived, `default` if there is none.
+
+        Raises:
+            SimulatorDead, WrongData: as `next`.
+        """
+        value = default
+        while self._wire is not None and self._wire.waiting_bytes():
+            value = self.next()
+        return value
+
+    def close(self) -> None:
+        """Drop the connection and take the registration back."""
+        self._drop()
+        if self._registered:
+            self._registered = False
+            # A master that is gone has forgotten us already.
+            with contextlib.suppress(MasterLost):
+                Master(ensure_node()).unregister_subscriber(self.name, node_uri())
+
+    def _drop(self) -> None:
+        if self._wire is not None:
+            self._wire.close()
+            self._wire = None
+
+    def _ask_for_address(self, publisher: str, node: str) -> tuple[str, int]:
+        try:
+            with xmlrpc.client.ServerProxy(publisher, transport=Deadline(_CONNECT_S)) as proxy:
+                answer: Any = proxy.requestTopic(node, self.name, [["TCPROS"]])
+        except TimeoutError as error:
+            raise SimulatorHung(self.simulator, f"{self.name} has a publisher that hangs") from error
+        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+            raise SimulatorDead(self.simulator, f"{self.name} has a publisher that is gone") from error
+        code, text, parameters = answer
+        if code != _OK:
+            raise SimulatorDead(self.simulator, f"{self.name} is not published: {text}")
+        _, host, port = parameters
+        return str(host), int(port)

@@ -1,0 +1,150 @@
+"""One persistent TCPROS connection of a client, with a deadline on every wait.
+
+Deadlines are the kernel's (SO_RCVTIMEO): one system call a read, where a selector or Python's own timeout
+would make two.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Mapping
+
+from palaestra_sim.protocol.tcpros import LENGTH, MAX_FRAME_BYTES, FramingError, decode_header, encode_header
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, WrongData
+
+_TIMEVAL = struct.Struct("@ll")
+_BUFFER_BYTES = 8192
+
+
+class Wire:
+    """A connection after its handshake.
+
+    Args:
+        address: host and port of the peer.
+        header: the connection header to send, e.g. service, md5sum and callerid.
+        simulator: the name that faults carry.
+        deadline_s: the longest wait for anything from the peer.
+
+    Raises:
+        SimulatorDead: refused or closed.
+        SimulatorHung: no handshake in time.
+        WrongData: the peer serves something else under that name.
+    """
+
+    def __init__(
+        self, address: tuple[str, int], header: Mapping[str, str], simulator: str, deadline_s: float
+    ) -> None:
+        self._simulator = simulator
+        self._deadline_s = deadline_s
+        self._buffer = bytearray(_BUFFER_BYTES)
+        self._view = memoryview(self._buffer)
+        self._filled = 0
+        try:
+            self._socket = socket.create_connection(address, timeout=deadline_s)
+        except OSError as error:
+            raise self._fault("cannot be reached", error) from error
+        self._socket.settimeout(None)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        timeval = _TIMEVAL.pack(int(deadline_s), int(deadline_s % 1 * 1e6))
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)
+        try:
+            self.send(encode_header(header))
+            self._check(bytes(self.receive()))
+        except SimulatorFault:
+            self.close()
+            raise
+
+    def send(self, data: bytes) -> None:
+        """Send all of `data`.
+
+        Raises:
+            SimulatorDead, SimulatorHung: see the class.
+        """
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise self._fault("does not take requests", error) from error
+
+    def receive(self, ahead: int = 0) -> memoryview:
+        """Return the next frame, with `ahead` bytes that stand before its length; valid until the next call.
+
+        Raises:
+            SimulatorDead, SimulatorHung: see the class.
+            WrongData: a length that cannot be.
+        """
+        give_up = 0.0
+        while True:
+            end = self._frame_end(ahead)
+            if end and self._filled >= end:
+                return self._take(ahead, end)
+            self._make_room(end)
+            if give_up and time.monotonic() > give_up:
+                raise SimulatorHung(self._simulator, f"sent part of an answer in {self._deadline_s:g} s")
+            self._read_more()
+            give_up = give_up or time.monotonic() + self._deadline_s
+
+    def waiting_bytes(self) -> bool:
+        """Return whether something has arrived that nobody has read; a closed connection counts."""
+        if self._filled:
+            return True
+        try:
+            self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
+        return True
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+    def _frame_end(self, ahead: int) -> int:
+        """Return where the frame at the start of the buffer ends, 0 while its length is unknown."""
+        if self._filled < ahead + LENGTH.size:
+            return 0
+        (length,) = LENGTH.unpack_from(self._buffer, ahead)
+        if length > MAX_FRAME_BYTES:
+            raise WrongData(self._simulator, f"announced a frame of {length} bytes")
+        return ahead + LENGTH.size + int(length)
+
+    def _take(self, ahead: int, end: int) -> memoryview:
+        if self._filled == end:
+            self._filled = 0
+            return self._view[:end] if ahead else self._view[LENGTH.size : end]
+        frame = memoryview(bytes(self._view[:end]))
+        rest = bytes(self._view[end : self._filled])
+        self._view[: len(rest)] = rest
+        self._filled = len(rest)
+        return frame if ahead else frame[LENGTH.size :]
+
+    def _make_room(self, end: int) -> None:
+        if end > len(self._buffer):
+            larger = bytearray(end + _BUFFER_BYTES)
+            larger[: self._filled] = self._view[: self._filled]
+            self._buffer, self._view = larger, memoryview(larger)
+
+    def _read_more(self) -> None:
+        try:
+            count = self._socket.recv_into(self._view[self._filled :])
+        except OSError as error:
+            raise self._fault("does not answer", error) from error
+        if count == 0:
+            raise SimulatorDead(self._simulator, "closed the connection")
+        self._filled += count
+
+    def _fault(self, fact: str, error: OSError) -> SimulatorFault:
+        if isinstance(error, BlockingIOError | TimeoutError):
+            return SimulatorHung(self._simulator, f"{fact} within {self._deadline_s:g} s")
+        return SimulatorDead(self._simulator, f"{fact}: {error.strerror or error}")
+
+    def _check(self, payload: bytes) -> None:
+        try:
+            error = decode_header(payload).get("error")
+        except FramingError as wrong:
+            raise WrongData(self._simulator, str(wrong)) from wrong
+        if error is not None:
+            raise WrongData(self._simulator, f"refused the connection: {error}")

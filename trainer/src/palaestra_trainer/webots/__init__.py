@@ -1,0 +1,24 @@
+"""Layer 2: Webots as Python objects, over the services and topics of its stock `ros` controller.
+
+What is peculiar to that controller is handled here and nowhere else: the wake-up that it can lose, the step
+that blocks for ever while paused, what a reset restores and what not.
+"""
+
+from palaestra_trainer.webots.devices import DistanceSensor, Motor, Sensor, TouchSensor
+from palaestra_trainer.webots.facade import Launcher, Webots
+from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.simulation import Simulation
+from palaestra_trainer.webots.supervisor import Supervisor
+
+__all__ = [
+    "DistanceSensor",
+    "Launcher",
+    "Mode",
+    "Motor",
+    "Observer",
+    "Sensor",
+    "Simulation",
+    "Supervisor",
+    "TouchSensor",
+    "Webots",
+]

@@ -1,0 +1,168 @@
+"""The devices of a robot: sensors that publish, motors that obey."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from palaestra_trainer.errors import SimulatorHung, WrongData
+from palaestra_trainer.ros import RosService, RosSubscriber
+from palaestra_trainer.webots.services import Services
+
+# The reading is the last field of the message, so the header before it need not be decoded.
+_FLOAT32 = struct.Struct("<f")
+_FLOAT64 = struct.Struct("<d")
+
+# Webots replaces these in names of devices, and nothing else.
+_REPLACED = str.maketrans("-. ()", "_____")
+
+
+def topic_name(device: str) -> str:
+    """Return the device's name as it stands in paths, e.g. touch_sensor for "touch sensor"."""
+    return device.translate(_REPLACED)
+
+
+class Sensor:
+    """A sensor: enabled with a period, then read once a step.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        device: the device's name in the world, e.g. ir1
+        type_name: the type of its topic.
+        decode: reads the value out of a message's bytes.
+    """
+
+    def __init__(
+        self, robot: str, device: str, type_name: str, decode: Callable[[memoryview], Any] | None = None
+    ) -> None:
+        self.device = device
+        path = f"/{robot}/{topic_name(device)}"
+        self._enable = RosService(f"{path}/enable", "webots_ros/set_int")
+        self._values = RosSubscriber(f"{path}/value", type_name, decode)
+        self._value: Any = None
+        self._late = False
+
+    @property
+    def value(self) -> Any:
+        """The last reading; None before the first step."""
+        return self._value
+
+    def enable(self, period_ms: int) -> None:
+        """Let the sensor publish every `period_ms` of simulated time, and subscribe.
+
+        Raises:
+            WrongData: the period is not a multiple of the step.
+            SimulatorDead, SimulatorHung: as `RosService`.
+        """
+        if not self._enable(value=period_ms).success:
+            raise WrongData(
+                self._enable.simulator,
+                f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step",
+            )
+        self._values.connect()
+        self._late = False
+
+    def forget_old(self) -> None:
+        """Throw away what came too late for the step it belonged to."""
+        if self._late:
+            self._value = self._values.newest(self._value)
+
+    def read(self) -> bool:
+        """Take the next message; False when it did not come in time, the value stays then.
+
+        Raises:
+            SimulatorDead, WrongData: as `RosSubscriber`.
+        """
+        try:
+            self._value = self._values.next()
+        except SimulatorHung:
+            self._late = True
+            return False
+        if self._late:
+            self._value = self._values.newest(self._value)
+            self._late = False
+        return True
+
+    def disable(self) -> None:
+        """Stop the sensor and unsubscribe."""
+        self._enable(value=0)
+        self.close()
+
+    def close(self) -> None:
+        """Drop the connections."""
+        self._enable.close()
+        self._values.close()
+
+
+class DistanceSensor(Sensor):
+    """A distance sensor; `value` is what its lookup table gives, volts for a Robotino."""
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "sensor_msgs/Range", self._range)
+
+    def _range(self, payload: memoryview) -> float:
+        (value,) = _FLOAT32.unpack_from(payload, len(payload) - _FLOAT32.size)
+        return _finite(value, self.device)
+
+
+class TouchSensor(Sensor):
+    """A bumper; `value` is True while something touches it."""
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "webots_ros/BoolStamped", _last_byte)
+
+
+class PositionSensor(Sensor):
+    """The position of a joint; `value` in radians or metres."""
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "webots_ros/Float64Stamped", self._position)
+
+    def _position(self, payload: memoryview) -> float:
+        (value,) = _FLOAT64.unpack_from(payload, len(payload) - _FLOAT64.size)
+        return _finite(value, self.device)
+
+
+class Motor:
+    """A motor under velocity control.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        device: the motor's name in the world, e.g. wheel0_joint
+    """
+
+    def __init__(self, robot: str, device: str) -> None:
+        services = Services(robot)
+        name = topic_name(device)
+        self._services = services
+        self._position = services.get(f"{name}/set_position", "set_float")
+        self.velocity_service = services.get(f"{name}/set_velocity", "set_float")
+
+    def set_velocity(self, velocity: float) -> None:
+        """Turn at `velocity` rad/s from the next step on."""
+        self.velocity_service(value=velocity)
+
+    def set_position(self, position: float) -> None:
+        """Turn to `position` rad; infinity means velocity control."""
+        self._position(value=position)
+
+    def release(self) -> None:
+        """Stand still under velocity control, as needed at the start and after every reset."""
+        self.set_position(math.inf)
+        self.set_velocity(0.0)
+
+    def close(self) -> None:
+        """Drop the connections."""
+        self._services.close()
+
+
+def _last_byte(payload: memoryview) -> bool:
+    return bool(payload[-1])
+
+
+def _finite(value: float, device: str) -> float:
+    if math.isnan(value):
+        raise ValueError(f"NaN from {device}")
+    return value

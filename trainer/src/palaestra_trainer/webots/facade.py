@@ -1,0 +1,166 @@
+"""Webots, started on demand: the paper's facade."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self, TypeVar
+
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.supervisor import Supervisor
+
+Result = TypeVar("Result")
+
+_PROBE_S = 1.0
+_POLL_S = 0.02
+
+
+class Launcher(Protocol):
+    """What starts the simulator's process, and knows whether it runs."""
+
+    def start(self) -> None:
+        """Begin to start it; return before it is ready."""
+        ...
+
+    def confirm_ready(self) -> None:
+        """Tell that it has answered a real round trip."""
+        ...
+
+    def expect_stop(self, deadline_s: float) -> None:
+        """Announce that it will end; it is killed once `deadline_s` seconds have passed."""
+        ...
+
+    def failure(self) -> str | None:
+        """Return why it is not running any more, None while it runs or starts."""
+        ...
+
+    def wait_stopped(self, deadline_s: float) -> None:
+        """Return when its process has ended.
+
+        Raises:
+            SimulatorHung: it has not within `deadline_s` seconds.
+        """
+        ...
+
+
+class Webots:
+    """One simulator, started, stopped and switched between fast and pause.
+
+    Args:
+        supervisor_node_name: the ROS name of the world's supervisor.
+        world_path: the world to load; or the name of a world that ships, e.g. "arena".
+        launcher: what starts the process; by default a process on this machine.
+        start_deadline_s: the longest time until it answers.
+        stop_deadline_s: the longest time it may take to quit by itself.
+    """
+
+    def __init__(
+        self,
+        supervisor_node_name: str,
+        world_path: str | Path,
+        *,
+        launcher: Launcher | None = None,
+        start_deadline_s: float = 60.0,
+        stop_deadline_s: float = 5.0,
+    ) -> None:
+        if launcher is None:
+            # The launcher talks to a sidecar, which this layer knows nothing of.
+            from palaestra_trainer.simulators.process import ProcessLauncher  # noqa: PLC0415
+
+            launcher = ProcessLauncher(world_path)
+        self.supervisor_node_name = supervisor_node_name
+        self.world_path = world_path
+        self.observer = Observer(supervisor_node_name)
+        self.supervisor = Supervisor(supervisor_node_name, self.observer)
+        self._launcher = launcher
+        # Its own connection, with a shorter patience: a simulator that hangs is not available.
+        self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
+        self._start_deadline_s = start_deadline_s
+        self._stop_deadline_s = stop_deadline_s
+
+    def start(self) -> None:
+        """Start the simulator and return when it answers.
+
+        Raises:
+            SimulatorDead: its process ended.
+            SimulatorHung: it did not answer in time.
+        """
+        self._disconnect()
+        self._launcher.start()
+        give_up = time.monotonic() + self._start_deadline_s
+        while not self.available():
+            failure = self._launcher.failure()
+            if failure is not None:
+                raise SimulatorDead(self.supervisor_node_name, failure)
+            if time.monotonic() > give_up:
+                raise SimulatorHung(
+                    self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
+                )
+            time.sleep(_POLL_S)  # between two real round trips; the master has no call that waits
+        self._launcher.confirm_ready()
+
+    def stop(self) -> None:
+        """Let the simulator quit through its supervisor; it is killed only when it does not.
+
+        Raises:
+            SimulatorHung: even killing it had no effect in time.
+        """
+        if self.available():
+            self._launcher.expect_stop(self._stop_deadline_s)
+            # It may break before it quits; the announced deadline ends it then.
+            with contextlib.suppress(SimulatorFault):
+                self.supervisor.quit()
+        else:
+            self._launcher.expect_stop(0.0)
+        self._disconnect()
+        self._launcher.wait_stopped(self._stop_deadline_s + _PROBE_S)
+
+    def __call__(self) -> None:
+        """Restart the simulator."""
+        self.stop()
+        self.start()
+
+    def available(self) -> bool:
+        """Return whether the simulator answers a real round trip now."""
+        try:
+            self._probe(ask=True)
+        except SimulatorFault:
+            return False
+        return True
+
+    def run(self, callback: Callable[[], Result], restart: bool = False) -> Result:  # noqa: FBT001, FBT002 - the paper's signature
+        """Return what `callback` returns, called while the simulation runs as fast as possible.
+
+        Args:
+            callback: what needs the simulation.
+            restart: whether the simulator is started anew before.
+        """
+        if restart:
+            self()
+        with self:
+            return callback()
+
+    def __enter__(self) -> Self:
+        if not self.available():
+            self.start()
+        self.supervisor.set_mode(Mode.FAST)
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if not isinstance(exc, SimulatorFault):
+            self.supervisor.set_mode(Mode.PAUSE)
+
+    def _disconnect(self) -> None:
+        self._probe.close()
+        self.observer.close()
+        self.supervisor.close()

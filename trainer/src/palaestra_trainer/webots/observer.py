@@ -1,0 +1,122 @@
+"""What can be asked of a simulation without changing it."""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import Any
+
+from palaestra_trainer.errors import WrongData
+from palaestra_trainer.ros import call_together
+from palaestra_trainer.webots.services import Services
+
+
+class Mode(enum.IntEnum):
+    """How time passes. Numbers of Webots R2021a and later."""
+
+    PAUSE = 0
+    REAL_TIME = 1
+    FAST = 2
+
+
+class Observer:
+    """Probes of the supervisor's controller; none of them affects the simulation.
+
+    Every method raises SimulatorDead, SimulatorHung or WrongData.
+
+    Args:
+        node_name: the ROS name of the supervisor.
+    """
+
+    def __init__(self, node_name: str) -> None:
+        self.node_name = node_name
+        self._services = Services(node_name)
+        self._nodes: dict[str, int] = {}
+        self._fields: dict[tuple[str, str], int] = {}
+
+    def time(self) -> float:
+        """Return the simulated time in seconds."""
+        return float(self._services.ask("robot/get_time", "get_float"))
+
+    def basic_time_step_ms(self) -> int:
+        """Return the length of one physics step in milliseconds."""
+        return int(self._services.ask("robot/get_basic_time_step", "get_float"))
+
+    def mode(self) -> Mode:
+        """Return how time passes."""
+        return Mode(self._services.ask("supervisor/simulation_get_mode", "get_int"))
+
+    def world_path(self) -> str:
+        """Return the path of the world that is loaded."""
+        return str(self._services.ask("robot/get_world_path", "get_string"))
+
+    def devices(self) -> tuple[str, ...]:
+        """Return the names of the robot's devices."""
+        return tuple(self._services.get("robot/get_device_list", "robot_get_device_list")(ask=1).list)
+
+    def exists(self, name: str) -> bool:
+        """Return whether the world has a node with DEF `name`."""
+        return bool(self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name).node)
+
+    def pose(self, name: str) -> tuple[float, float, float]:
+        """Return x and y in metres and the heading in radians of the node with DEF `name`."""
+        node = self.node(name)
+        position, orientation = call_together(
+            (
+                (self._services.get("supervisor/node/get_position", "node_get_position"), {"node": node}),
+                (
+                    self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
+                    {"node": node},
+                ),
+            )
+        )
+        turn = orientation.orientation
+        heading = 2.0 * math.atan2(turn.z, turn.w)
+        pose = (position.position.x, position.position.y, math.remainder(heading, 2.0 * math.pi))
+        if not all(map(math.isfinite, pose)):
+            raise WrongData(self.node_name, f"the pose of {name} is {pose}")
+        return pose
+
+    def translation(self, name: str) -> tuple[float, float, float]:
+        """Return the translation field, in metres, of the node with DEF `name`."""
+        field = self.field(name, "translation")
+        value = self._services.get("supervisor/field/get_vec3f", "field_get_vec3f")(field=field).value
+        return (value.x, value.y, value.z)
+
+    def node(self, name: str) -> int:
+        """Return the handle of the node with DEF `name`; it holds until the world is loaded anew.
+
+        Raises:
+            WrongData: the world has no such node.
+        """
+        if name not in self._nodes:
+            answer = self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name)
+            self._nodes[name] = self._known(answer.node, f"no node DEF {name}")
+        return self._nodes[name]
+
+    def field(self, name: str, field: str) -> int:
+        """Return the handle of a field of the node with DEF `name`.
+
+        Raises:
+            WrongData: the node has no such field.
+        """
+        if (name, field) not in self._fields:
+            service = self._services.get("supervisor/node/get_field", "node_get_field")
+            answer = service(node=self.node(name), fieldName=field)
+            self._fields[name, field] = self._known(answer.field, f"{name} has no field {field}")
+        return self._fields[name, field]
+
+    def forget_handles(self) -> None:
+        """Drop all handles, which dangle after the world or the simulator was loaded anew."""
+        self._nodes.clear()
+        self._fields.clear()
+
+    def close(self) -> None:
+        """Drop handles and connections."""
+        self.forget_handles()
+        self._services.close()
+
+    def _known(self, handle: Any, fact: str) -> int:
+        if not handle:
+            raise WrongData(self.node_name, f"the world has {fact}")
+        return int(handle)

@@ -1,0 +1,36 @@
+"""The services of one controller, by path, each made when first used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palaestra_trainer.ros import RosService
+
+
+class Services:
+    """What one robot's controller serves.
+
+    Args:
+        node_name: the ROS name of the controller, e.g. robotino
+    """
+
+    def __init__(self, node_name: str) -> None:
+        self.node_name = node_name
+        self._services: dict[str, RosService] = {}
+
+    def get(self, path: str, type_name: str) -> RosService:
+        """Return the service at `path`, relative to the node, of type webots_ros/`type_name`."""
+        service = self._services.get(path)
+        if service is None:
+            service = RosService(f"/{self.node_name}/{path}", f"webots_ros/{type_name}")
+            self._services[path] = service
+        return service
+
+    def ask(self, path: str, type_name: str) -> Any:
+        """Return the `value` of a service that takes no argument."""
+        return self.get(path, type_name)(ask=True).value
+
+    def close(self) -> None:
+        """Drop all connections."""
+        for service in self._services.values():
+            service.close()

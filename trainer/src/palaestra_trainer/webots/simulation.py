@@ -1,0 +1,96 @@
+"""The steps of a simulation: the only caller of `time_step`.
+
+One step lasts one period, for all robots of the world at once, and brings one message of every sensor. The
+controller can miss its own wake-up and then sends nothing for that step; so a missing message is awaited for
+a bounded time, and then the simulation steps once more, which is no fault but is counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from palaestra_trainer.errors import SimulatorHung, WrongData
+from palaestra_trainer.ros import RosService, call_together
+from palaestra_trainer.webots.devices import Motor, Sensor
+from palaestra_trainer.webots.supervisor import Supervisor
+
+# Two extra steps deliver whatever a lost wake-up withheld; a sensor that is silent after them is broken.
+_MOST_EXTRA_STEPS = 2
+
+
+class Simulation:
+    """Steps and resets.
+
+    Args:
+        robots: the ROS names of all robots of the world; a step lasts until each has asked for it.
+        supervisor: resets, and places what is moved.
+        period_ms: simulated milliseconds a step, a multiple of the world's basicTimeStep.
+    """
+
+    def __init__(self, robots: Sequence[str], supervisor: Supervisor, period_ms: int) -> None:
+        self.period_ms = period_ms
+        self._supervisor = supervisor
+        self._steps = [RosService(f"/{robot}/robot/time_step", "webots_ros/set_int") for robot in robots]
+        self._sensors: list[Sensor] = []
+        self._motors: list[Motor] = []
+
+    def add(self, sensors: Sequence[Sensor], motors: Sequence[Motor]) -> None:
+        """Let a robot's devices take part: its sensors are read each step, its motors released at resets."""
+        self._sensors += sensors
+        self._motors += motors
+
+    def connect(self) -> None:
+        """Enable every sensor and release every motor, after the simulator has started.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        for sensor in self._sensors:
+            sensor.enable(self.period_ms)
+        self._release_motors()
+
+    def step(self) -> int:
+        """Simulate one period and read every sensor; return the extra steps it took, normally 0.
+
+        Raises:
+            SimulatorDead, SimulatorHung: also when a sensor stays silent.
+            WrongData: the simulator refused the period, or a reading cannot be right.
+        """
+        for sensor in self._sensors:
+            sensor.forget_old()
+        self._advance()
+        silent = [sensor for sensor in self._sensors if not sensor.read()]
+        extra_steps = 0
+        while silent:
+            if extra_steps == _MOST_EXTRA_STEPS:
+                raise SimulatorHung(self._supervisor.node_name, f"{silent[0].device} stays silent")
+            extra_steps += 1
+            self._advance()
+            silent = [sensor for sensor in self._sensors if not sensor.read() and sensor in silent]
+        return extra_steps
+
+    def reset(self, seed: int) -> None:
+        """Bring the simulation back to its start, with that seed; what the scene moves is placed afterwards.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        self._supervisor.set_seed(seed)
+        self._supervisor.reset()
+        self.step()
+        self._release_motors()
+
+    def close(self) -> None:
+        """Drop all connections of steps, sensors and motors."""
+        parts: tuple[RosService | Sensor | Motor, ...] = (*self._steps, *self._sensors, *self._motors)
+        for part in parts:
+            part.close()
+
+    def _advance(self) -> None:
+        answers = call_together([(step, {"value": self.period_ms}) for step in self._steps])
+        if not all(answer.success for answer in answers):
+            raise WrongData(self._supervisor.node_name, f"refused a step of {self.period_ms} ms")
+
+    def _release_motors(self) -> None:
+        for motor in self._motors:
+            motor.release()

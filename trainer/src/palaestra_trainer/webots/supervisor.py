@@ -1,0 +1,98 @@
+"""What changes a simulation."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.ros import call_together
+from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.services import Services
+
+# An exact identity quaternion has no axis, so Webots would keep the old rotation and still report success.
+_SMALLEST_TURN = 1e-6
+
+
+class Supervisor:
+    """Changes, through the supervisor's controller.
+
+    Every method raises SimulatorDead, SimulatorHung or WrongData. Field changes take effect with the next
+    step.
+
+    Args:
+        node_name: the ROS name of the supervisor.
+        observer: where node and field handles are looked up.
+    """
+
+    def __init__(self, node_name: str, observer: Observer) -> None:
+        self.node_name = node_name
+        self._observer = observer
+        self._services = Services(node_name)
+
+    def set_mode(self, mode: Mode) -> None:
+        """Let time pass as `mode` says. Never step while paused: the controller would block for ever."""
+        self._services.get("supervisor/simulation_set_mode", "set_int")(value=int(mode))
+
+    def reset(self) -> None:
+        """Bring the simulation back to its start within the next step; enabled sensors stay enabled."""
+        self._services.ask("supervisor/simulation_reset", "get_bool")
+
+    def reload(self) -> None:
+        """Load the world anew; controllers restart, and everything must be connected again."""
+        # The answer may be lost with the controller that gave it.
+        with contextlib.suppress(SimulatorDead):
+            self._services.ask("supervisor/world_reload", "get_bool")
+        self._observer.close()
+        self._services.close()
+
+    def quit(self, status: int = 0) -> None:
+        """End the simulator with an exit status."""
+        try:
+            self._services.get("supervisor/simulation_quit", "set_int")(value=status)
+        finally:
+            self._services.close()
+
+    def set_seed(self, seed: int) -> None:
+        """Give the simulation the seed that it takes at the next reset, by way of the robot's customData."""
+        self._services.get("robot/set_custom_data", "set_string")(value=f'{{"seed": {seed}}}')
+
+    def place(self, name: str, x_m: float, y_m: float, heading_rad: float | None = None) -> None:
+        """Move the node with DEF `name` on the floor, turn it unless the heading is None, and stop it."""
+        height = self._observer.translation(name)[2]
+        setters = [
+            (
+                self._services.get("supervisor/field/set_vec3f", "field_set_vec3f"),
+                {
+                    "field": self._observer.field(name, "translation"),
+                    "value": {"x": x_m, "y": y_m, "z": height},
+                },
+            )
+        ]
+        if heading_rad is not None:
+            setters.append(
+                (
+                    self._services.get("supervisor/field/set_rotation", "field_set_rotation"),
+                    {
+                        "field": self._observer.field(name, "rotation"),
+                        "value": _turn_about_z(heading_rad),
+                    },
+                )
+            )
+        call_together(setters)
+
+    def stop_inertia(self, name: str) -> None:
+        """Take all speed from the node with DEF `name` and what hangs on it."""
+        service = self._services.get("supervisor/node/reset_physics", "node_reset_functions")
+        service(node=self._observer.node(name))
+
+    def close(self) -> None:
+        """Drop the connections."""
+        self._services.close()
+
+
+def _turn_about_z(heading_rad: float) -> dict[str, float]:
+    z = math.sin(heading_rad / 2.0)
+    if abs(z) < _SMALLEST_TURN:
+        return {"x": 0.0, "y": 0.0, "z": _SMALLEST_TURN, "w": 1.0}
+    return {"x": 0.0, "y": 0.0, "z": z, "w": math.cos(heading_rad / 2.0)}
