@@ -1,20 +1,9 @@
-"""A real ROS master, and a node of the stub's kind in a thread."""
+"""A node of the stub's kind in a thread, beside a real ROS master."""
 
-import os
 import threading
 
 import pytest
 from palaestra_sim.stub.ros import LATER, Loop, RosNode, ServiceFailed
-from palaestra_trainer.simulators.master import ensure_master
-
-
-@pytest.fixture(scope="session", autouse=True)
-def master():
-    """One master a process: rospy registers once."""
-    os.environ["ROS_HOSTNAME"] = "localhost"
-    os.environ["ROS_MASTER_URI"] = "http://localhost:1"
-    ensure_master()
-    return os.environ["ROS_MASTER_URI"]
 
 
 class Peer:

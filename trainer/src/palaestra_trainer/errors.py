@@ -1,14 +1,14 @@
 """What can go wrong in a trainer, and whether trying again can help.
 
-    TrainerError
-    ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
-    ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
-    ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
-    ├── NoSuchSensor         this robot does not have it
-    └── SimulatorFault       one simulator broke; restart it and go on
-        ├── SimulatorDead    its connections are refused or were closed
-        ├── SimulatorHung    it is connected and does not answer in time
-        └── WrongData        it answered, with something that cannot be right
+TrainerError
+├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
+├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
+├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
+├── NoSuchSensor         this robot does not have it
+└── SimulatorFault       one simulator broke; restart it and go on
+    ├── SimulatorDead    its connections are refused or were closed
+    ├── SimulatorHung    it is connected and does not answer in time
+    └── WrongData        it answered, with something that cannot be right
 """
 
 from __future__ import annotations

@@ -157,7 +157,8 @@ class _StructCodec:
         self._struct = struct.Struct("<" + "".join(_STRUCT_CODES[type_] for type_ in spec.types))
         # As in genpy: a field called `from` is an attribute called `from_`.
         self._names = tuple(name + "_" * keyword.iskeyword(name) for name in spec.names)
-        self._make = namedtuple(spec.short_name, self._names)._make  # noqa: PYI024 - made at run time
+        made: Any = namedtuple(spec.short_name, self._names)  # noqa: PYI024 - made at run time
+        self._make = made._make
 
     def encode(self, fields: dict[str, Any]) -> bytes:
         return self._struct.pack(*[fields.get(name, 0) for name in self._names])

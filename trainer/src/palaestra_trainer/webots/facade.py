@@ -92,6 +92,16 @@ class Webots:
         """
         self._disconnect()
         self._launcher.start()
+        self.wait_available()
+        self._launcher.confirm_ready()
+
+    def wait_available(self) -> None:
+        """Return when the simulator answers, after a start or a reload.
+
+        Raises:
+            SimulatorDead: its process ended.
+            SimulatorHung: it did not answer in time.
+        """
         give_up = time.monotonic() + self._start_deadline_s
         while not self.available():
             failure = self._launcher.failure()
@@ -102,7 +112,6 @@ class Webots:
                     self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
                 )
             time.sleep(_POLL_S)  # between two real round trips; the master has no call that waits
-        self._launcher.confirm_ready()
 
     def stop(self) -> None:
         """Let the simulator quit through its supervisor; it is killed only when it does not.
@@ -159,6 +168,10 @@ class Webots:
     ) -> None:
         if not isinstance(exc, SimulatorFault):
             self.supervisor.set_mode(Mode.PAUSE)
+
+    def close(self) -> None:
+        """Drop all connections; the simulator is left as it is."""
+        self._disconnect()
 
     def _disconnect(self) -> None:
         self._probe.close()

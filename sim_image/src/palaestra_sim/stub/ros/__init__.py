@@ -6,6 +6,7 @@ loop for everything that moves (`loop`), and names, services and topics on top (
 """
 
 from palaestra_sim.stub.ros.loop import Loop
+from palaestra_sim.stub.ros.master import MasterUnreachable
 from palaestra_sim.stub.ros.node import LATER, Publisher, RosNode, ServiceFailed
 
-__all__ = ["LATER", "Loop", "Publisher", "RosNode", "ServiceFailed"]
+__all__ = ["LATER", "Loop", "MasterUnreachable", "Publisher", "RosNode", "ServiceFailed"]

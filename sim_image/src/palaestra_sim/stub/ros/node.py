@@ -7,6 +7,7 @@ robot or for the end of a pause.
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import struct
 import time
@@ -18,7 +19,7 @@ from palaestra_sim.protocol.rostypes import MessageType, ServiceType, message_ty
 from palaestra_sim.protocol.tcpros import LENGTH, encode_header, frame
 from palaestra_sim.stub.ros.links import Endpoint, Link, Refused
 from palaestra_sim.stub.ros.loop import Loop
-from palaestra_sim.stub.ros.master import Master, SlaveApi, bind_address, host_name
+from palaestra_sim.stub.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name
 
 LATER: Final = object()
 Handler = Callable[[Any], Any]
@@ -131,10 +132,12 @@ class RosNode:
 
     def close(self) -> None:
         """Unregister, as a controller that ends in good order does, and close every socket."""
-        for name in self._services:
-            self._master.call("unregisterService", name, self._rosrpc)
-        for name in self._topics:
-            self._master.call("unregisterPublisher", name, self._slave.uri)
+        # A master that is gone has forgotten us already.
+        with contextlib.suppress(MasterUnreachable):
+            for name in self._services:
+                self._master.call("unregisterService", name, self._rosrpc)
+            for name in self._topics:
+                self._master.call("unregisterPublisher", name, self._slave.uri)
         self.abandon()
 
     def abandon(self) -> None:

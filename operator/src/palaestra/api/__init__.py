@@ -1,0 +1,35 @@
+"""The TrainingJob: what a person writes, checked, and everything that is generated from it.
+
+The models are the one source: the custom resource definition, its rules and the reference page are
+made from them. Nothing here touches a cluster, a file or a clock.
+"""
+
+from palaestra.api.job import API_VERSION, KIND, Metadata, Spec, TrainingJob
+from palaestra.api.loading import as_data, dump, load, validate
+from palaestra.api.scheduling import Scheduling
+from palaestra.api.simulators import Driver, Role, SimulatorGroup, World
+from palaestra.api.status import Status
+from palaestra.api.storage import Storage
+from palaestra.api.trainer import AlgorithmName, Reward, Trainer
+
+__all__ = [
+    "API_VERSION",
+    "KIND",
+    "AlgorithmName",
+    "Driver",
+    "Metadata",
+    "Reward",
+    "Role",
+    "Scheduling",
+    "SimulatorGroup",
+    "Spec",
+    "Status",
+    "Storage",
+    "Trainer",
+    "TrainingJob",
+    "World",
+    "as_data",
+    "dump",
+    "load",
+    "validate",
+]

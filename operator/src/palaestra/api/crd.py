@@ -1,0 +1,74 @@
+"""The CustomResourceDefinition, made from the models.
+
+What an API server is to check stands in the models; what is Kubernetes' own, names, scope, columns
+and the status subresource, stands here.
+"""
+
+from typing import Any
+
+from palaestra.api.job import API_VERSION, KIND, TrainingJob
+from palaestra.api.structural import Schema, freeze, structural, without_marks
+
+GROUP, VERSION = API_VERSION.split("/")
+
+_COLUMNS = (
+    ("Status", "string", ".status.phase", "Where the job stands", 0),
+    ("Replicas", "string", ".status.running", "Replicas that run or have succeeded, of all", 0),
+    ("Step", "integer", ".status.step", "Step of the replica that is furthest behind", 0),
+    ("Success", "number", ".status.successRate", "Success rate of the worst replica", 0),
+    ("Algorithm", "string", ".spec.trainer.algorithm.name", "The learning algorithm", 1),
+    ("Target", "integer", ".spec.trainer.steps", "Environment steps of the whole run", 1),
+    ("Started", "date", ".status.startTime", "When the first pod started", 1),
+    ("Completed", "date", ".status.completionTime", "When the last replica ended", 1),
+    ("Age", "date", ".metadata.creationTimestamp", "When the job was made", 0),
+)
+
+
+def crd() -> dict[str, Any]:
+    """Return the CustomResourceDefinition of TrainingJobs as plain data."""
+    return {
+        "apiVersion": "apiextensions.k8s.io/v1",
+        "kind": "CustomResourceDefinition",
+        "metadata": {"name": f"trainingjobs.{GROUP}"},
+        "spec": {
+            "group": GROUP,
+            "names": {
+                "kind": KIND,
+                "listKind": f"{KIND}List",
+                "plural": "trainingjobs",
+                "singular": "trainingjob",
+                "shortNames": ["tj"],
+            },
+            "scope": "Namespaced",
+            "versions": [
+                {
+                    "name": VERSION,
+                    "served": True,
+                    "storage": True,
+                    "subresources": {"status": {}},
+                    "additionalPrinterColumns": [_column(*column) for column in _COLUMNS],
+                    "schema": {"openAPIV3Schema": schema()},
+                }
+            ],
+        },
+    }
+
+
+def schema() -> Schema:
+    """Return the structural schema of a TrainingJob."""
+    source = TrainingJob.model_json_schema(by_alias=True)
+    whole = structural(source, source["$defs"])
+    fields = whole["properties"]
+    freeze(fields["spec"])
+    for heading in ("apiVersion", "kind"):  # the API server checks these itself
+        fields[heading] = {"type": "string", "maxLength": 63}
+    name = fields["metadata"]["properties"]["name"]  # and may be told about no more than the name
+    fields["metadata"] = {"type": "object", "properties": {"name": name}}
+    del fields["status"]["default"]
+    plain: Schema = without_marks(whole)
+    return plain
+
+
+def _column(name: str, kind: str, path: str, description: str, priority: int) -> dict[str, Any]:
+    column = {"name": name, "type": kind, "jsonPath": path, "description": description}
+    return column | ({"priority": priority} if priority else {})

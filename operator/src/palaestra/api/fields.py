@@ -1,0 +1,168 @@
+"""The kinds of value that a TrainingJob is made of, each bounded.
+
+Everything has a largest size: an API server estimates what a rule may cost from the largest
+object that the schema admits, and refuses a schema whose strings, lists or maps may grow for ever.
+Patterns are read by two engines, Rust's here and Go's in the API server: plain ASCII classes only.
+"""
+
+import json
+from typing import Annotated, Any, Protocol, TypeVar
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+T = TypeVar("T")
+
+# Marks, in a field's JSON schema, what may be changed after the job was accepted.
+MAY_CHANGE = "x-may-change"
+
+LABEL = "^[a-z]([-a-z0-9]*[a-z0-9])?$"
+SUBDOMAIN = "^[a-z0-9]([-a-z0-9]*[a-z0-9])?([.][a-z0-9]([-a-z0-9]*[a-z0-9])?)*$"
+QUALIFIED = "^[a-z0-9]([-a-z0-9.]*[a-z0-9])?/[A-Za-z0-9]([-A-Za-z0-9_.]*[A-Za-z0-9])?$"
+FILE_KEY = "^[-._a-zA-Z0-9]+$"
+VARIABLE = "^[A-Za-z_][A-Za-z0-9_]*$"
+IMAGE = "^[A-Za-z0-9][-A-Za-z0-9._:/@]*$"
+LABEL_VALUE = "^([A-Za-z0-9]([-A-Za-z0-9_.]*[A-Za-z0-9])?)?$"
+QUANTITY = "^[0-9]+([.][0-9]+)?(m|k|M|G|T|P|Ki|Mi|Gi|Ti|Pi)?$"
+FOLDER = "^[A-Za-z0-9][-A-Za-z0-9._]*$"
+WORLD_FILE = "^/.+[.]wbt$"
+ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
+
+# For each pattern: what a value that does not match is not, and what to write instead.
+PATTERNS: dict[str, tuple[str, str]] = {
+    LABEL: ("a name", "use a-z first, then a-z, 0-9 and '-', no '-' at the end"),
+    SUBDOMAIN: ("the name of an object", "use a-z, 0-9, '-' and '.'"),
+    QUALIFIED: ("a name with a domain", "write it as example.com/name"),
+    FILE_KEY: ("a key", "use letters, digits, '-', '_' and '.'"),
+    VARIABLE: ("the name of a variable", "use letters, digits and '_', no digit first"),
+    IMAGE: ("an image", "write it as registry/name:tag"),
+    QUANTITY: ("a quantity", "write a number and a unit, as 500m, 2, 512Mi or 1Gi"),
+    LABEL_VALUE: ("the value of a label", "use letters, digits, '-', '_' and '.'"),
+    FOLDER: ("the name of a folder", "use letters, digits, '-', '_' and '.', no '/'"),
+    WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt file"),
+    ENVIRONMENT_ID: (
+        "the id of an environment",
+        "write it as gymnasium knows it, as MoveToTargetEnv-v0",
+    ),
+}
+
+# The pods' names, hash included, have to be DNS labels of at most 63 characters.
+JobName = Annotated[str, Field(min_length=1, max_length=48, pattern=LABEL)]
+GroupName = Annotated[str, Field(min_length=1, max_length=20, pattern=LABEL)]
+Label = Annotated[str, Field(min_length=1, max_length=63, pattern=LABEL)]
+ObjectName = Annotated[str, Field(min_length=1, max_length=253, pattern=SUBDOMAIN)]
+FileKey = Annotated[str, Field(min_length=1, max_length=253, pattern=FILE_KEY)]
+Image = Annotated[str, Field(min_length=1, max_length=512, pattern=IMAGE)]
+Text = Annotated[str, Field(max_length=1024)]
+Word = Annotated[str, Field(min_length=1, max_length=256)]
+Sentence = Annotated[str, Field(max_length=4096)]
+Seconds = Annotated[int, Field(ge=1, le=31_536_000)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=0, le=2_000_000_000)]
+
+# Lists come from YAML as lists and are kept as tuples, so that a job cannot change.
+Listed = Annotated[tuple[T, ...], Field(strict=False)]
+Words = Annotated[Listed[Word], Field(max_length=64)]
+
+
+class Named(Protocol):
+    """An item of a list whose items are told apart by their names."""
+
+    @property
+    def name(self) -> str:
+        """The item's name."""
+        ...
+
+
+N = TypeVar("N", bound=Named)
+
+
+def _told_apart(items: tuple[N, ...]) -> tuple[N, ...]:
+    """Return `items` when no two have the same name."""
+    names = [item.name for item in items]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise PydanticCustomError(
+            "twice",
+            "{name} is the name of two of them; give each its own",
+            {"name": json.dumps(twice[0])},
+        )
+    return items
+
+
+# In the CRD the API server itself sees to it that no two names are equal.
+NamedList = Annotated[
+    Listed[N],
+    AfterValidator(_told_apart),
+    Field(
+        json_schema_extra={
+            "x-kubernetes-list-type": "map",
+            "x-kubernetes-list-map-keys": ["name"],
+        }
+    ),
+]
+TextMap = Annotated[dict[Annotated[str, Field(max_length=317)], Text], Field(max_length=32)]
+LabelMap = Annotated[
+    dict[
+        Annotated[str, Field(max_length=317)],
+        Annotated[str, Field(max_length=63, pattern=LABEL_VALUE)],
+    ],
+    Field(max_length=32),
+]
+
+
+def _as_text(value: object) -> object:
+    """Return a whole number as the text of a quantity; a fraction must be quoted by its author."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value)
+    return value
+
+
+Quantity = Annotated[
+    str,
+    Field(max_length=32, pattern=QUANTITY),
+    BeforeValidator(_as_text),
+    WithJsonSchema(
+        {"x-kubernetes-int-or-string": True, "maxLength": 32, "pattern": QUANTITY},
+    ),
+]
+Quantities = Annotated[dict[Annotated[str, Field(max_length=317)], Quantity], Field(max_length=16)]
+
+_DEEPEST = 8
+_LONGEST_TEXT = 4096
+_MOST_VALUES = 1000
+
+
+def _plain(value: object, depth: int) -> int:
+    """Return how many values `value` holds; raise ValueError where JSON could not carry one."""
+    if depth > _DEEPEST:
+        raise PydanticCustomError("free", "is nested deeper than 8; flatten it")
+    if isinstance(value, dict):
+        if not all(isinstance(key, str) for key in value):
+            raise PydanticCustomError("free", "has a key that is not text; quote it")
+        return 1 + sum(_plain(item, depth + 1) for item in value.values())
+    if isinstance(value, list):
+        return 1 + sum(_plain(item, depth + 1) for item in value)
+    if isinstance(value, str) and len(value) > _LONGEST_TEXT:
+        raise PydanticCustomError("free", "holds a text over 4096 characters; shorten it")
+    if isinstance(value, float) and not (abs(value) < float("inf")):
+        raise PydanticCustomError("free", "holds a number that is not finite; choose a finite one")
+    if value is not None and not isinstance(value, str | int | float):
+        raise PydanticCustomError("free", "holds what JSON cannot carry; use text and numbers")
+    return 1
+
+
+def _free(value: dict[str, Any]) -> dict[str, Any]:
+    """Return `value` when it is plain, finite and small."""
+    if _plain(value, 0) > _MOST_VALUES:
+        raise PydanticCustomError("free", "holds more than 1000 values; shorten it")
+    return value
+
+
+FreeObject = Annotated[
+    dict[str, Any],
+    Field(max_length=64),
+    AfterValidator(_free),
+    WithJsonSchema(
+        {"type": "object", "maxProperties": 64, "x-kubernetes-preserve-unknown-fields": True},
+    ),
+]

@@ -1,0 +1,143 @@
+"""A TrainingJob from YAML or plain data, with all its mistakes at once, and back.
+
+Pydantic stops at the first layer of mistakes: it judges no rule of an object that has a wrong
+field. So what is wrong is told, taken away, and the rest looked at again, until something whole is
+left; then the rules are judged, but for those that read what was taken away.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from palaestra.api.job import API_VERSION, KIND, TrainingJob
+from palaestra.api.model import FIELDS_ONLY, Rule
+from palaestra.api.paths import Path, Pruned, shown
+from palaestra.api.sentences import quoted, sentence
+from palaestra.api.tree import objects
+from palaestra.api.yaml_text import NotYaml, read, write
+from palaestra.errors import SpecErrors
+
+_KEY = "[key]"  # pydantic's last piece of a path when a mapping's key is wrong, not its value
+
+_HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
+
+# What is put where something required is wrong as a whole, so that the rest can be looked at.
+_STAND_INS: dict[Path, Any] = {("metadata",): {"name": "stand-in"}, ("spec",): {}}
+
+
+def load(text: str, name: str = "job") -> TrainingJob:
+    """Return the one TrainingJob in `text`, a YAML document; `name` is its file's path.
+
+    Raises:
+        SpecErrors: with every mistake; when the text is no YAML, with the place of the first.
+    """
+    try:
+        data = read(text, name)
+    except NotYaml as error:
+        raise SpecErrors(name, (error.problem,)) from None
+    return validate(data, name)
+
+
+def validate(data: Any, name: str = "job") -> TrainingJob:
+    """Return the TrainingJob that `data`, as of an API server, describes.
+
+    Raises:
+        SpecErrors: with every mistake.
+    """
+    if not isinstance(data, Mapping):
+        fact = "empty" if data is None else f"{quoted(data)}, not a mapping"
+        problem = f"{name}: the document is {fact}; begin it with apiVersion: {API_VERSION}"
+        raise SpecErrors(name, (problem,))
+    other = [
+        f"{key}: {_not_ours(data[key], ours)}" for key, ours in _HEADING if key in data and data[key] != ours
+    ]
+    if len(other) == len(_HEADING):  # another kind of object: its fields need no judgement
+        raise SpecErrors(name, tuple(other))
+    missing = [f"{key}: is missing; add {key}: {ours}" for key, ours in _HEADING if key not in data]
+    job, problems = _examine(data)
+    if job is None or missing or problems:
+        raise SpecErrors(name, (*missing, *problems))
+    return job
+
+
+def dump(job: TrainingJob) -> str:
+    """Return the job as YAML, defaults included; what is absent is left out."""
+    return write(as_data(job))
+
+
+def as_data(job: TrainingJob) -> dict[str, Any]:
+    """Return the job as plain data in camelCase, defaults included; what is absent is left out."""
+    return job.model_dump(mode="json", by_alias=True, exclude_none=True)
+
+
+def _not_ours(value: Any, ours: str) -> str:
+    return f"{quoted(value)} is not known; use {ours}"
+
+
+def _examine(data: Mapping[str, Any]) -> tuple[TrainingJob | None, list[str]]:
+    """Return what can be made of `data`, None if nothing, and one line for each mistake."""
+    pruned = Pruned(data)
+    taken: list[Path] = []
+    problems: list[str] = []
+    while True:
+        try:
+            job = TrainingJob.model_validate(pruned.data(), by_alias=True, by_name=False, context=FIELDS_ONLY)
+        except ValidationError as error:
+            found = [
+                (pruned.original(_place(detail["loc"])), detail) for detail in error.errors(include_url=False)
+            ]
+            for path, detail in found:
+                if not (detail["type"] in _ECHOES and _touches(path, taken)):
+                    problems.append(f"{shown(path)}: {sentence(path, detail)}")
+            if not _take(pruned, [path for path, _ in found], taken):
+                return None, problems
+            continue
+        return job, problems + _broken_rules(job, pruned, taken)
+
+
+# Mistakes that may only be there because something was taken away.
+_ECHOES = {"missing", "too_short"}
+
+
+def _place(loc: tuple[int | str, ...]) -> Path:
+    return loc[:-1] if loc[-1:] == (_KEY,) else loc
+
+
+def _touches(path: Path, taken: list[Path]) -> bool:
+    """Return whether `path` lies on the way to something taken, or is it."""
+    return any(other[: len(path)] == path for other in taken)
+
+
+def _take(pruned: Pruned, paths: list[Path], taken: list[Path]) -> bool:
+    """Take what is wrong away, or what it is missing from; return whether anything went."""
+    before = len(taken)
+    for path in paths:
+        if any(path[: len(other)] == other != path for other in taken):
+            continue  # it went with something larger
+        gone = path
+        while gone and not pruned.take(gone, _STAND_INS.get(gone)):
+            gone = gone[:-1]
+        if not gone:
+            return False
+        taken.append(gone)
+    return len(taken) > before
+
+
+def _broken_rules(job: TrainingJob, pruned: Pruned, taken: list[Path]) -> list[str]:
+    problems = []
+    for place, thing in objects(job):
+        path = pruned.original(place)
+        for rule in thing.rules:
+            if not _reads_taken(rule, path, taken) and not rule.holds(thing):
+                field = (*path, *rule.field.split(".")) if rule.field else path
+                problems.append(f"{shown(field)}: {rule.message}")
+    return problems
+
+
+def _reads_taken(rule: Rule, path: Path, taken: list[Path]) -> bool:
+    """Return whether a part of the object at `path` that the rule names was taken away."""
+    named = {*rule.reads, *re.findall(r"\w+", rule.cel)}
+    below = [other[len(path) :] for other in taken if other[: len(path)] == path]
+    return any(named.issuperset(p for p in rest if isinstance(p, str)) for rest in below)

@@ -1,0 +1,92 @@
+"""Paths of fields, as messages show them, and data with parts taken away.
+
+`spec.simulators[1].role` is, in pieces, `("spec", "simulators", 1, "role")`.
+"""
+
+import json
+import re
+from typing import Any
+
+Path = tuple[str | int, ...]
+
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def shown(path: Path) -> str:
+    """Return `path` as a person writes it; keys that are no plain words stand in brackets."""
+    text = ""
+    for piece in path:
+        if isinstance(piece, int):
+            text += f"[{piece}]"
+        elif _PLAIN.fullmatch(piece):
+            text += f".{piece}" if text else piece
+        else:
+            text += f"[{json.dumps(piece, ensure_ascii=False)}]"
+    return text
+
+
+class Pruned:
+    """A copy of plain data from which parts are taken, while the rest keeps its place.
+
+    Lists are held as mappings from index to item, so that what is left of a list still knows its
+    numbers in the original.
+    """
+
+    def __init__(self, data: Any) -> None:
+        self._tree = _sparse(data)
+
+    def take(self, path: Path, stand_in: Any = None) -> bool:
+        """Take what lies at `path` away; return False when there was nothing to take.
+
+        A `stand_in` that is not None is put there, once, whether or not there was anything.
+        """
+        *above, last = path
+        tree = self._tree
+        for piece in above:
+            if not isinstance(tree, dict) or piece not in tree:
+                return False
+            tree = tree[piece]
+        if not isinstance(tree, dict):
+            return False
+        if stand_in is None:
+            return tree.pop(last, _NOTHING) is not _NOTHING
+        changed: bool = tree.get(last, _NOTHING) != stand_in
+        tree[last] = stand_in
+        return changed
+
+    def data(self) -> Any:
+        """Return what is left, as plain data."""
+        return _dense(self._tree)
+
+    def original(self, path: Path) -> Path:
+        """Return where the original had what now lies at `path`."""
+        tree, found = self._tree, []
+        for piece in path:
+            if isinstance(tree, _SparseList) and isinstance(piece, int):
+                piece = list(tree)[piece]  # noqa: PLW2901 - the same piece, as the original had it
+            found.append(piece)
+            tree = tree.get(piece) if isinstance(tree, dict) else None
+        return tuple(found)
+
+
+_NOTHING = object()
+
+
+class _SparseList(dict[Any, Any]):
+    """The items of a list that are left, by their index."""
+
+
+def _sparse(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _sparse(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return _SparseList((index, _sparse(item)) for index, item in enumerate(data))
+    return data
+
+
+def _dense(tree: Any) -> Any:
+    if isinstance(tree, _SparseList):
+        return [_dense(item) for item in tree.values()]
+    if isinstance(tree, dict):
+        return {key: _dense(value) for key, value in tree.items()}
+    return tree

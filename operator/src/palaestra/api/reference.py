@@ -1,0 +1,118 @@
+"""The field tables of docs/trainingjob.md, made from the schema that the CRD carries."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from palaestra.api.crd import schema
+from palaestra.api.job import TrainingJob
+from palaestra.api.structural import Schema
+from palaestra.api.tree import model_at
+
+BEGIN = "<!-- generated from the models: palaestra.api.reference -->"
+END = "<!-- end of the generated part -->"
+
+
+def page(text: str) -> str:
+    """Return the page `text` with the part between its two marks made anew.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    before, mark, rest = text.partition(BEGIN)
+    _, other_mark, after = rest.partition(END)
+    if not (mark and other_mark):
+        raise ValueError(f"docs/trainingjob.md: no {BEGIN} and {END}; put both in")
+    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+
+
+def tables() -> str:
+    """Return a section for each object of a TrainingJob: its fields, and below them its rules."""
+    return "\n".join(line for path, at in _objects(schema(), ()) for line in _section(path, at))
+
+
+def _objects(at: Schema, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema]]:
+    """Yield every object below `at` that has fields, each with the way to it."""
+    if "items" in at:
+        yield from _objects(at["items"], (*path[:-1], f"{path[-1]}[]"))
+    elif path != ("metadata",):
+        if path and "properties" in at:
+            yield path, at
+        for name, inner in at.get("properties", {}).items():
+            yield from _objects(inner, (*path, name))
+
+
+def _section(path: tuple[str, ...], at: Schema) -> Iterator[str]:
+    yield f"### {'.'.join(path)}"
+    yield ""
+    yield at["description"].replace("\n", "\n\n")
+    yield ""
+    yield "| field | type | default | meaning |"
+    yield "|---|---|---|---|"
+    for name, field in at["properties"].items():
+        meaning = field["description"].split("\n")[0].replace("|", "\\|")
+        default = _default(field, required=name in at.get("required", ()))
+        yield f"| `{name}` | {_kind(field)} | {default} | {meaning} |"
+    yield ""
+    yield from _rules(path)
+
+
+def _rules(path: tuple[str, ...]) -> Iterator[str]:
+    model = model_at(TrainingJob, tuple(piece.removesuffix("[]") for piece in path))
+    if model is None or not model.rules:
+        return
+    yield "Refused otherwise:"
+    yield ""
+    for rule in model.rules:
+        yield f"- `{rule.field}`: {rule.message}" if rule.field else f"- {rule.message}"
+    yield ""
+
+
+def _default(field: Schema, *, required: bool) -> str:
+    if required:
+        return "*required*"
+    if "default" not in field:
+        return "absent"
+    text = json.dumps(_told(field["default"], field))
+    return "" if text in {"{}", "[]"} else f"`{text}`"
+
+
+def _told(default: Any, field: Schema) -> Any:
+    """Return `default` without what the tables of its objects tell already."""
+    if isinstance(default, list):
+        return [_told(item, field["items"]) for item in default]
+    if not isinstance(default, dict):
+        return default
+    inner = field.get("properties", {})
+    return {
+        name: _told(value, inner[name])
+        for name, value in default.items()
+        if name in inner and value != inner[name].get("default")
+    }
+
+
+def _kind(field: Schema) -> str:
+    if "enum" in field:
+        return " \\| ".join(f"`{member}`" for member in field["enum"])
+    if "items" in field:
+        return f"list of {_kind(field['items'])}"
+    if "additionalProperties" in field:
+        return f"map to {_kind(field['additionalProperties'])}"
+    kind = str(field.get("format", field.get("type", "quantity")))
+    return _KINDS.get(kind, kind) + _range(field)
+
+
+_KINDS = {
+    "boolean": "true \\| false",
+    "date-time": "time",
+    "int64": "integer",
+    "string": "text",
+}
+
+
+def _range(field: Schema) -> str:
+    low, high = field.get("minimum"), field.get("maximum")
+    if low is None:
+        return ""
+    above = "above " if field.get("exclusiveMinimum") else ""
+    return f", {above}{low:,} to {high:,}" if high is not None else f", {above}{low:,} or more"

@@ -1,0 +1,209 @@
+"""The status of a TrainingJob: what the operator tells people about it.
+
+Numbers come from the trainers and are as old as the last poll. What is not known is absent, never
+zero.
+"""
+
+from datetime import datetime
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field
+
+from palaestra.api.fields import Count, Fraction, Listed, Sentence, Word
+from palaestra.api.model import ApiModel
+from palaestra.api.simulators import Role
+
+
+class Phase(StrEnum):
+    """Where a job or a replica stands, in one word."""
+
+    PENDING = "Pending"
+    RUNNING = "Running"
+    SUSPENDED = "Suspended"
+    SUCCEEDED = "Succeeded"
+    FAILED = "Failed"
+
+
+class SimulatorPhase(StrEnum):
+    """Where a simulator stands, as its sidecar tells it."""
+
+    IDLE = "idle"
+    STARTING = "starting"
+    READY = "ready"
+    STOPPING = "stopping"
+    FAILED = "failed"
+
+
+class ConditionType(StrEnum):
+    """The conditions of a TrainingJob."""
+
+    ACCEPTED = "Accepted"
+    RUNNING = "Running"
+    SUSPENDED = "Suspended"
+    SUCCEEDED = "Succeeded"
+    FAILED = "Failed"
+
+
+class ConditionStatus(StrEnum):
+    """Whether a condition holds."""
+
+    TRUE = "True"
+    FALSE = "False"
+    UNKNOWN = "Unknown"
+
+
+class Condition(ApiModel):
+    """One claim about the job, with its reason, as Kubernetes' own conditions."""
+
+    type: ConditionType = Field(strict=False)
+    """`Accepted`, `Running`, `Suspended`, `Succeeded` or `Failed`."""
+
+    status: ConditionStatus = Field(strict=False)
+    """`True`, `False` or `Unknown`."""
+
+    reason: Word
+    """Why, in one word for programs."""
+
+    message: Sentence
+    """Why, in a sentence for people: the fact and the remedy."""
+
+    last_transition_time: datetime = Field(strict=False)
+    """When `status` last changed."""
+
+    observed_generation: Count | None = None
+    """Generation of the spec that this speaks of; absent: unknown."""
+
+
+class LastCheckpoint(ApiModel):
+    """The newest checkpoint in the run directory."""
+
+    step: Count
+    """Environment steps learned from when it was written."""
+
+    time: datetime = Field(strict=False)
+    """When it was written."""
+
+
+class Restarts(ApiModel):
+    """What was started again in a replica, by cause."""
+
+    trainer: Count = 0
+    """Pods that were replaced because the trainer failed; these count against `backoffLimit`."""
+
+    simulator: Count = 0
+    """Simulators that were started again after a fault, over all attempts."""
+
+    disruption: Count = 0
+    """Pods that were replaced because the cluster took them: preemption, eviction, drain."""
+
+
+class SimulatorStatus(ApiModel):
+    """One simulator of a replica, as the trainer tells it."""
+
+    name: Word
+    """Group and number: `collect-0`."""
+
+    role: Role = Field(strict=False)
+    """`Collect` or `Evaluate`."""
+
+    state: SimulatorPhase = Field(strict=False)
+    """`idle`, `starting`, `ready`, `stopping` or `failed`."""
+
+    restarts: Count = 0
+    """Restarts after a fault in this attempt; recycling is not counted."""
+
+    last_fault: Sentence | None = None
+    """The last fault in a sentence; absent: none in this attempt."""
+
+
+class ReplicaStatus(ApiModel):
+    """One training run."""
+
+    index: Count
+    """Number of the replica, from 0."""
+
+    phase: Phase = Field(default=Phase.PENDING, strict=False)
+    """Where it stands; `Succeeded` and `Failed` are final."""
+
+    reason: Word | None = None
+    """Why, in one word for programs; absent: nothing to say."""
+
+    message: Sentence | None = None
+    """Why, in a sentence for people; absent: nothing to say."""
+
+    attempt: Count = 0
+    """Number of the current pod, from 1; 0: none yet."""
+
+    step: Count | None = None
+    """Environment steps learned from; absent: not known yet."""
+
+    target: Count | None = None
+    """Environment steps at which it ends; absent: not known yet."""
+
+    success_rate: Fraction | None = None
+    """Share of successful episodes in the last evaluation, 0 to 1; absent: none yet."""
+
+    mean_return: float | None = None
+    """Mean return of recent training episodes, in rewards; absent: none ended yet."""
+
+    steps_per_second: Annotated[float, Field(ge=0)] | None = None
+    """Environment steps a second, lately; absent: not known, or not running."""
+
+    simulators: Annotated[Listed[SimulatorStatus], Field(max_length=32)] = ()
+    """Its simulators; empty: not known yet."""
+
+    last_checkpoint: LastCheckpoint | None = None
+    """The newest checkpoint; absent: none yet."""
+
+    restarts: Restarts = Restarts()
+    """What was started again, by cause."""
+
+
+class Status(ApiModel):
+    """What the operator tells about a TrainingJob; never written by its author."""
+
+    observed_generation: Count | None = None
+    """Generation of the spec that this status speaks of; absent: not seen yet."""
+
+    phase: Phase | None = Field(default=None, strict=False)
+    """The job in one word; absent: not seen yet."""
+
+    conditions: Annotated[
+        Listed[Condition],
+        Field(
+            max_length=16,
+            json_schema_extra={
+                "x-kubernetes-list-type": "map",
+                "x-kubernetes-list-map-keys": ["type"],
+            },
+        ),
+    ] = ()
+    """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason."""
+
+    start_time: datetime | None = Field(default=None, strict=False)
+    """When the first pod started; absent: none has."""
+
+    completion_time: datetime | None = Field(default=None, strict=False)
+    """When the last replica ended; absent: not all have."""
+
+    running: Word | None = None
+    """Replicas that run or have succeeded, of all: `2/2`; absent: not seen yet."""
+
+    step: Count | None = None
+    """Step of the replica that is furthest behind; absent: not known yet."""
+
+    success_rate: Fraction | None = None
+    """Success rate of the worst replica, 0 to 1; absent: nothing evaluated yet."""
+
+    replicas: Annotated[
+        Listed[ReplicaStatus],
+        Field(
+            max_length=100,
+            json_schema_extra={
+                "x-kubernetes-list-type": "map",
+                "x-kubernetes-list-map-keys": ["index"],
+            },
+        ),
+    ] = ()
+    """One entry for each replica, by index; empty: not seen yet."""

@@ -1,0 +1,131 @@
+"""JSON Schema, as pydantic writes it, into the structural schema of an API server.
+
+Structural: no reference, no alternative, every type spelled out, everything bounded. What differs
+is rewritten here, field by field; what is said about a field stays what the model says.
+"""
+
+from typing import Any
+
+from palaestra.api.fields import MAY_CHANGE
+
+Schema = dict[str, Any]
+
+FROZEN = "cannot be changed; make a new TrainingJob, which may go on with storage.resumeFrom"
+
+# Keywords that mean the same in both, and are taken over as they are.
+_KEPT = (
+    "description", "type", "format", "pattern", "enum", "minimum", "maximum", "required",
+    "minLength", "maxLength", "minItems", "maxItems", "minProperties", "maxProperties",
+    "x-kubernetes-int-or-string", "x-kubernetes-preserve-unknown-fields",
+    "x-kubernetes-list-type", "x-kubernetes-list-map-keys", "x-kubernetes-validations",
+    MAY_CHANGE,
+)  # fmt: skip
+_BOUNDS_OF = {"array": "Items", "object": "Properties"}
+
+
+def structural(schema: Schema, definitions: dict[str, Schema]) -> Schema:
+    """Return `schema` with its references to `definitions` resolved, in structural form."""
+    source = _whole(schema, definitions)
+    result = {key: source[key] for key in _KEPT if key in source}
+    if "description" in result:
+        result["description"] = _unwrapped(result["description"])
+    if "const" in source:
+        result["enum"] = [source["const"]]
+    if "exclusiveMinimum" in source:
+        result |= {"minimum": source["exclusiveMinimum"], "exclusiveMinimum": True}
+    if source.get("type") == "integer":
+        result["format"] = "int64"
+    _name_bounds(result)
+    if "items" in source:
+        result["items"] = structural(source["items"], definitions)
+    if "properties" in source:
+        result["properties"] = {
+            name: structural(inner, definitions) for name, inner in source["properties"].items()
+        }
+    if isinstance(source.get("additionalProperties"), dict):
+        result["additionalProperties"] = structural(source["additionalProperties"], definitions)
+    if source.get("default") is not None:
+        result["default"] = _present(source["default"])
+    return result
+
+
+def _whole(schema: Schema, definitions: dict[str, Schema]) -> Schema:
+    """Return `schema` without `$ref` and without `or null`; and all that is said of it."""
+    here = {key: value for key, value in schema.items() if key not in {"$ref", "anyOf"}}
+    for choice in schema.get("anyOf", ()):
+        if choice != {"type": "null"}:
+            return _whole(choice | here, definitions)
+    if "$ref" not in schema:
+        return here
+    there = definitions[schema["$ref"].removeprefix("#/$defs/")]
+    both = there | here
+    if there.get("type") == "object" and "description" in here:
+        _, *more = there["description"].split("\n\n")  # the first is the field's in other words
+        both["description"] = "\n\n".join((here["description"], *more))
+    return both
+
+
+def _unwrapped(text: str) -> str:
+    """Return `text` with one line for each paragraph."""
+    return "\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
+
+
+def _name_bounds(schema: Schema) -> None:
+    """Give the bounds of lists and maps the names that belong to their type."""
+    kind = _BOUNDS_OF.get(schema.get("type", ""))
+    for bound in ("min", "max"):
+        if kind and f"{bound}Length" in schema:
+            schema[f"{bound}{kind}"] = schema.pop(f"{bound}Length")
+
+
+def _present(default: Any) -> Any:
+    """Return `default` without what is absent; rules are tried on it as it stands here."""
+    if isinstance(default, list):
+        return [_present(item) for item in default]
+    if isinstance(default, dict):
+        return {name: _present(value) for name, value in default.items() if value is not None}
+    return default
+
+
+def freeze(schema: Schema) -> None:
+    """Add rules to the object `schema` that keep each field, but for those that may change."""
+    for name, inner in schema["properties"].items():
+        if inner.get(MAY_CHANGE):
+            continue
+        if _has_what_may_change(inner):
+            _freeze_below(inner)
+        elif "default" in inner or name in schema.get("required", ()):
+            _add(inner, {"rule": "self == oldSelf", "message": FROZEN})
+        else:
+            rule = (
+                f"has(self.{name}) == has(oldSelf.{name})"
+                f" && (!has(self.{name}) || self.{name} == oldSelf.{name})"
+            )
+            _add(schema, {"rule": rule, "message": FROZEN, "fieldPath": f".{name}"})
+
+
+def _freeze_below(inner: Schema) -> None:
+    if inner["type"] == "object":
+        freeze(inner)
+        return
+    freeze(inner["items"])  # the API server finds an item's old self by its name
+    same_names = "size(self) == size(oldSelf) && self.all(item, oldSelf.exists(old, old.name == item.name))"
+    _add(inner, {"rule": same_names, "message": FROZEN})
+
+
+def _add(schema: Schema, rule: dict[str, str]) -> None:
+    schema["x-kubernetes-validations"] = [*schema.get("x-kubernetes-validations", ()), rule]
+
+
+def _has_what_may_change(schema: Schema) -> bool:
+    below = [*schema.get("properties", {}).values(), schema.get("items")]
+    return any(inner.get(MAY_CHANGE) or _has_what_may_change(inner) for inner in below if inner)
+
+
+def without_marks(schema: Any) -> Any:
+    """Return `schema` without the marks that only `freeze` reads."""
+    if isinstance(schema, list):
+        return [without_marks(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: without_marks(value) for key, value in schema.items() if key != MAY_CHANGE}

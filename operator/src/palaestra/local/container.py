@@ -1,0 +1,134 @@
+"""One container as a process: started, probed, restarted with back-off, stopped within a grace period.
+
+The rules are the kubelet's. SIGTERM goes to the first process only, SIGKILL to everything that the
+container started. A container that ends too often waits longer each time, and the count starts again
+once it has run long enough.
+"""
+
+import asyncio
+import contextlib
+import os
+import signal
+from dataclasses import dataclass
+
+from palaestra.local import probe
+from palaestra.local.output import Log
+from palaestra.local.process import NOT_RUNNABLE, Process, end_marked, marked
+from palaestra.local.spec import Container, Pod
+
+DRAIN_S = 0.5  # for output that is still in the pipe; a pipe open for longer is somebody else's
+TERMINATED = 128 + signal.SIGTERM
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackOff:
+    """How long a container waits before its next start: a kubelet's rule, shorter for a laptop.
+
+    The wait doubles with each end from `first_s` to `most_s`; after a life of `calm_s` it starts again.
+    """
+
+    first_s: float = 0.5
+    most_s: float = 30.0
+    calm_s: float = 60.0
+
+    def wait_s(self, ends_in_a_row: int) -> float:
+        """Return the seconds to wait after that many ends in a row, 1 or more."""
+        return float(min(self.first_s * 2 ** (ends_in_a_row - 1), self.most_s))
+
+
+class Running:
+    """One container of a running pod, over all of its lives."""
+
+    def __init__(self, spec: Container, pod: Pod, log: Log, backoff: BackOff) -> None:
+        self.spec = spec
+        self.log = log
+        self.ends = 0
+        self.started = False  # it has passed its startup probe once, or it has none
+        self._news = asyncio.Event()  # it started, or ended
+        self._pod = pod
+        self._env = marked(spec.env, pod.uid, spec.name)
+        self._backoff = backoff
+        self._stopping = asyncio.Event()
+        self._process: Process | None = None
+
+    async def run_once(self, terminal: int | None = None) -> int:
+        """Run one life of it and return the exit code.
+
+        `terminal` is the descriptor of a terminal that it may draw on.
+        """
+        if self._stopping.is_set():
+            return TERMINATED
+        process = self._process = self._start(terminal)
+        if process is None:
+            return NOT_RUNNABLE
+        watch = asyncio.create_task(self._watch(process))
+        try:
+            code = await process.wait()
+        finally:
+            watch.cancel()
+            await asyncio.gather(watch, return_exceptions=True)
+        await self.log.finished(DRAIN_S)
+        self.log.note(f"{self.spec.name} ended with exit code {code}")
+        return code
+
+    async def keep_running(self) -> None:
+        """Run it again and again until it is stopped, as a native sidecar is."""
+        ends_in_a_row = 0
+        loop = asyncio.get_running_loop()
+        while True:
+            born = loop.time()
+            await self.run_once()
+            if self._stopping.is_set():
+                return
+            self.ends += 1
+            self._news.set()
+            await end_marked(self._pod.uid, self.spec.name)
+            ends_in_a_row = 1 if loop.time() - born > self._backoff.calm_s else ends_in_a_row + 1
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._stopping.wait(), self._backoff.wait_s(ends_in_a_row))
+
+    async def until_started(self, tries: int) -> bool:
+        """Return whether it started within that many lives."""
+        while not self.started and self.ends < tries:
+            self._news.clear()
+            await self._news.wait()
+        return self.started
+
+    async def stop(self, grace_s: float) -> None:
+        """Ask it to end and return when it has; it is killed when the grace period is over."""
+        self._stopping.set()
+        if self._process is not None:
+            await self._end(self._process, grace_s)
+
+    def _start(self, terminal: int | None) -> Process | None:
+        writer = self.log.begin(terminal)
+        try:
+            return Process.start(self.spec.command, self._env, stdout=writer, stderr=writer)
+        except OSError as error:
+            self.log.note(f"{self.spec.command[0]}: {error.strerror}")
+            return None
+        finally:
+            os.close(writer)
+
+    async def _watch(self, process: Process) -> None:
+        """Apply the startup probe, then the liveness probe; end the process when one has failed."""
+        startup, liveness = self.spec.startup, self.spec.liveness
+        if startup is not None and not await probe.until_passed(startup, self._env):
+            await self._end_for("startup", process)
+            return
+        self.started = True
+        self._news.set()
+        if liveness is not None:
+            await probe.until_failed(liveness, self._env)
+            await self._end_for("liveness", process)
+
+    async def _end_for(self, failed_probe: str, process: Process) -> None:
+        self.log.note(f"{self.spec.name} failed its {failed_probe} probe")
+        await self._end(process, self._pod.grace_s)
+
+    async def _end(self, process: Process, grace_s: float) -> None:
+        process.send(signal.SIGTERM)
+        if not await process.ended_within(grace_s):
+            self.log.note(f"{self.spec.name} did not end within {grace_s:.1f} s and is killed")
+            process.send(signal.SIGKILL)
+        await process.wait()

@@ -1,0 +1,31 @@
+"""What can go wrong on this machine, each with its remedy.
+
+LocalError              one line for a person, and the exit code of `palaestra run`
+├── Refused             exit 2: found before anything was started
+├── StartFailed         exit 1: a sidecar did not come up, so the trainer was not started
+└── StorageFailed       exit 1: the run directory cannot be written (full disk, no permission)
+"""
+
+from palaestra_sim.protocol.status import ExitCode
+
+from palaestra.errors import PalaestraError
+
+
+class LocalError(PalaestraError):
+    """Something on this machine stops the run; the message says what and how to go on."""
+
+    exit_code = 1
+
+
+class Refused(LocalError, ValueError):
+    """The run cannot be started as asked; nothing was started and nothing was changed."""
+
+    exit_code = int(ExitCode.CONFIGURATION)
+
+
+class StartFailed(LocalError, RuntimeError):
+    """A container that others wait for did not come up."""
+
+
+class StorageFailed(LocalError, OSError):
+    """A file of the run could not be written; what was there before is unharmed."""

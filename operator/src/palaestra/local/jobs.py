@@ -1,0 +1,66 @@
+"""The Job controller of this machine: what the end of one pod means for its replica.
+
+`verdict` reads the planned Job's podFailurePolicy as Kubernetes does: rules in order, the first that
+matches decides, and what matches none is counted against `backoffLimit`. Pods whose failure is ignored
+have no bound in Kubernetes; here, as in the operator, they have one when they make no progress.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+IDLE_PODS = 5  # ignored pods in a row that got no further, before a replica is given up
+FIRST_WAIT_S = 1.0  # before the next pod; it doubles, as in Kubernetes, where it begins at 10 s
+MOST_WAIT_S = 60.0
+
+
+class Verdict(Enum):
+    """What one pod's end means."""
+
+    COMPLETE = "complete"
+    FAIL_JOB = "fail"
+    IGNORE = "ignore"
+    COUNT = "count"
+
+
+def verdict(job: Mapping[str, Any], exit_code: int) -> Verdict:
+    """Return what the exit code of the trainer means to `job`, a batch/v1 Job."""
+    if exit_code == 0:
+        return Verdict.COMPLETE
+    for rule in job["spec"].get("podFailurePolicy", {}).get("rules", ()):
+        if (codes := rule.get("onExitCodes")) and _matches(codes, exit_code):
+            return {"FailJob": Verdict.FAIL_JOB, "Ignore": Verdict.IGNORE}.get(rule["action"], Verdict.COUNT)
+    return Verdict.COUNT
+
+
+def _matches(codes: Mapping[str, Any], exit_code: int) -> bool:
+    return (exit_code in codes["values"]) == (codes["operator"] == "In")
+
+
+@dataclass(slots=True, kw_only=True)
+class Tries:
+    """The pods of one replica so far, in this run of the runner."""
+
+    limit: int
+    counted: int = 0
+    idle: int = 0
+    step: int = 0
+
+    def another(self, meaning: Verdict, step: int) -> bool:
+        """Note the end of a pod that reached `step`; return whether the replica gets another pod."""
+        self.idle = 0 if step > self.step else self.idle + 1
+        self.step = max(step, self.step)
+        match meaning:
+            case Verdict.COUNT:
+                self.counted += 1
+                return self.counted <= self.limit
+            case Verdict.IGNORE:
+                return self.idle < IDLE_PODS
+            case _:
+                return False
+
+    @property
+    def wait_s(self) -> float:
+        """Return the seconds before the next pod; it doubles with every pod that got no further."""
+        return float(min(FIRST_WAIT_S * 2 ** max(self.idle - 1, 0), MOST_WAIT_S))

@@ -1,0 +1,65 @@
+"""How the run of a replica ended, as it is kept in the run directory and told to a person."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Self
+
+from palaestra.local.files import write
+
+FILE = "outcome.json"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """The end of a replica's run; what nobody measured is None.
+
+    `exit_code` is the last trainer's, `faults` counts those of all simulators and pods.
+    """
+
+    exit_code: int
+    reason: str = ""
+    steps: int | None = None
+    success_rate: float | None = None
+    steps_per_second: float | None = None
+    faults: int | None = None
+    pods: int = 1
+
+    @property
+    def finished(self) -> bool:
+        """Return whether there is nothing left to train."""
+        return self.exit_code == 0
+
+    def keep(self, run_directory: Path) -> None:
+        """Write it into the run directory.
+
+        Raises:
+            StorageFailed: it cannot be written.
+        """
+        write(run_directory / FILE, json.dumps(asdict(self), indent=1).encode() + b"\n")
+
+    @classmethod
+    def of(cls, run_directory: Path) -> Self | None:
+        """Return how the run in this directory ended, or None when it has not, or was cut off."""
+        try:
+            return cls(**json.loads((run_directory / FILE).read_bytes()))
+        except (OSError, ValueError, TypeError):  # missing, or written by nobody that we know
+            return None
+
+
+def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
+    """Return the lines that a person reads at the end."""
+    facts = {
+        "success rate": _shown(outcome.success_rate, "{:.0%}"),
+        "steps": _shown(outcome.steps, "{:,}"),
+        "steps per second": _shown(outcome.steps_per_second, "{:.0f}"),
+        "faults": _shown(outcome.faults, "{}"),
+        "run directory": str(run_directory),
+        "look at it": f"tensorboard --logdir {run_directory / 'tensorboard'}",
+        "try the policy": f"palaestra-eval {run_directory}",
+    }
+    return tuple(f"  {name:<18}{value}" for name, value in facts.items())
+
+
+def _shown(value: float | None, form: str) -> str:
+    return "not measured" if value is None else form.format(value)

@@ -1,0 +1,115 @@
+"""Where the output of containers goes: always to a file, and to the screen when asked.
+
+Every line goes to `logs/<container>.log`. With `-v` it is shown too, behind the container's name. Without,
+the trainer may draw on the person's terminal (`terminal`).
+"""
+
+import asyncio
+import errno
+import os
+import sys
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+from palaestra.local.errors import StorageFailed
+from palaestra.local.terminal import as_seen, open_like, resize
+
+Show = Callable[[str], None]
+KEPT_LINES = 20  # what a person needs to see why a program ended, without opening a file
+CHUNK = 65536
+
+
+class Log:
+    """One container's output, over all of its lives; the file is appended to."""
+
+    def __init__(self, name: str, folder: Path, show: Show | None = None) -> None:
+        """Open the file.
+
+        Raises:
+            StorageFailed: it cannot be written.
+        """
+        self.path = folder / f"{name}.log"
+        self._show = show
+        self._prefix = f"[{name}] "
+        self._rest = b""
+        self._tail: deque[str] = deque(maxlen=KEPT_LINES)
+        self._open: set[asyncio.Future[None]] = set()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file = self.path.open("ab", buffering=0)
+        except OSError as error:
+            raise StorageFailed(f"{self.path}: {error.strerror}; make room for it") from error
+
+    def begin(self, terminal: int | None = None) -> int:
+        """Return a descriptor for a program to write to; the caller closes it after the start.
+
+        With `terminal`, it is a terminal too, and what is written is copied there.
+        """
+        reader, writer = os.pipe() if terminal is None else open_like(terminal)
+        os.set_blocking(reader, False)
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[None] = loop.create_future()
+        self._open.add(done)
+        loop.add_reader(reader, self._read, reader, terminal, done)
+        return writer
+
+    async def finished(self, deadline_s: float) -> None:
+        """Return when the programs have closed their ends, at the latest after `deadline_s`."""
+        if self._open:
+            await asyncio.wait(self._open, timeout=deadline_s)
+
+    def note(self, text: str) -> None:
+        """Write a line of the runner's own, such as the end of a program."""
+        self._write(f"--- {text}")
+
+    @property
+    def last_lines(self) -> tuple[str, ...]:
+        """Return the end of the output, at most twenty lines."""
+        return tuple(self._tail)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _read(self, reader: int, terminal: int | None, done: "asyncio.Future[None]") -> None:
+        try:
+            data = os.read(reader, CHUNK)
+        except BlockingIOError:  # nothing to read after all
+            return
+        except OSError:  # EIO is how a terminal says that nobody is there any more
+            data = b""
+        if terminal is not None:
+            resize(reader, terminal)  # the person may have changed the window since
+            os.write(terminal, data)
+        *lines, rest = (self._rest + data).split(b"\n")
+        if not data and rest:
+            lines, rest = [rest], b""
+        self._rest = rest[max(rest.rfind(b"\r"), len(rest) - CHUNK, 0) :]  # what is drawn over is gone
+        for line in lines:
+            self._line(as_seen(line.decode(errors="replace")))
+        if not data:
+            asyncio.get_running_loop().remove_reader(reader)
+            os.close(reader)
+            self._open.discard(done)
+            done.set_result(None)
+
+    def _line(self, line: str) -> None:
+        self._tail.append(line)
+        self._write(line)
+        if self._show is not None:
+            self._show(self._prefix + line)
+
+    def _write(self, line: str) -> None:
+        """Append; a full disk costs lines of the log, not the training, which meets it itself."""
+        try:
+            self._file.write(line.encode() + b"\n")
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+
+
+def say(text: str) -> None:
+    """Show a line to the person at once."""
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()

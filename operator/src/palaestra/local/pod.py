@@ -1,0 +1,139 @@
+"""One attempt of a replica: a pod's containers, from the first start to the last end.
+
+Order, as KEP-753 has it: init containers one after another, a sidecar's successor waiting for its
+startup probe; then the main container, whose end is the pod's; then the sidecars in reverse order,
+within what is left of one grace period. `stop` begins the same shutdown early, with the main container
+first, so that a simulator can still be used while the last checkpoint is written.
+"""
+
+import asyncio
+from collections.abc import Coroutine, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from palaestra.local.container import BackOff, Running
+from palaestra.local.errors import StartFailed
+from palaestra.local.output import Log
+from palaestra.local.process import Watchdog
+from palaestra.local.spec import Container, Pod
+
+TRIES = 3  # lives of a sidecar that others wait for, before the pod is given up
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kubelet:
+    """What this machine adds to a pod: where output goes, and how patient it is."""
+
+    logs: Mapping[str, Log]  # by container
+    backoff: BackOff = field(default_factory=BackOff)
+    start_deadline_s: float = 60.0
+    terminal: int | None = None  # of a person, for the main container to draw on
+
+
+class _Stopped(Exception):
+    """The pod was told to stop before its main container was started."""
+
+
+class RunningPod:
+    """A pod that runs, or is about to."""
+
+    def __init__(self, pod: Pod, kubelet: Kubelet) -> None:
+        self._pod = pod
+        self._kubelet = kubelet
+        self._stop = asyncio.Event()
+        self._watchdog: Watchdog | None = None
+        self._running: list[Running] = []
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._end_of_grace: float | None = None
+
+    def stop(self) -> None:
+        """Begin the shutdown: the main container first."""
+        self._stop.set()
+
+    def kill(self) -> None:
+        """End every process at once."""
+        self._stop.set()
+        if self._watchdog is not None:
+            self._watchdog.close()
+
+    async def run(self) -> int | None:
+        """Return the main container's exit code, or None when it was stopped before that one started.
+
+        No process of the pod is left when this returns, or raises.
+
+        Raises:
+            StartFailed: a sidecar that others wait for did not come up.
+        """
+        self._watchdog = Watchdog(self._pod.uid)
+        try:
+            for spec in self._pod.init:
+                await self._unless_stopped(self._bring_up(self._add(spec)))
+            return await self._run_main()
+        except _Stopped:
+            return None
+        finally:
+            for running in reversed(self._running):
+                await running.stop(self._grace_left_s())
+            await asyncio.gather(*self._tasks)
+            await self._watchdog.closed()
+
+    def _add(self, spec: Container) -> Running:
+        kubelet = self._kubelet
+        running = Running(spec, self._pod, kubelet.logs[spec.name], kubelet.backoff)
+        self._running.append(running)
+        return running
+
+    async def _bring_up(self, running: Running) -> None:
+        """Start an init container and wait until its successor may start."""
+        if not running.spec.sidecar:
+            if code := await running.run_once():
+                raise StartFailed(_why(running, f"ended with exit code {code}"))
+            return
+        life = asyncio.create_task(running.keep_running())
+        self._tasks.add(life)
+        if running.spec.startup is not None:
+            await self._until_started(running)
+
+    async def _until_started(self, running: Running) -> None:
+        try:
+            async with asyncio.timeout(self._kubelet.start_deadline_s):
+                if not await running.until_started(TRIES):
+                    raise StartFailed(_why(running, f"ended {TRIES} times before it was ready"))
+        except TimeoutError:
+            seconds = f"{self._kubelet.start_deadline_s:g} s"
+            raise StartFailed(_why(running, f"was not ready within {seconds}")) from None
+
+    async def _run_main(self) -> int:
+        main = self._add(self._pod.main)
+        life = asyncio.create_task(main.run_once(self._kubelet.terminal))
+        stop = asyncio.create_task(self._stop.wait())
+        await asyncio.wait({life, stop}, return_when=asyncio.FIRST_COMPLETED)
+        if not life.done():
+            await main.stop(self._grace_left_s())
+        stop.cancel()
+        return await life
+
+    async def _unless_stopped(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        stop = asyncio.create_task(self._stop.wait())
+        try:
+            await asyncio.wait({task, stop}, return_when=asyncio.FIRST_COMPLETED)
+            if not task.done():
+                raise _Stopped
+            task.result()
+        finally:
+            task.cancel()
+            stop.cancel()
+            await asyncio.gather(task, stop, return_exceptions=True)
+
+    def _grace_left_s(self) -> float:
+        """Return what is left of the one grace period, which begins with the first question."""
+        now = asyncio.get_running_loop().time()
+        if self._end_of_grace is None:
+            self._end_of_grace = now + self._pod.grace_s
+        return max(self._end_of_grace - now, 0.0)
+
+
+def _why(running: Running, fact: str) -> str:
+    last = running.log.last_lines[-1:] or ("it wrote nothing",)
+    return f"{running.spec.name} {fact}: {last[0].strip()}; see {running.log.path}"

@@ -1,0 +1,59 @@
+"""Free ports, chosen all at once and kept for as long as the run needs them.
+
+A port that is looked up and given back can be taken by anybody before the container listens on it.
+So each one stays bound here, without listening: the kernel gives a bound port neither to a program
+that asks for any port nor to an outgoing connection, while SO_REUSEADDR lets the container, which
+sets it too, bind and listen beside us.
+"""
+
+import socket
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Self
+
+from palaestra.local.errors import Refused
+
+LOOPBACK = "127.0.0.1"
+
+
+class HeldPorts:
+    """Ports of the loopback interface that nobody else is given until `close`."""
+
+    def __init__(self) -> None:
+        self._sockets = ExitStack()
+
+    def any(self) -> int:
+        """Return a free port, held."""
+        return self._bind(0)
+
+    def this(self, port: int) -> int:
+        """Return `port`, held.
+
+        Raises:
+            Refused: another program has it.
+        """
+        try:
+            return self._bind(port)
+        except OSError as error:
+            raise Refused(
+                f"port {port}: {error.strerror or error}; "
+                "choose another with --ros-port, or leave it out for a free one"
+            ) from error
+
+    def _bind(self, port: int) -> int:
+        held = self._sockets.enter_context(socket.socket(socket.AF_INET, socket.SOCK_STREAM))
+        held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        held.bind((LOOPBACK, port))
+        return int(held.getsockname()[1])
+
+    def close(self) -> None:
+        """Give all of them back."""
+        self._sockets.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None:
+        self.close()

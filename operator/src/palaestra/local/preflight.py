@@ -1,0 +1,104 @@
+"""What can be known to be wrong before anything is started, each check with its remedy."""
+
+import importlib.util
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from palaestra.api import Driver, SimulatorGroup, TrainingJob
+from palaestra.local.errors import Refused
+from palaestra.local.process import program_path
+from palaestra_sim.world import RunIdentity, WorldError, generate
+
+LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
+INSTALLATION = "this installation"
+ROS = "install python3-rospy and python3-rosmaster (`make setup` does)"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What is about to be run, and in which folder its runs lie."""
+
+    job: TrainingJob
+    runs: Path
+
+
+Check = Callable[[Request], Iterator[str]]
+
+
+def check(request: Request) -> None:
+    """Make every check.
+
+    Raises:
+        Refused: with one line for each thing that is wrong.
+    """
+    if problems := [problem for each in CHECKS for problem in each(request)]:
+        raise Refused("\n".join(problems))
+
+
+def ros_is_installed(request: Request) -> Iterator[str]:
+    """The ROS master is a program, its client a module that the trainer imports."""
+    del request
+    if shutil.which("rosmaster", path=program_path()) is None:
+        yield f"rosmaster: is not installed; {ROS}"
+    if importlib.util.find_spec("rospy") is None:
+        yield f"rospy: cannot be imported by {sys.executable}; {ROS}"
+
+
+def programs_exist(request: Request) -> Iterator[str]:
+    """Every program that a container begins with can be found."""
+    spec = request.job.spec
+    own = spec.trainer.command[:1]
+    programs = {"palaestra-sidecar": INSTALLATION}
+    programs.update({own[0]: "spec.trainer.command"} if own else {"palaestra-train": INSTALLATION})
+    for index, group in enumerate(spec.simulators):
+        programs[_simulator_program(group)] = f"spec.simulators[{index}]"
+    for program, field in programs.items():
+        if shutil.which(program, path=program_path()) is None:
+            yield f"{field}: {program} is not a program on this machine; install it"
+
+
+def worlds_are_right(request: Request) -> Iterator[str]:
+    """A world that lies in a file is read here too, though its sidecar generates it."""
+    for index, group in enumerate(request.job.spec.simulators):
+        if group.world.file is not None:
+            field = f"spec.simulators[{index}].world.file"
+            yield from (f"{field}: {problem}" for problem in _problems(Path(group.world.file), group))
+
+
+def space_is_left(request: Request) -> Iterator[str]:
+    """A disk that is nearly full would end the run in the middle."""
+    folder = next(each for each in (request.runs, *request.runs.parents) if each.exists())
+    if not os.access(folder, os.W_OK):
+        yield f"{folder}: cannot be written; choose another folder with --dir"
+    elif (free := shutil.disk_usage(folder).free) < LEAST_FREE:
+        yield (
+            f"{folder}: {free // 2**20} MiB are free and a run takes {LEAST_FREE // 2**20}; "
+            "make room, or choose another folder with --dir"
+        )
+
+
+CHECKS: tuple[Check, ...] = (ros_is_installed, programs_exist, worlds_are_right, space_is_left)
+
+
+def _simulator_program(group: SimulatorGroup) -> str:
+    match group.driver:
+        case Driver.STUB:
+            return "palaestra-stub"
+        case Driver.WEBOTS:
+            return "webots"
+        case Driver.COMMAND:
+            return group.command[0]
+
+
+def _problems(path: Path, group: SimulatorGroup) -> Iterator[str]:
+    identity = RunIdentity(job="check", replica=0, group=group.name, index=0)
+    try:
+        generate(path.read_bytes(), identity, clock=False, name=str(path), relative_addresses=True)
+    except OSError as error:
+        yield f"{path}: {error.strerror}; name a world of this machine"
+    except WorldError as error:
+        yield str(error)

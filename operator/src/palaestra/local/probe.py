@@ -1,0 +1,57 @@
+"""Ask a container whether it has started, or still lives: by a command, or by HTTP."""
+
+import asyncio
+import signal
+import subprocess
+import urllib.request
+from collections.abc import Mapping
+
+from palaestra.local.process import Process
+from palaestra.local.spec import Probe
+
+_DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # loopback, whatever is set
+
+
+async def passes(probe: Probe, env: Mapping[str, str]) -> bool:
+    """Return whether one try succeeds within the probe's timeout."""
+    if probe.command:
+        return await _command_succeeds(probe, env)
+    return await asyncio.to_thread(_answers, probe.url, probe.timeout_s)
+
+
+async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
+    """Try until one succeeds; return False when the threshold of failures is reached first."""
+    await asyncio.sleep(probe.initial_delay_s)
+    for failures in range(probe.failure_threshold):
+        if failures:
+            await asyncio.sleep(probe.period_s)
+        if await passes(probe, env):
+            return True
+    return False
+
+
+async def until_failed(probe: Probe, env: Mapping[str, str]) -> None:
+    """Return when as many tries in a row as the threshold says have failed."""
+    await asyncio.sleep(probe.initial_delay_s)
+    failures = 0
+    while failures < probe.failure_threshold:
+        failures = 0 if await passes(probe, env) else failures + 1
+        await asyncio.sleep(probe.period_s)
+
+
+async def _command_succeeds(probe: Probe, env: Mapping[str, str]) -> bool:
+    """Run the command; a try that was given up, or cancelled, leaves no process behind."""
+    process = Process.start(probe.command, env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        return await process.ended_within(probe.timeout_s) and await process.wait() == 0
+    finally:
+        process.send(signal.SIGKILL)
+
+
+def _answers(url: str, timeout_s: float) -> bool:
+    """Return whether a GET is answered with a status from 200 to 399."""
+    try:
+        with _DIRECT.open(url, timeout=timeout_s) as answer:
+            return bool(answer.status < 400)  # noqa: PLR2004 - the kubelet's own rule
+    except OSError:  # refused, timed out, or an HTTP error status
+        return False

@@ -1,0 +1,119 @@
+"""Start programs, each in a session of its own, and wait for them without blocking.
+
+The only module that starts processes. A terminal's Ctrl-C reaches the runner alone, because nothing
+that it starts is in its process group.
+"""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Self
+
+from palaestra.local import watchdog
+
+NOT_RUNNABLE = 127  # a shell's exit code for a program that it cannot find
+
+
+class Process:
+    """One running program, from start to end."""
+
+    def __init__(self, started: "subprocess.Popen[bytes]") -> None:
+        self._started = started
+        self._handle = os.pidfd_open(started.pid)
+        self._loop = asyncio.get_running_loop()
+        self._ended: asyncio.Future[int] = self._loop.create_future()
+        self._loop.add_reader(self._handle, self._reap)
+
+    @classmethod
+    def start(cls, command: Sequence[str], env: Mapping[str, str], *, stdout: int, stderr: int) -> Self:
+        """Start `command` with exactly `env`; the descriptors stay the caller's.
+
+        Raises:
+            OSError: the program cannot be run.
+        """
+        return cls(
+            subprocess.Popen(
+                command,
+                env=env,
+                stdin=subprocess.DEVNULL,
+                stdout=stdout,
+                stderr=stderr,
+                start_new_session=True,
+            )
+        )
+
+    @property
+    def pid(self) -> int:
+        """Return the process id, which is its session's and group's id too."""
+        return self._started.pid
+
+    async def wait(self) -> int:
+        """Return the exit code; 128 + n when signal n ended it, as a container runtime reports it."""
+        return await asyncio.shield(self._ended)
+
+    async def ended_within(self, seconds: float) -> bool:
+        """Return whether it ended before `seconds` have passed."""
+        await asyncio.wait({self._ended}, timeout=max(seconds, 0.0))
+        return self._ended.done()
+
+    def send(self, number: signal.Signals) -> None:
+        """Send a signal to the program alone, as a runtime does; nothing happens once it ended."""
+        if not self._ended.done():
+            self._started.send_signal(number)
+
+    def _reap(self) -> None:
+        self._loop.remove_reader(self._handle)
+        os.close(self._handle)
+        code = self._started.wait()
+        if not self._ended.done():
+            self._ended.set_result(code if code >= 0 else 128 - code)
+
+
+class Watchdog:
+    """Ends all processes of a pod when it is closed, or when this process is gone."""
+
+    def __init__(self, pod_uid: str) -> None:
+        reader, self._writer = os.pipe()
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-S", str(Path(watchdog.__file__)), f"{pod_uid}/"],
+                stdin=reader,
+                env={},
+                start_new_session=True,
+            )
+        finally:
+            os.close(reader)
+
+    def close(self) -> None:
+        """Begin the end of everything that is left of the pod; harmless when repeated."""
+        if self._writer >= 0:
+            os.close(self._writer)
+            self._writer = -1
+
+    async def closed(self) -> None:
+        """Return when nothing of the pod is left."""
+        self.close()
+        await asyncio.to_thread(self._process.wait)
+
+
+def marked(env: Mapping[str, str], pod_uid: str, container: str) -> dict[str, str]:
+    """Return the environment of a container: this machine's, `env` over it, and the marker.
+
+    The programs of this installation come first on the PATH, as they do in an image.
+    """
+    machine = {**os.environ, "PATH": program_path()}
+    return {**machine, **env, watchdog.MARKER: f"{pod_uid}/{container}/"}
+
+
+def program_path() -> str:
+    """Return the PATH of containers: the folder of the running interpreter, then this machine's."""
+    return os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)))
+
+
+async def end_marked(pod_uid: str, container: str) -> None:
+    """Kill what a container has left behind: with its first process all of it ends."""
+    await asyncio.to_thread(watchdog.sweep, f"{pod_uid}/{container}/")

@@ -1,0 +1,124 @@
+"""One replica on this machine, from its planned Job to its outcome: pod after pod, as the Job says."""
+
+import asyncio
+import contextlib
+import json
+import signal
+import uuid
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from palaestra_sim.protocol.status import ExitCode
+
+from palaestra.local.container import BackOff
+from palaestra.local.interrupt import Interrupt
+from palaestra.local.jobs import Tries, verdict
+from palaestra.local.outcome import Outcome
+from palaestra.local.output import Log, Show, say
+from palaestra.local.pod import Kubelet, RunningPod
+from palaestra.local.spec import Pod, read_pod
+from palaestra.local.volumes import mount
+from palaestra.plan import ReplicaPlan
+
+KILLED = 128 + signal.SIGINT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """Where a replica runs, and who sees its output.
+
+    `terminal` is the descriptor of a terminal that the trainer may draw on, None without one.
+    """
+
+    directory: Path
+    show: Show | None = None
+    terminal: int | None = None
+    backoff: BackOff = field(default_factory=BackOff)
+
+
+async def run_replica(planned: ReplicaPlan, setting: Setting) -> Outcome:
+    """Run pods until the Job is complete, given up or interrupted; return how it ended.
+
+    Raises:
+        LocalError: a pod could not be started, or its files could not be written.
+    """
+    interrupt = Interrupt()
+    tries = Tries(limit=planned.job["spec"]["backoffLimit"])
+    with interrupt.listening():
+        for pods in range(1, 2**31):
+            code = await _run_pod(planned, setting, interrupt)
+            outcome = _outcome(setting.directory, code, pods)
+            if interrupt.asked.is_set():
+                return _interrupted(outcome, killed=interrupt.killed)
+            if not tries.another(verdict(planned.job, outcome.exit_code), outcome.steps or 0):
+                return outcome
+            say(f"trainer ended with {meaning(outcome.exit_code)}; again in {tries.wait_s:g} s")
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(interrupt.asked.wait(), tries.wait_s)
+    raise AssertionError("a replica's pods are bounded by its Job")
+
+
+def meaning(exit_code: int) -> str:
+    """Return an exit code in words."""
+    try:
+        return f"exit code {exit_code} ({ExitCode(exit_code).name.lower().replace('_', ' ')})"
+    except ValueError:
+        return f"exit code {exit_code}"
+
+
+async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt) -> int | None:
+    """Return the trainer's exit code; None when it was never started."""
+    if interrupt.asked.is_set():
+        return None
+    template = planned.job["spec"]["template"]
+    pod = read_pod(template, str(uuid.uuid4()))
+    mount(pod, template["spec"]["volumes"], planned.config_map)
+    _termination(setting.directory).unlink(missing_ok=True)
+    with contextlib.ExitStack() as logs:
+        kubelet = Kubelet(logs=_logs(pod, setting, logs), backoff=setting.backoff, terminal=setting.terminal)
+        running = RunningPod(pod, kubelet)
+        interrupt.pass_to(running)
+        return await running.run()
+
+
+def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str, Log]:
+    folder = setting.directory / "logs"
+    logs = {each.name: Log(each.name, folder, setting.show) for each in pod.containers}
+    for log in logs.values():
+        opened.callback(log.close)
+    return logs
+
+
+def _interrupted(outcome: Outcome, *, killed: bool) -> Outcome:
+    """Return the outcome of a run that a person ended; one that was done anyway stays done."""
+    if outcome.finished:
+        return outcome
+    code = KILLED if killed else int(ExitCode.INTERRUPTED)
+    return Outcome(exit_code=code, steps=outcome.steps, pods=outcome.pods)
+
+
+def _outcome(directory: Path, code: int | None, pods: int) -> Outcome:
+    """Return what the trainer said of its end: in summary.json, or in its termination message."""
+    said = {**_json(_termination(directory)), **_json(directory / "summary.json")}
+    return Outcome(
+        exit_code=int(ExitCode.INTERRUPTED) if code is None else code,
+        reason=str(said.get("reason", "")),
+        steps=said.get("step", said.get("steps")),
+        success_rate=said.get("success_rate"),
+        steps_per_second=said.get("steps_per_second"),
+        faults=said.get("faults"),
+        pods=pods,
+    )
+
+
+def _termination(directory: Path) -> Path:
+    return directory / "termination.json"
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError):  # not written, or cut off with its writer
+        return {}
+    return content if isinstance(content, dict) else {}

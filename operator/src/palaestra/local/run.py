@@ -1,0 +1,126 @@
+"""`palaestra run`: a TrainingJob file becomes a trained policy on this machine.
+
+Nothing is started and no file is written before every check has passed. Replicas run one after
+another, as each takes a whole small machine; `--replica` picks one, and two terminals with one each
+run two at a time.
+"""
+
+import asyncio
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from palaestra_sim.protocol.status import ExitCode
+
+from palaestra.api import TrainingJob
+from palaestra.api.loading import as_data
+from palaestra.local import preflight, rundir
+from palaestra.local.errors import Refused
+from palaestra.local.outcome import Outcome, summary
+from palaestra.local.output import say
+from palaestra.local.ports import HeldPorts
+from palaestra.local.replica import KILLED, Setting, meaning, run_replica
+from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
+
+SHOWN_LINES = 5  # of the trainer's log, when it failed without a last word
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What a person chose on the command line."""
+
+    runs: Path
+    version: str
+    replica: int | None = None
+    fresh: bool = False
+    verbose: bool = False
+    ros_port: int | None = None
+
+
+def run(job: TrainingJob, options: Options) -> int:
+    """Run a job's replicas and return the exit code: 0, or that of the first that was not done.
+
+    Raises:
+        LocalError: it cannot be run here; the message has one line for each reason.
+        PlanError: it cannot be run on one machine.
+        WorldError: one of its worlds is wrong.
+    """
+    directory = rundir.job_directory(options.runs, job.metadata.name)
+    job = identified(job, rundir.uid_of(directory))
+    chosen = _chosen(job, options.replica)
+    plan(job, LocalLayout(images=Images.of_release(options.version), job_directory=str(directory)))
+    preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
+    codes = []
+    for replica in chosen:
+        codes.append(_run_one(job, directory / str(replica), replica, options))
+        if codes[-1] in (ExitCode.INTERRUPTED, KILLED):
+            break
+    return next((code for code in codes if code), 0)
+
+
+def _chosen(job: TrainingJob, replica: int | None) -> range:
+    if replica is None:
+        return range(job.spec.replicas)
+    if not 0 <= replica < job.spec.replicas:
+        raise Refused(
+            f"--replica {replica}: the job has {job.spec.replicas}; "
+            f"use 0 to {job.spec.replicas - 1}, or raise spec.replicas"
+        )
+    return range(replica, replica + 1)
+
+
+def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> int:
+    record = {field: value for field, value in as_data(job).items() if field != "status"}
+    with rundir.locked(path), HeldPorts() as held:
+        ports = _ports(held, job, options)
+        if options.fresh and (aside := rundir.set_aside(path)):
+            say(f"{path}: the run that was there is now {aside}")
+        rundir.refuse_another_job(path, record)
+        before = Outcome.of(path)
+        if before is not None and before.finished:
+            say(f"{job.metadata.name}, replica {replica}: finished already; --fresh begins anew")
+            _tell(before, path)
+            return 0
+        layout = LocalLayout(
+            images=Images.of_release(options.version), job_directory=str(path.parent), ports=ports
+        )
+        rundir.prepare(path, record)
+        return _trained(plan(job, layout).replicas[replica], path, ports, options)
+
+
+def _ports(held: HeldPorts, job: TrainingJob, options: Options) -> Ports:
+    simulators = sum(group.count for group in job.spec.simulators)
+    return Ports(
+        ros_master=held.any() if options.ros_port is None else held.this(options.ros_port),
+        status=held.any(),
+        control=tuple(held.any() for _ in range(simulators)),
+        health=tuple(held.any() for _ in range(simulators)),
+    )
+
+
+def _trained(planned: ReplicaPlan, path: Path, ports: Ports, options: Options) -> int:
+    say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")
+    say(f"ROS_MASTER_URI=http://127.0.0.1:{ports.ros_master}")
+    on_terminal = sys.stdout.isatty() and not options.verbose
+    setting = Setting(
+        directory=path,
+        show=say if options.verbose else None,
+        terminal=sys.stdout.fileno() if on_terminal else None,
+    )
+    outcome = asyncio.run(run_replica(planned, setting))
+    outcome.keep(path)
+    _tell(outcome, path)
+    return outcome.exit_code
+
+
+def _tell(outcome: Outcome, path: Path) -> None:
+    if outcome.exit_code == ExitCode.INTERRUPTED:
+        say(f"interrupted at step {outcome.steps or 0}; the same command goes on from there")
+    elif outcome.exit_code == KILLED:
+        say("killed; the same command goes on from the newest checkpoint")
+    elif not outcome.finished:
+        log = path / "logs" / "trainer.log"
+        said = outcome.reason or "\n".join(log.read_text(errors="replace").splitlines()[-SHOWN_LINES:])
+        say(f"failed: the trainer ended with {meaning(outcome.exit_code)}: {said}; more in {log}")
+    for line in summary(outcome, path):
+        say(line)

@@ -1,0 +1,148 @@
+"""The run directory of one replica: whose it is, what was asked for, and whether it is finished.
+
+    <dir>/<job name>/<replica>/     job.yaml, training.yaml, worlds/, logs/, scratch/, outcome.json,
+                                    and what the trainer writes: checkpoints/, tensorboard/, ...
+    <dir>/<job name>/<replica>.lock held by the runner that uses the directory
+    <dir>/<job name>/<replica>.old-<n>/   what --fresh has set aside; nothing is ever deleted
+
+A job's uid on a laptop follows from this place: it is the same for every `palaestra run` of one
+directory, and different for two directories, without a file that could be lost.
+"""
+
+import fcntl
+import itertools
+import os
+import re
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from palaestra.local.errors import Refused
+from palaestra.local.files import make_folder, storage, write
+
+RECORD = "job.yaml"
+# What may differ between two runs of one directory: it changes when training ends or stops, or which
+# replicas there are, never what one replica learns.
+MUTABLE = frozenset(
+    f"spec.{field}"
+    for field in (
+        "activeDeadlineSeconds",
+        "backoffLimit",
+        "replicas",
+        "simulators[].startDeadlineSeconds",
+        "stallDeadlineSeconds",
+        "suspend",
+        "ttlSecondsAfterFinished",
+    )
+)
+_ANY = re.compile(r"\[[0-9]+\]")
+
+Record = Mapping[str, Any]
+
+
+def job_directory(runs: Path, job: str) -> Path:
+    """Return the absolute folder of a job below the folder of all runs."""
+    return runs.absolute() / job
+
+
+def uid_of(directory: Path) -> str:
+    """Return the uid of the job whose runs lie in `directory`; the same path, the same uid."""
+    return str(uuid.uuid5(uuid.NAMESPACE_URL, directory.absolute().as_uri()))
+
+
+@contextmanager
+def locked(directory: Path) -> Iterator[None]:
+    """Hold a run directory for this process alone; the kernel gives it back with our end.
+
+    Raises:
+        Refused: another runner has it.
+        StorageFailed: its parent cannot be written.
+    """
+    make_folder(directory.parent)
+    path = directory.with_name(f"{directory.name}.lock")
+    with storage(path):
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.read(descriptor, 32).decode(errors="replace").strip() or "unknown"
+            raise Refused(
+                f"{directory}: `palaestra run` is at work there (process {holder}); "
+                "wait for its end, or choose another folder with --dir"
+            ) from None
+        with storage(path):
+            os.truncate(descriptor, 0)
+            os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def refuse_another_job(directory: Path, record: Record) -> None:
+    """Compare what is asked for with what the directory's run was started with.
+
+    Raises:
+        Refused: they differ in what a run cannot change; one line for each field.
+    """
+    try:
+        before = yaml.safe_load((directory / RECORD).read_bytes())
+    except FileNotFoundError:
+        return
+    if changes := tuple(changed_fields(before, record)):
+        raise Refused(
+            "\n".join(changes) + f"\n{directory}: holds a run of the job as it was; "
+            "change the file back, give the job another name, or begin anew with --fresh"
+        )
+
+
+def changed_fields(before: Record, now: Record) -> Iterator[str]:
+    """Yield `field: was x, is y` for every field that differs and may not."""
+    old, new = dict(_flat(before)), dict(_flat(now))
+    for field in sorted(old.keys() | new.keys()):
+        if old.get(field) != new.get(field) and _ANY.sub("[]", field) not in MUTABLE:
+            yield f"{field}: was {_short(old.get(field))}, is {_short(new.get(field))}"
+
+
+def prepare(directory: Path, record: Record) -> None:
+    """Make the directory and write down what is run in it.
+
+    Raises:
+        StorageFailed: it cannot be written.
+    """
+    write(directory / RECORD, yaml.safe_dump(dict(record), sort_keys=False).encode())
+
+
+def set_aside(directory: Path) -> Path | None:
+    """Move a run directory out of the way; return where it is now, or None when there was none.
+
+    Raises:
+        StorageFailed: it cannot be moved.
+    """
+    if not directory.exists():
+        return None
+    names = (directory.with_name(f"{directory.name}.old-{n}") for n in itertools.count(1))
+    aside = next(name for name in names if not name.exists())
+    with storage(directory):
+        return directory.rename(aside)
+
+
+def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    match value:
+        case dict() if value:
+            for key, item in value.items():
+                yield from _flat(item, f"{path}.{key}" if path else key)
+        case list() if value:
+            for index, item in enumerate(value):
+                yield from _flat(item, f"{path}[{index}]")
+        case _:
+            yield path, value
+
+
+def _short(value: Any) -> str:
+    text = "absent" if value is None else repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."  # noqa: PLR2004 - what fits in a line

@@ -1,0 +1,119 @@
+"""Read a planned pod as a kubelet would: containers in order, commands, environment, probes, volumes.
+
+Only what a process on this machine can have is read; images, resources and security contexts are the
+cluster's business. What a container asks for and a laptop cannot give is refused, not left out.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from palaestra.local.errors import Refused
+
+GRACE_S = 30.0  # Kubernetes' default terminationGracePeriodSeconds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Probe:
+    """How to ask a container whether it started, or lives: a command or an address, not both."""
+
+    command: tuple[str, ...] = ()
+    url: str = ""
+    initial_delay_s: float = 0.0
+    period_s: float = 10.0
+    timeout_s: float = 1.0
+    failure_threshold: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Container:
+    """One container of a pod.
+
+    `sidecar` claims that it is a native sidecar: an init container that is restarted for as long as
+    the pod lives.
+    """
+
+    name: str
+    command: tuple[str, ...]
+    env: Mapping[str, str]
+    sidecar: bool = False
+    startup: Probe | None = None
+    liveness: Probe | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pod:
+    """One pod; `init` in the order of their start, `main` is the container whose end ends the pod."""
+
+    uid: str
+    init: tuple[Container, ...]
+    main: Container
+    grace_s: float
+    mounts: Mapping[str, str]  # volume name -> directory
+
+    @property
+    def containers(self) -> tuple[Container, ...]:
+        """Return all containers in the order of their start."""
+        return (*self.init, self.main)
+
+
+def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
+    """Return the pod that a Job's template describes, for its attempt with `uid`.
+
+    Raises:
+        Refused: it asks for what only a cluster has.
+    """
+    spec = template["spec"]
+    main, *others = spec["containers"]
+    if others:
+        raise Refused(f"container {others[0]['name']}: a pod is run here with one main container only")
+    return Pod(
+        uid=uid,
+        init=tuple(_container(each, uid) for each in spec.get("initContainers", ())),
+        main=_container(main, uid),
+        grace_s=float(spec.get("terminationGracePeriodSeconds", GRACE_S)),
+        mounts={
+            mount["name"]: mount["mountPath"]
+            for each in (*spec.get("initContainers", ()), main)
+            for mount in each.get("volumeMounts", ())
+        },
+    )
+
+
+def _container(spec: Mapping[str, Any], uid: str) -> Container:
+    name = spec["name"]
+    return Container(
+        name=name,
+        command=(*spec["command"], *spec.get("args", ())),
+        env={entry["name"]: _value(name, entry, uid) for entry in spec.get("env", ())},
+        sidecar=spec.get("restartPolicy") == "Always",
+        startup=_probe(spec.get("startupProbe")),
+        liveness=_probe(spec.get("livenessProbe")),
+    )
+
+
+def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
+    source = entry.get("valueFrom")
+    if source is None:
+        return str(entry.get("value", ""))
+    if source.get("fieldRef", {}).get("fieldPath") == "metadata.uid":
+        return uid
+    raise Refused(
+        f"env {entry['name']} of container {container}: its value lies in a cluster; "
+        "give it as `value` to run the job here"
+    )
+
+
+def _probe(spec: Mapping[str, Any] | None) -> Probe | None:
+    if spec is None:
+        return None
+    command: Sequence[str] = spec.get("exec", {}).get("command", ())
+    get = spec.get("httpGet")
+    return Probe(
+        command=tuple(command),
+        url=f"http://{get.get('host', '127.0.0.1')}:{get['port']}{get['path']}" if get else "",
+        initial_delay_s=float(spec.get("initialDelaySeconds", 0)),
+        period_s=float(spec.get("periodSeconds", 10)),
+        timeout_s=float(spec.get("timeoutSeconds", 1)),
+        failure_threshold=int(spec.get("failureThreshold", 3)),
+    )

@@ -1,0 +1,31 @@
+"""The volumes of a planned pod as folders: a ConfigMap's files, a claim, empty ones."""
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from palaestra.local.files import make_folder, storage, write
+from palaestra.local.spec import Pod
+
+
+def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:
+    """Make every volume ready where the pod mounts it; empty ones begin empty with each pod.
+
+    Raises:
+        StorageFailed: one of them cannot be written.
+    """
+    for volume in volumes:
+        target = Path(pod.mounts[volume["name"]])
+        if "configMap" in volume:
+            _show(volume["configMap"], config_map, target)
+            continue
+        if "emptyDir" in volume and volume["name"] != "run":
+            with storage(target):
+                shutil.rmtree(target, ignore_errors=True)
+        make_folder(target)
+
+
+def _show(source: Mapping[str, Any], config_map: Mapping[str, Any], target: Path) -> None:
+    for item in source["items"]:
+        write(target / item["path"], config_map["data"][item["key"]].encode())

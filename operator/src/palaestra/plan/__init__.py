@@ -1,0 +1,92 @@
+"""Turn a TrainingJob into the objects that it needs.
+
+Pure: the same job and layout, the same objects. No clock, no network, no randomness, so every example
+has its whole plan recorded in tests/golden/, as a cluster gets it and as a laptop does.
+
+    plan(job, layout).objects
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from palaestra.api import TrainingJob
+from palaestra.plan.claim import claim
+from palaestra.plan.config_map import config_map
+from palaestra.plan.errors import PlanError
+from palaestra.plan.job import job as replica_job
+from palaestra.plan.layout import ClusterLayout, Images, Layout, LocalLayout, Places, Ports
+from palaestra.plan.pod import pod_template
+from palaestra.plan.replica import Replica
+from palaestra.plan.worlds import ConfigMaps, world_files
+
+__all__ = [
+    "ClusterLayout",
+    "ConfigMaps",
+    "Images",
+    "Layout",
+    "LocalLayout",
+    "Object",
+    "Places",
+    "Plan",
+    "PlanError",
+    "Ports",
+    "ReplicaPlan",
+    "identified",
+    "plan",
+]
+
+Object = Mapping[str, Any]  # a Kubernetes object, as in JSON
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplicaPlan:
+    """The objects of one replica."""
+
+    config_map: Object
+    claim: Object | None
+    job: Object
+
+    @property
+    def objects(self) -> tuple[Object, ...]:
+        """Return them in the order of their creation: a Job's pods need the other two."""
+        found = (self.config_map, self.claim, self.job)
+        return tuple(each for each in found if each is not None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """The objects of a TrainingJob, by replica."""
+
+    replicas: tuple[ReplicaPlan, ...]
+
+    @property
+    def objects(self) -> tuple[Object, ...]:
+        """Return all of them in the order of their creation."""
+        return tuple(each for replica in self.replicas for each in replica.objects)
+
+
+def plan(job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None) -> Plan:
+    """Return the plan of a job that has a uid.
+
+    `config_maps` holds the worlds of `configMap` sources, by name and key.
+
+    Raises:
+        PlanError: the job cannot be planned in this layout.
+        WorldError: one of its worlds is wrong.
+    """
+    replicas = (Replica(job=job, index=i, layout=layout) for i in range(job.spec.replicas))
+    return Plan(replicas=tuple(_replica_plan(each, config_maps or {}) for each in replicas))
+
+
+def identified(job: TrainingJob, uid: str) -> TrainingJob:
+    """Return the job as it is with a uid, for one that no cluster has given one to."""
+    metadata = job.metadata.model_copy(update={"uid": uid})
+    return job.model_copy(update={"metadata": metadata})
+
+
+def _replica_plan(replica: Replica, config_maps: ConfigMaps) -> ReplicaPlan:
+    worlds = world_files(replica, config_maps)
+    configured = config_map(replica, worlds)
+    template = pod_template(replica, configured, worlds)
+    return ReplicaPlan(config_map=configured, claim=claim(replica), job=replica_job(replica, template))

@@ -1,0 +1,206 @@
+"""The containers of a replica's pod: the ROS master, a sidecar for each simulator, the trainer."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from palaestra.api import Driver
+from palaestra.api.container import Resources, Variable
+from palaestra.plan import resources as planned
+from palaestra.plan.layout import Places
+from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica, Simulator
+from palaestra.plan.training import FILE, LOOPBACK
+from palaestra.plan.worlds import world_path
+
+Container = dict[str, Any]
+
+SIDECAR = "palaestra-sidecar"
+SECURITY = {
+    "allowPrivilegeEscalation": False,
+    "capabilities": {"drop": ["ALL"]},
+    "readOnlyRootFilesystem": True,
+}
+# One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
+# quarter of one. The port is on loopback, where a kubelet's own TCP probe cannot look.
+MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
+
+
+def ros_master(replica: Replica) -> Container:
+    """Return the ROS master: no parameter of it is shared by anything but loopback."""
+    port = replica.layout.ports.ros_master
+    probe = ["bash", "-c", MASTER_ANSWERS.format(host=LOOPBACK, port=port)]
+    return {
+        "name": ROS_MASTER,
+        "image": _trainer_image(replica),
+        "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
+        "restartPolicy": "Always",
+        "command": ["rosmaster", "--core", "-p", str(port)],
+        "startupProbe": {
+            "exec": {"command": probe},
+            "periodSeconds": 1,
+            "timeoutSeconds": 10,
+            "failureThreshold": 6,
+        },
+        **_common(replica, ROS_MASTER, Resources(), planned.ROS_MASTER, ()),
+    }
+
+
+def sidecar(replica: Replica, simulator: Simulator, worlds: Mapping[str, bytes]) -> Container:
+    """Return the sidecar of one simulator, which the trainer tells when to start it."""
+    group, places = simulator.group, replica.places(simulator.container)
+    ports = replica.layout.ports
+    program = SIDECAR
+    if group.driver is Driver.COMMAND and places.sidecar is not None:
+        program = f"{places.sidecar}/{SIDECAR}"
+    return {
+        "name": simulator.container,
+        "image": _simulator_image(replica, simulator),
+        "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
+        "restartPolicy": "Always",
+        "command": [program],
+        "args": [
+            f"--driver={group.driver.value}",
+            f"--world={world_path(replica, simulator, worlds)}",
+            f"--work={places.scratch}/work",
+            f"--control={LOOPBACK}:{ports.control[simulator.place]}",
+            f"--health={replica.layout.health_host}:{ports.health[simulator.place]}",
+            *_identity(simulator),
+            *(f"--option={option}" for option in group.options),
+            *(("--", *group.command) if group.command else ()),
+        ],
+        "ports": [_port(f"sim-{simulator.place}", ports.health[simulator.place])],
+        "livenessProbe": _healthz(ports.health[simulator.place], initialDelaySeconds=10),
+        **_common(replica, simulator.container, group.resources, planned.SIMULATOR, group.env),
+    }
+
+
+def trainer(replica: Replica) -> Container:
+    """Return the trainer: the built-in loop, or the job's own program in its place."""
+    spec, places = replica.job.spec.trainer, replica.places(TRAINER)
+    port = replica.layout.ports.status
+    container = {
+        "name": TRAINER,
+        "image": _trainer_image(replica),
+        "imagePullPolicy": spec.image_pull_policy.value,
+        "command": list(spec.command) or ["palaestra-train"],
+        "ports": [_port("metrics", port)],
+        "terminationMessagePath": places.termination,
+        "terminationMessagePolicy": "FallbackToLogsOnError",
+        **_common(replica, TRAINER, spec.resources, planned.TRAINER, spec.env),
+    }
+    if not spec.command:  # a program of the job's own need not serve anything
+        # Importing PyTorch takes a busy node half a minute, before anything can answer.
+        container["livenessProbe"] = _healthz(port, initialDelaySeconds=60)
+    return container
+
+
+def install_sidecar(replica: Replica) -> Container | None:
+    """Return the init container that copies the sidecar for users' own images; None: not needed."""
+    groups = replica.job.spec.simulators
+    if replica.places(SIDECAR).sidecar is None or not any(group.driver is Driver.COMMAND for group in groups):
+        return None
+    target = replica.places(SIDECAR).sidecar
+    return {
+        "name": "install-sidecar",
+        "image": replica.layout.images.stub,
+        "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
+        "command": ["cp", "-a", "/opt/palaestra/.", f"{target}/"],
+        "securityContext": SECURITY,
+        "resources": planned.resources(Resources(), planned.ROS_MASTER),
+        "volumeMounts": [{"name": "sidecar", "mountPath": target}],
+    }
+
+
+def _common(
+    replica: Replica,
+    container: str,
+    wanted: Resources,
+    default: Resources,
+    own: tuple[Variable, ...],
+) -> Container:
+    """Return what every container has: environment, resources, security and mounts."""
+    places = replica.places(container)
+    quantities = planned.resources(wanted, default)
+    env = {
+        **_environment(replica, container, planned.threads(quantities)),
+        **{each.name: _variable(each) for each in own},
+    }
+    return {
+        "env": [{"name": name, **value} for name, value in env.items()],
+        "resources": quantities,
+        "securityContext": SECURITY,
+        "volumeMounts": _mounts(container, places),
+    }
+
+
+def _environment(replica: Replica, container: str, threads: int) -> dict[str, dict[str, Any]]:
+    places = replica.places(container)
+    variables = {
+        "ROS_MASTER_URI": f"http://{LOOPBACK}:{replica.layout.ports.ros_master}",
+        "ROS_HOSTNAME": "localhost",
+        "ROS_HOME": f"{places.scratch}/ros",
+        "PALAESTRA_CONFIG": f"{places.config}/{FILE}",
+        "PALAESTRA_RUN": places.run,
+        "OMP_NUM_THREADS": str(threads),
+        "PYTHONUNBUFFERED": "1",  # a log is read while it is written
+        **({"HOME": places.home} if places.home is not None else {}),
+        **({"PALAESTRA_TERMINATION_LOG": places.termination} if container == TRAINER else {}),
+    }
+    uid = {"valueFrom": {"fieldRef": {"fieldPath": "metadata.uid"}}}
+    return {**{name: {"value": value} for name, value in variables.items()}, "PALAESTRA_POD_UID": uid}
+
+
+def _mounts(container: str, places: Places) -> list[dict[str, Any]]:
+    mounts: list[dict[str, Any]] = [
+        {"name": "config", "mountPath": places.config, "readOnly": True},
+        {"name": f"scratch-{container}", "mountPath": places.scratch},
+    ]
+    if container == TRAINER:
+        mounts.append({"name": "run", "mountPath": places.volume})
+    elif container != ROS_MASTER and places.shared_memory is not None:
+        mounts.append({"name": f"memory-{container}", "mountPath": places.shared_memory})
+    return mounts
+
+
+def _variable(variable: Variable) -> dict[str, Any]:
+    if variable.secret_key_ref is None:
+        return {"value": variable.value}
+    reference = variable.secret_key_ref
+    return {"valueFrom": {"secretKeyRef": {"name": reference.name, "key": reference.key}}}
+
+
+def _identity(simulator: Simulator) -> tuple[str, ...]:
+    identity = simulator.identity
+    return (
+        f"--job={identity.job}",
+        f"--namespace={identity.namespace}",
+        f"--uid={identity.uid}",
+        f"--replica={identity.replica}",
+        f"--group={identity.group}",
+        f"--index={identity.index}",
+        *(("--clock",) if simulator.keeps_clock else ()),
+    )
+
+
+def _simulator_image(replica: Replica, simulator: Simulator) -> str:
+    images = replica.layout.images
+    release = images.webots if simulator.group.driver is Driver.WEBOTS else images.stub
+    return simulator.group.image or release
+
+
+def _trainer_image(replica: Replica) -> str:
+    return replica.job.spec.trainer.image or replica.layout.images.trainer
+
+
+def _port(name: str, number: int) -> dict[str, Any]:
+    return {"name": name, "containerPort": number, "protocol": "TCP"}
+
+
+def _healthz(port: int, **timing: int) -> dict[str, Any]:
+    """Return a liveness probe that bears a minute of a busy node."""
+    return {
+        "httpGet": {"path": "/healthz", "port": port},
+        "periodSeconds": 10,
+        "timeoutSeconds": 5,
+        "failureThreshold": 6,
+        **timing,
+    }

@@ -1,0 +1,129 @@
+"""What differs between a cluster and a laptop: ports, places and images. Nothing else does.
+
+A layout is given to `plan` and only read there; nothing is edited after planning.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
+STATUS_PORT = 9090
+CONTROL_PORTS = range(7100, 7200)  # of the k-th simulator of a pod; a pod has 32 at most
+HEALTH_PORTS = range(7200, 7300)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ports:
+    """The ports of one replica; `control` and `health` are indexed by the simulator's place."""
+
+    ros_master: int = ROS_MASTER_PORT
+    status: int = STATUS_PORT
+    control: Sequence[int] = CONTROL_PORTS
+    health: Sequence[int] = HEALTH_PORTS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Images:
+    """The release's own images, for jobs that name none."""
+
+    trainer: str
+    stub: str
+    webots: str
+
+    @classmethod
+    def of_release(cls, version: str) -> "Images":
+        """Return the images that were built for a version of Palaestra."""
+        return cls(
+            trainer=f"palaestra-trainer:{version}",
+            stub=f"palaestra-stub:{version}",
+            webots=f"palaestra-webots:{version}",
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Places:
+    """Where things lie for the containers of one replica; absolute paths.
+
+    `volume` is where the claim is mounted and `run` the run directory on it. `home` is given where
+    the image's own cannot be written, `shared_memory` where the default is too small for a simulator,
+    and `sidecar` where `palaestra-sidecar` has to be copied into a user's image.
+    """
+
+    config: str
+    volume: str
+    run: str
+    scratch: str
+    termination: str
+    home: str | None = None
+    shared_memory: str | None = None
+    sidecar: str | None = None
+
+
+class Layout(Protocol):
+    """A cluster's or a laptop's."""
+
+    @property
+    def images(self) -> Images:
+        """The images for jobs that name none."""
+        ...
+
+    @property
+    def ports(self) -> Ports:
+        """The ports of one replica."""
+        ...
+
+    @property
+    def health_host(self) -> str:
+        """The address on which health and metrics are served."""
+        ...
+
+    def places(self, uid: str, replica: int, container: str) -> Places:
+        """Return where things lie for a container of a replica of the job with `uid`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterLayout:
+    """Every pod has a network and a file system of its own, so places and ports are always the same."""
+
+    images: Images
+    ports: Ports = Ports()
+    health_host: str = "0.0.0.0"  # noqa: S104 - the pod's address, for the kubelet and Prometheus
+
+    def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - no container differs
+        """Return the same places for every container; runs are kept apart by the job's uid."""
+        return Places(
+            config="/etc/palaestra",
+            volume="/var/lib/palaestra",
+            run=f"/var/lib/palaestra/{uid}/{replica}",
+            scratch="/tmp",  # noqa: S108 - a volume of the container's own
+            termination="/dev/termination-log",
+            home="/tmp",  # noqa: S108
+            shared_memory="/dev/shm",  # noqa: S108
+            sidecar="/palaestra",
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LocalLayout:
+    """All containers share this machine: everything lies in the run directory, on loopback.
+
+    `job_directory` is the absolute folder of the job's replicas, `<dir>/<job name>`.
+    """
+
+    images: Images
+    job_directory: str
+    ports: Ports = Ports()
+    health_host: str = "127.0.0.1"
+
+    def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - the folder is the job's already
+        """Return the places of one container, all below `<job_directory>/<replica>`."""
+        run = f"{self.job_directory}/{replica}"
+        return Places(
+            config=run,
+            volume=run,
+            run=run,
+            scratch=f"{run}/scratch/{container}",
+            termination=f"{run}/termination.json",
+        )

@@ -1,0 +1,79 @@
+"""The pod template of a replica: containers in order, volumes, and what *restricted* security asks."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from palaestra.plan.claim import run_volume
+from palaestra.plan.config_map import config_volume
+from palaestra.plan.containers import install_sidecar, ros_master, sidecar, trainer
+from palaestra.plan.replica import Replica
+
+USER = 65532  # uid, gid and fsGroup of everything in the pod
+GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot notice
+SCRATCH_SIZE = "1Gi"
+MEMORY_SIZE = "128Mi"
+
+
+def pod_template(
+    replica: Replica, config_map: Mapping[str, Any], worlds: Mapping[str, bytes]
+) -> dict[str, Any]:
+    """Return the template; `config_map` is the replica's, `worlds` are those in it."""
+    scheduling = replica.job.spec.scheduling
+    installed = install_sidecar(replica)
+    init = [
+        *([installed] if installed else []),
+        ros_master(replica),
+        *(sidecar(replica, simulator, worlds) for simulator in replica.simulators),
+    ]
+    main = trainer(replica)
+    metadata: dict[str, Any] = {"labels": {**scheduling.pod_labels, **replica.labels}}
+    if scheduling.pod_annotations:
+        metadata["annotations"] = scheduling.pod_annotations
+    return {
+        "metadata": metadata,
+        "spec": {
+            "restartPolicy": "Never",
+            "automountServiceAccountToken": False,
+            "enableServiceLinks": False,
+            "terminationGracePeriodSeconds": GRACE_S,
+            "securityContext": {
+                "runAsNonRoot": True,
+                "runAsUser": USER,
+                "runAsGroup": USER,
+                "fsGroup": USER,
+                "fsGroupChangePolicy": "OnRootMismatch",
+                "seccompProfile": {"type": "RuntimeDefault"},
+            },
+            **_scheduling(replica),
+            "initContainers": init,
+            "containers": [main],
+            "volumes": [
+                config_volume(config_map),
+                run_volume(replica),
+                *_empty_volumes([*init, main]),
+            ],
+        },
+    }
+
+
+def _scheduling(replica: Replica) -> dict[str, Any]:
+    """Return the fields of a pod that the job's `scheduling` and pull secrets fill."""
+    spec, scheduling = replica.job.spec, replica.job.spec.scheduling
+    given = scheduling.model_dump(mode="json", by_alias=True, exclude_none=True)
+    taken = ("priorityClassName", "nodeSelector", "tolerations", "affinity", "runtimeClassName")
+    fields = {name: given[name] for name in taken if given.get(name)}
+    if spec.image_pull_secrets:
+        fields["imagePullSecrets"] = [{"name": each.name} for each in spec.image_pull_secrets]
+    return fields
+
+
+def _empty_volumes(containers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return an empty volume for every mount that has no other: each container has its own."""
+    mounted = {mount["name"] for each in containers for mount in each["volumeMounts"]}
+    return [{"name": name, "emptyDir": _empty(name)} for name in sorted(mounted - {"config", "run"})]
+
+
+def _empty(name: str) -> dict[str, Any]:
+    if name.startswith("memory-"):
+        return {"medium": "Memory", "sizeLimit": MEMORY_SIZE}
+    return {"sizeLimit": SCRATCH_SIZE}

@@ -1,0 +1,31 @@
+"""Objects as YAML that a person reads: fields in their own order, long texts as blocks, no anchors."""
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import yaml
+
+# Text to PyYAML, a number to kubectl: 5e-4.
+_NUMBER = re.compile(r"[-+]?[0-9.][0-9._]*([eE][-+]?[0-9]+)?")
+
+
+class _Dumper(yaml.SafeDumper):
+    """PyYAML's safe dumper for people."""
+
+    def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - equal parts are written out
+        """Return True: no object refers to a part of another."""
+        return True
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = "|" if "\n" in text else "'" if _NUMBER.fullmatch(text) else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)
+
+
+def as_yaml(documents: Iterable[Mapping[str, Any]]) -> str:
+    """Return objects as YAML documents, as `kubectl apply` takes them."""
+    return yaml.dump_all(documents, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)

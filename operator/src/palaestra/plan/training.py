@@ -1,0 +1,66 @@
+"""training.yaml: the job, resolved for one replica, as its trainer reads it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from palaestra.plan.replica import Replica, Simulator
+from palaestra.plan.text import as_yaml
+from palaestra.plan.worlds import world_path
+from palaestra_sim.world import name_prefix
+
+FILE = "training.yaml"
+LOOPBACK = "127.0.0.1"
+
+
+def training_yaml(replica: Replica, files: Mapping[str, bytes]) -> bytes:
+    """Return the text of the replica's training.yaml; `files` are the worlds beside it."""
+    return as_yaml([_training(replica, files)]).encode()
+
+
+def status_address(replica: Replica) -> str:
+    """Return where the trainer serves /metrics, /status and /healthz."""
+    return f"{replica.layout.health_host}:{replica.layout.ports.status}"
+
+
+def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
+    spec = replica.job.spec
+    trainer = spec.trainer.model_dump(mode="json", by_alias=True, exclude_none=True)
+    training = {
+        "job": replica.job.metadata.name,
+        "namespace": replica.job.metadata.namespace,
+        "uid": replica.uid,
+        "replica": replica.index,
+        "seed": spec.seed + replica.index,
+        "environment": trainer["environment"],
+        "algorithm": trainer["algorithm"],
+        "steps": spec.trainer.steps,
+        "evaluation": trainer["evaluation"] if spec.trainer.evaluation.every_steps else None,
+        "checkpoint": trainer["checkpoint"],
+        "stallDeadlineSeconds": spec.stall_deadline_seconds,
+        "command": list(spec.trainer.command) or None,
+        "statusAddress": status_address(replica),
+        "simulators": [_simulator(replica, each, files) for each in replica.simulators],
+    }
+    return {field: value for field, value in training.items() if value is not None}
+
+
+def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes]) -> dict[str, Any]:
+    group = simulator.group
+    port = replica.layout.ports.control[simulator.place]
+    described: dict[str, Any] = {
+        "name": simulator.name,
+        "group": group.name,
+        "index": simulator.identity.index,
+        "role": group.role.value,
+        "control": f"http://{LOOPBACK}:{port}",
+        "world": world_path(replica, simulator, files),
+        "namesPrefix": name_prefix(simulator.identity),
+    }
+    if group.recycle.after_resets:
+        described["recycle"] = {"afterResets": group.recycle.after_resets}
+    described["restart"] = {
+        "limit": group.restart.limit,
+        "withinSeconds": group.restart.within_seconds,
+    }
+    described["startDeadlineSeconds"] = group.start_deadline_seconds
+    return described

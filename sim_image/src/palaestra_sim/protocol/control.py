@@ -1,0 +1,213 @@
+"""What a trainer asks of a sidecar, and what the sidecar tells of its simulator.
+
+    POST /start   {}                    begin to start it; answered at once
+    POST /ready   {}                    it has answered a real round trip
+    POST /stop    {"deadline_s": 5.0}   it will end; it is killed after that many seconds
+    GET  /state
+
+Each is answered with a `SimulatorState`: 200, or 409 when the state does not allow the request. A
+body that is wrong is answered with 400 and {"error": "<field>: <fact>"}.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Self
+
+from palaestra_sim.protocol.fields import (
+    MOST_NAME,
+    Fields,
+    ProtocolError,
+    clipped,
+    decoded,
+)
+
+__all__ = [
+    "LastExit",
+    "ProtocolError",
+    "RobotName",
+    "SidecarState",
+    "SimulatorState",
+    "StopRequest",
+    "decoded",
+]
+
+MOST_DEADLINE_S = 3600.0
+MOST_PATH = 4096
+MOST_ROBOTS = 32
+MOST_PID = 2**22  # Source: PID_MAX_LIMIT of Linux
+
+
+class SidecarState(StrEnum):
+    """Where a simulator stands."""
+
+    IDLE = "idle"
+    STARTING = "starting"
+    READY = "ready"
+    STOPPING = "stopping"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotName:
+    """How a robot of the world is called.
+
+    `robot` is its Robot.name, `ros_name` the name of its ROS node, `supervisor` whether it may change
+    the scene.
+    """
+
+    robot: str
+    ros_name: str
+    supervisor: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {
+            "robot": clipped(self.robot, MOST_NAME),
+            "ros_name": clipped(self.ros_name, MOST_NAME),
+            "supervisor": self.supervisor,
+        }
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else.
+        """
+        fields = Fields(content, path)
+        return cls(
+            robot=fields.text("robot", MOST_NAME),
+            ros_name=fields.text("ros_name", MOST_NAME, least=1),
+            supervisor=fields.flag("supervisor"),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LastExit:
+    """How the simulator last ended: with a code, or by a signal such as "SIGBUS".
+
+    Neither: it could not be started, or nobody saw its end. `expected` is true if the end was asked
+    for; otherwise it was a fault.
+    """
+
+    code: int | None
+    signal: str | None
+    expected: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {"code": self.code, "signal": self.signal, "expected": self.expected}
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else.
+        """
+        fields = Fields(content, path)
+        return cls(
+            code=fields.whole("code", 0, 255) if fields.has("code") else None,
+            signal=fields.text("signal", 32, least=1) if fields.has("signal") else None,
+            expected=fields.flag("expected"),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorState:
+    """What a sidecar tells of its simulator.
+
+    Attributes:
+        state: where the simulator stands.
+        driver: stub, webots or command.
+        world: the path of the world it runs.
+        robots: the robots of that world that speak ROS.
+        pid: of the simulator's first process; None while none runs.
+        starts: how often it was started, in this life of the sidecar.
+        faults: how often it ended without having been asked to.
+        last_exit: how it last ended; None: never yet.
+        detail: why it is in this state, in a sentence for people; "": there is nothing to say.
+    """
+
+    state: SidecarState
+    driver: str
+    world: str
+    robots: tuple[RobotName, ...] = ()
+    pid: int | None = None
+    starts: int = 0
+    faults: int = 0
+    last_exit: LastExit | None = None
+    detail: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data, texts cut to what a reader takes."""
+        return {
+            "state": self.state.value,
+            "driver": clipped(self.driver, MOST_NAME),
+            "world": clipped(self.world, MOST_PATH),
+            "robots": [robot.to_json() for robot in self.robots[:MOST_ROBOTS]],
+            "pid": self.pid,
+            "starts": self.starts,
+            "faults": self.faults,
+            "last_exit": None if self.last_exit is None else self.last_exit.to_json(),
+            "detail": clipped(self.detail),
+        }
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else.
+        """
+        fields = Fields(content, path)
+        return cls(
+            state=fields.choice("state", SidecarState),
+            driver=fields.text("driver", MOST_NAME),
+            world=fields.text("world", MOST_PATH),
+            robots=fields.parts("robots", RobotName.from_json, MOST_ROBOTS),
+            pid=fields.whole("pid", 1, MOST_PID) if fields.has("pid") else None,
+            starts=fields.whole("starts"),
+            faults=fields.whole("faults"),
+            last_exit=fields.part("last_exit", LastExit.from_json) if fields.has("last_exit") else None,
+            detail=fields.text("detail"),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopRequest:
+    """An announcement that the simulator will end, within `deadline_s` seconds (0: kill it now)."""
+
+    deadline_s: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {"deadline_s": self.deadline_s}
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else, or has a field more.
+        """
+        fields = Fields(content, path)
+        fields.only("deadline_s")
+        return cls(deadline_s=fields.number("deadline_s", 0.0, MOST_DEADLINE_S))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlainRequest:
+    """A request that says nothing but its name: start, ready."""
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return the request.
+
+        Raises:
+            ProtocolError: `content` is anything but an empty object.
+        """
+        Fields(content, path).only()
+        return cls()

@@ -1,0 +1,185 @@
+"""Read JSON that comes from a process one does not trust.
+
+A pod runs programs that its author chose, so what it answers may be anything: of the wrong type,
+endless, or text that no other program takes. Every value is read by one method that knows its type
+and its bounds, and everything else is a `ProtocolError`. Fields that nobody asked for are ignored in
+answers, so that a newer release may add some, and refused in requests, where they are mistakes.
+
+What is written stays within the same bounds: `clipped` and `known` make it so.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from datetime import datetime
+from enum import StrEnum
+from typing import TypeVar, cast
+
+from palaestra_sim.errors import SimError
+
+T = TypeVar("T")
+Choice = TypeVar("Choice", bound=StrEnum)
+
+MOST_BYTES = 2**19  # of one answer; every field at its longest, in the longest escapes, fits
+MOST_COUNT = 2**53  # integers that every JSON reader keeps exactly
+MOST_NAME = 255
+MOST_TEXT = 500
+
+_RFC3339 = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(Z|[+-]\d\d:\d\d)", re.ASCII)
+
+_TYPES = {dict: "an object", list: "a list", str: "text", bool: "true or false", type(None): "null"}
+
+
+class ProtocolError(SimError, ValueError):
+    """What was received is not what was agreed; the message names the field and the fact."""
+
+
+def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
+    """Return the JSON value of `data`.
+
+    Raises:
+        ProtocolError: it is longer than `most_bytes`, or no JSON.
+    """
+    if len(data) > most_bytes:
+        raise ProtocolError(f"body: {len(data)} bytes are more than {most_bytes}")
+    try:
+        return cast("object", json.loads(data))
+    except (ValueError, RecursionError) as error:
+        raise ProtocolError(f"body: is no JSON ({type(error).__name__})") from error
+
+
+def clipped(text: str, most: int = MOST_TEXT) -> str:
+    """Return `text`, at most `most` characters of it, as any reader of UTF-8 takes it."""
+    return text[:most].encode("utf-8", "replace").decode()
+
+
+def known(value: float | None) -> float | None:
+    """Return `value`, or None for what JSON cannot say: infinities and not-a-number."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+class Fields:
+    """The fields of one JSON object, each read as what it has to be.
+
+    Every method raises ProtocolError when the field is missing or anything else.
+
+    Args:
+        content: what `json.loads` gave.
+        path: where the object stands, "" at the top, as "simulators[1]".
+    """
+
+    def __init__(self, content: object, path: str = "") -> None:
+        self._path = path
+        if not isinstance(content, dict):
+            raise ProtocolError(f"{path or 'body'}: {_kind(content)} is no object")
+        self._content = cast("dict[str, object]", content)
+
+    def only(self, *names: str) -> None:
+        """Refuse every field that is not among `names`."""
+        for name in self._content:
+            if name not in names:
+                raise self._error(clipped(name, MOST_NAME), "is not a field of this request")
+
+    def has(self, name: str) -> bool:
+        """Return whether the field is there and not null."""
+        return self._content.get(name) is not None
+
+    def text(self, name: str, most: int = MOST_TEXT, least: int = 0) -> str:
+        """Return text of `least` to `most` characters."""
+        value = self._value(name)
+        if not isinstance(value, str):
+            raise self._error(name, f"{_kind(value)} is no text")
+        if not least <= len(value) <= most:
+            raise self._error(name, f"has {len(value)} characters, not {least} to {most}")
+        if any("\ud800" <= character <= "\udfff" for character in value):
+            raise self._error(name, "holds half a character")
+        return value
+
+    def choice(self, name: str, choices: type[Choice]) -> Choice:
+        """Return one of `choices`."""
+        value = self.text(name)
+        try:
+            return choices(value)
+        except ValueError:
+            allowed = ", ".join(choices)
+            raise self._error(name, f"{value[:40]!r} is not one of {allowed}") from None
+
+    def whole(self, name: str, least: int = 0, most: int = MOST_COUNT) -> int:
+        """Return an integer from `least` to `most`."""
+        value = self._value(name)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise self._error(name, f"{_kind(value)} is no integer")
+        if not least <= value <= most:
+            raise self._error(name, f"is not within {least} to {most}")
+        return value
+
+    def number(self, name: str, least: float = -math.inf, most: float = math.inf) -> float:
+        """Return a finite number from `least` to `most`."""
+        value = self._value(name)
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            raise self._error(name, f"{_kind(value)} is no number")
+        try:
+            number = float(value)
+        except OverflowError:
+            raise self._error(name, "is not finite") from None
+        if not math.isfinite(number):
+            raise self._error(name, "is not finite")
+        if not least <= number <= most:
+            raise self._error(name, f"is not within {least:g} to {most:g}")
+        return number
+
+    def flag(self, name: str) -> bool:
+        """Return true or false."""
+        value = self._value(name)
+        if not isinstance(value, bool):
+            raise self._error(name, f"{_kind(value)} is not true or false")
+        return value
+
+    def time(self, name: str) -> str:
+        """Return a time as RFC 3339 writes it."""
+        text = self.text(name, MOST_NAME)
+        if not _RFC3339.fullmatch(text) or not _exists(text):
+            raise self._error(name, "is no time such as 2025-01-31T12:00:00Z")
+        return text
+
+    def part(self, name: str, read: Callable[[object, str], T]) -> T:
+        """Return an object within this one, as `read` reads it."""
+        return read(self._value(name), self._at(name))
+
+    def parts(self, name: str, read: Callable[[object, str], T], most: int) -> tuple[T, ...]:
+        """Return a list of at most `most` objects, as `read` reads each."""
+        value = self._value(name)
+        if not isinstance(value, list):
+            raise self._error(name, f"{_kind(value)} is no list")
+        items = cast("list[object]", value)
+        if len(items) > most:
+            raise self._error(name, f"has {len(items)} entries, more than {most}")
+        return tuple(read(item, f"{self._at(name)}[{place}]") for place, item in enumerate(items))
+
+    def _value(self, name: str) -> object:
+        if name not in self._content:
+            raise self._error(name, "is missing")
+        return self._content[name]
+
+    def _at(self, name: str) -> str:
+        return f"{self._path}.{name}" if self._path else name
+
+    def _error(self, name: str, fact: str) -> ProtocolError:
+        return ProtocolError(f"{self._at(name)}: {fact}")
+
+
+def _kind(value: object) -> str:
+    """Return what a JSON value is, in words; never the value: it may be endless."""
+    return _TYPES.get(type(value), "a number")
+
+
+def _exists(time: str) -> bool:
+    """Return whether there is such a day and hour."""
+    try:
+        datetime.fromisoformat(time)
+    except ValueError:
+        return False
+    return True

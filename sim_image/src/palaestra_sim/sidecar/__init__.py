@@ -1,0 +1,13 @@
+"""The sidecar: one process that starts, watches and stops one simulator, for a trainer to command.
+
+cli          the command line: check everything, then run
+preparation  the world that the simulator will run, with its own ROS names
+drivers      the command lines of stub, Webots and other programs
+lifecycle    PURE: what may happen in which state, as a table
+simulator    the one owner of the state: takes events in order, does what the table says
+process      the only module that starts a process
+keeper       the small program between sidecar and simulator, which lets nothing escape
+output       what the simulator prints, passed on line by line
+server       the two listeners: control, and health with metrics and state
+metrics      what /metrics says
+"""

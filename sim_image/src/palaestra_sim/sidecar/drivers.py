@@ -1,0 +1,97 @@
+"""The command lines of the simulators: the stub, Webots, and any other program."""
+
+import os
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from palaestra_sim.sidecar.errors import SidecarError
+from palaestra_sim.sidecar.process import Command
+
+WORLD = "{world}"  # in a command: the path of the world
+_NOT_ROOT = "palaestra"
+
+# Source: Webots' guide, "Command Line Arguments". --batch: no dialog waits for a click;
+# --minimize alone would start in fast mode.
+_WEBOTS = ("--batch", "--mode=pause", "--stdout", "--stderr", "--minimize", "--no-rendering")
+
+
+class Driver(StrEnum):
+    """Which program simulates."""
+
+    STUB = "stub"
+    WEBOTS = "webots"
+    COMMAND = "command"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Launch:
+    """What is to be started: a world, options of the simulator, and its program for `command`."""
+
+    world: Path
+    options: Sequence[str] = ()
+    program: Sequence[str] = ()
+
+
+def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> Command:
+    """Return how the simulator is started, with the full path of its program.
+
+    Raises:
+        SidecarError: there is no such program, or none is given where one is needed.
+    """
+    arguments = _ARGUMENTS[driver](launch)
+    own = {**environment, **_ENVIRONMENT[driver](environment)}
+    return Command(arguments=(_found(driver, arguments[0], environment), *arguments[1:]), environment=own)
+
+
+def _stub(launch: Launch) -> list[str]:
+    return ["palaestra-stub", str(launch.world), *launch.options]
+
+
+def _webots(launch: Launch) -> list[str]:
+    return ["webots", *_WEBOTS, str(launch.world), *launch.options]
+
+
+def _command(launch: Launch) -> list[str]:
+    if not launch.program:
+        raise SidecarError("--driver command: has no program; give it behind --, as -- sim {world}")
+    given = (argument.replace(WORLD, str(launch.world)) for argument in launch.program)
+    return [*given, *launch.options]
+
+
+def _nothing(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return no variable: the program gets the container's."""
+    del environment
+    return {}
+
+
+def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return what Webots needs: a user, whom a container often lacks, and no file beside the world."""
+    return {
+        "USER": environment.get("USER", _NOT_ROOT),
+        "WEBOTS_DISABLE_SAVE_SCREEN_PERSPECTIVE_ON_CLOSE": "true",
+    }
+
+
+def _found(driver: Driver, program: str, environment: Mapping[str, str]) -> str:
+    """Return the full path of a program: on the PATH, or beside the Python that runs us."""
+    beside = os.fspath(Path(sys.executable).parent)
+    for path in (environment.get("PATH", os.defpath), beside):
+        if (found := shutil.which(program, path=path)) is not None:
+            return str(Path(found).absolute())
+    raise SidecarError(f"--driver {driver}: there is no program {program}; install it, or set PATH")
+
+
+_ARGUMENTS: Mapping[Driver, Callable[[Launch], list[str]]] = {
+    Driver.STUB: _stub,
+    Driver.WEBOTS: _webots,
+    Driver.COMMAND: _command,
+}
+_ENVIRONMENT: Mapping[Driver, Callable[[Mapping[str, str]], dict[str, str]]] = {
+    Driver.STUB: _nothing,
+    Driver.WEBOTS: _for_webots,
+    Driver.COMMAND: _nothing,
+}

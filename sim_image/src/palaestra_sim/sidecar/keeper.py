@@ -1,0 +1,156 @@
+"""Stand between the sidecar and its simulator, so that nothing the simulator starts can outlive them.
+
+Run as a program of its own, one for each life of the simulator: `python -I -S keeper.py PROGRAM ...`
+with a pipe from the sidecar as standard input, and a pipe to it as descriptor 3:
+
+    in   T             send SIGTERM to the simulator's process group
+         K, or the end kill everything; the end also comes when the sidecar was killed with SIGKILL
+    out  started PID   the simulator's first process
+         error ERRNO   its program could not be run
+         exit STATUS   it ended, with this wait status, and so did everything that it had started
+
+It is a subreaper: whatever loses its parent below becomes its child, also after `setsid`, a double
+fork or a change of environment, where a process group, a parent-death signal or a mark would lose it.
+So its children are killed until there are none, and each killed parent hands over its own children
+before its end is seen (Linux: exit_notify). That needs no clock: SIGCHLD tells when to look again.
+
+Linux and the standard library only, and no import from this package: it is started as a file.
+"""
+
+import contextlib
+import ctypes
+import os
+import select
+import signal
+import sys
+
+COMMANDS = 0
+REPORTS = 3
+TERMINATE = b"T"
+KILL = b"K"
+
+_PR_SET_CHILD_SUBREAPER = 36  # Source: linux/prctl.h
+_GIVE_UP_S = 20.0  # a process that outlives SIGKILL for this long hangs in the kernel
+_NOT_RUN = 127  # as a shell says it
+_PARENT = 1  # among the fields behind the name in /proc/PID/stat: state, parent, ...
+
+
+def adopt_orphans() -> None:
+    """Make this process the parent of every orphan among its descendants.
+
+    Raises:
+        OSError: the kernel refuses.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
+        raise OSError(ctypes.get_errno(), "prctl(PR_SET_CHILD_SUBREAPER)")
+
+
+def children(parents: set[int]) -> set[int]:
+    """Return the processes whose parent is one of `parents`, by one look at /proc."""
+    found = set()
+    for name in os.listdir("/proc"):  # noqa: PTH208 - nor is it imported for this
+        if name.isdigit():
+            with contextlib.suppress(OSError):  # it ended meanwhile
+                with open(f"/proc/{name}/stat", "rb") as file:  # noqa: PTH123 - pathlib is slow to import
+                    fields = file.read().rpartition(b")")[2].split()
+                if int(fields[_PARENT]) in parents:
+                    found.add(int(name))
+    return found
+
+
+def kill_children() -> set[int]:
+    """Send SIGKILL to every child of this process, and return them.
+
+    None can be mistaken for another process: a number is free again only when we have reaped it.
+    """
+    found = children({os.getpid()})
+    for pid in found:
+        with contextlib.suppress(OSError):  # it became another user's; its own end is up to that user
+            os.kill(pid, signal.SIGKILL)
+    return found
+
+
+def main() -> None:
+    """Start the program in `argv`, obey the commands, and return when nothing of it is left."""
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    adopt_orphans()
+    woken, wake = os.pipe()
+    os.set_blocking(woken, False)
+    os.set_blocking(wake, False)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+    os.set_inheritable(REPORTS, False)
+    pid = _spawn(sys.argv[1:])
+    _report(f"started {pid}")
+    _report(f"exit {_keep(pid, woken)}")
+
+
+def _keep(pid: int, woken: int) -> int:
+    """Return the wait status of `pid` when it and all of its descendants have ended."""
+    status: int | None = None
+    ending = False
+    while True:
+        ended = _reap()
+        status = ended.get(pid, status)
+        if None in ended:
+            return status or 0
+        if ending := ending or status is not None:
+            kill_children()
+        ready, _, _ = select.select(
+            [woken] if ending else [woken, COMMANDS], [], [], _GIVE_UP_S if ending else None
+        )
+        if not ready:
+            return status if status is not None else signal.SIGKILL
+        if woken in ready:
+            with contextlib.suppress(BlockingIOError):
+                os.read(woken, 4096)
+        if COMMANDS in ready:
+            ending = _obey(pid)
+
+
+def _obey(pid: int) -> bool:
+    """Do what the sidecar says about `pid`, which is not reaped yet; return whether to kill."""
+    command = os.read(COMMANDS, 1)
+    if command == TERMINATE:
+        with contextlib.suppress(ProcessLookupError):  # it has no group yet
+            os.killpg(pid, signal.SIGTERM)
+    return command != TERMINATE
+
+
+def _reap() -> dict[int | None, int]:
+    """Return the wait status of every child that has ended; with a key None if there is none left."""
+    ended: dict[int | None, int] = {}
+    try:
+        while (result := os.waitpid(-1, os.WNOHANG))[0]:
+            ended[result[0]] = result[1]
+    except ChildProcessError:
+        ended[None] = 0
+    return ended
+
+
+def _spawn(arguments: list[str]) -> int:
+    """Start the program, leading a session and group of its own; return its process."""
+    pid = os.fork()
+    if pid:
+        return pid
+    try:
+        os.setsid()
+        os.dup2(os.open(os.devnull, os.O_RDONLY), COMMANDS)
+        for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGPIPE, signal.SIGXFSZ):
+            signal.signal(number, signal.SIG_DFL)  # an ignored signal would stay so in the program
+        os.execv(arguments[0], arguments)  # noqa: S606 - the sidecar's own command line
+    except OSError as error:
+        _report(f"error {error.errno}")
+    os._exit(_NOT_RUN)
+
+
+def _report(line: str) -> None:
+    """Tell the sidecar, if it is still there."""
+    with contextlib.suppress(BrokenPipeError):
+        os.write(REPORTS, f"{line}\n".encode())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""Whole lines to standard output, the simulator's and the sidecar's own.
+
+A line is written at once and is never longer than a pipe takes in one piece, so lines of several
+writers do not mix, and nobody has to hold a lock while a full pipe makes him wait. A simulator that
+prints faster than the container's log takes it has to wait too: nothing is kept here but one line.
+"""
+
+import logging
+import os
+import select
+
+STDOUT = 1
+MOST_LINE = select.PIPE_BUF  # 4096: what POSIX writes into a pipe in one piece
+_CHUNK = 65536
+
+
+def write_line(line: bytes) -> None:
+    """Write a line that ends in a newline; a reader that has gone is not told."""
+    try:
+        while line:
+            line = line[os.write(STDOUT, line) :]
+    except BrokenPipeError:
+        return
+
+
+class LineHandler(logging.Handler):
+    """Writes log records as whole lines, behind the program's name."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one record."""
+        text = f"palaestra-sidecar: {record.getMessage()}".encode("utf-8", "replace")
+        write_line(text[: MOST_LINE - 1].replace(b"\n", b" ") + b"\n")
+
+
+class Passage:
+    """Passes on what comes out of a pipe, line by line, until its end.
+
+    Attributes:
+        last_line: the last line that was not empty, as text.
+    """
+
+    def __init__(self, source: int) -> None:
+        self.last_line = ""
+        self._source = source
+
+    def run(self) -> None:
+        """Pass on everything; returns when nobody can write any more. Closes the pipe."""
+        rest = b""
+        while chunk := os.read(self._source, _CHUNK):
+            *lines, rest = (rest + chunk).split(b"\n")
+            for line in lines:
+                self._pass_on(line)
+            while len(rest) >= MOST_LINE:
+                self._pass_on(rest[: MOST_LINE - 1])
+                rest = rest[MOST_LINE - 1 :]
+        if rest:
+            self._pass_on(rest)
+        os.close(self._source)
+
+    def _pass_on(self, line: bytes) -> None:
+        """Write one line, in pieces if it is longer than a line may be."""
+        if line.strip():
+            self.last_line = line[:MOST_LINE].decode("utf-8", "replace").strip()
+        for start in range(0, max(1, len(line)), MOST_LINE - 1):
+            write_line(line[start : start + MOST_LINE - 1] + b"\n")

@@ -1,0 +1,94 @@
+"""Put the world that the simulator will run where it can run it.
+
+The generator makes the same world of what it has made before, so the sidecar runs it on whatever it
+is given: on a source world from the image, or on a world from the ConfigMap that has its names.
+"""
+
+import os
+from pathlib import Path
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.protocol.control import RobotName
+from palaestra_sim.sidecar.errors import SidecarError
+from palaestra_sim.world import RunIdentity, generate, robots
+
+_PROJECT = "project"
+
+
+def read(world: Path) -> bytes:
+    """Return the bytes of a world.
+
+    Raises:
+        SidecarError: there is no such file, or it may not be read.
+    """
+    try:
+        return world.read_bytes()
+    except OSError as error:
+        raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt file") from error
+
+
+def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool) -> Path:
+    """Write this simulator's own world of `world` into the folder `work`; return where it is.
+
+    A world that names files beside it gets them, as links, at the same places around its new one.
+
+    Raises:
+        WorldError: the world is wrong.
+        SidecarError: it cannot be read or written; nothing is half-written.
+    """
+    source, name = read(world), f"{identity.group}-{identity.index}.wbt"
+    try:
+        generated, folder = generate(source, identity, clock=clock, name=str(world)), None
+    except WorldError:
+        generated = generate(source, identity, clock=clock, name=str(world), relative_addresses=True)
+        folder = work / _PROJECT / (world.absolute().parent.name or "worlds")
+    try:
+        if folder is not None:
+            _link_neighbours(world.absolute(), folder)
+        return _write_whole((folder or work) / name, generated)
+    except OSError as error:
+        raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
+
+
+def described(source: bytes, name: str) -> tuple[RobotName, ...]:
+    """Return the robots of a world that a client can find: those with a ROS name in it.
+
+    Raises:
+        WorldError: the world is wrong.
+    """
+    return tuple(
+        RobotName(robot=robot.robot, ros_name=robot.ros_name, supervisor=robot.supervisor)
+        for robot in robots(source, name)
+        if robot.ros_name
+    )
+
+
+def _link_neighbours(world: Path, folder: Path) -> None:
+    """Make what lies beside `world`, and beside its folder, lie around `folder` in the same way.
+
+    That is how far a Webots project's addresses go: `textures/a.png`, `../protos/Robot.proto`.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for neighbour in world.parent.parent.iterdir():
+        if neighbour != world.parent:
+            _link(folder.parent / neighbour.name, neighbour)
+    for neighbour in world.parent.iterdir():
+        _link(folder / neighbour.name, neighbour)
+
+
+def _link(link: Path, target: Path) -> None:
+    if link.is_symlink():
+        link.unlink()  # of an earlier life of this container
+    link.symlink_to(target)
+
+
+def _write_whole(path: Path, content: bytes) -> Path:
+    """Write a file so that it is there as a whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        unfinished.write_bytes(content)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return path

@@ -1,0 +1,186 @@
+"""The one module that starts processes: a simulator, under a keeper that ends whatever it started.
+
+The sidecar talks to the keeper through two pipes and hears its end through threads, so nothing here
+waits. Reaping is a matter of the whole sidecar, as it may be process 1 of its container: `reap` takes
+every child that ended, the keeper and the orphans that only process 1 gets.
+"""
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from palaestra_sim.sidecar import keeper
+from palaestra_sim.sidecar.output import Passage
+
+_KEEPER = Path(keeper.__file__)
+_LAST_OUTPUT_S = 0.2  # for the lines that are still in the pipe when the simulator has ended
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """A program with its arguments, and its environment."""
+
+    arguments: tuple[str, ...]
+    environment: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Started:
+    """The simulator's first process runs."""
+
+    pid: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ended:
+    """The simulator ended, and everything that it had started.
+
+    `code` or `signal` (as "SIGBUS") say how; with neither, `problem` says why that is not known.
+    `last_line` is the last that it printed.
+    """
+
+    code: int | None = None
+    signal: str | None = None
+    problem: str | None = None
+    last_line: str = ""
+
+
+Report = Callable[[Started | Ended], None]
+
+
+class Process:
+    """A simulator's process and all of its descendants.
+
+    Attributes:
+        keeper: the process that holds them; they are all below it.
+    """
+
+    def __init__(self, keeper_pid: int, commands: int) -> None:
+        self.keeper = keeper_pid
+        self._commands = commands
+
+    @classmethod
+    def start(cls, command: Command, report: Report) -> Self:
+        """Start a simulator; `report` is called from a thread: Started, and Ended once, at last.
+
+        Raises:
+            OSError: the system has no room for another process.
+        """
+        (commands, our_commands), (our_reports, reports) = os.pipe(), os.pipe()
+        our_output, output = os.pipe()
+        try:
+            pid = _spawn(command, {0: commands, 1: output, 2: output, keeper.REPORTS: reports})
+        except OSError:
+            _close(our_commands, our_reports, our_output)
+            raise
+        finally:
+            _close(commands, output, reports)
+        passage = Passage(our_output)
+        reader = threading.Thread(target=passage.run, name="output", daemon=True)
+        watcher = threading.Thread(
+            target=_watch, args=(our_reports, reader, passage, report), name="reports", daemon=True
+        )
+        reader.start()
+        watcher.start()
+        return cls(pid, our_commands)
+
+    def terminate(self) -> None:
+        """Send SIGTERM to the simulator's process group."""
+        self._say(keeper.TERMINATE)
+
+    def kill(self) -> None:
+        """Kill the simulator and everything below it."""
+        self._say(keeper.KILL)
+
+    def close(self) -> None:
+        """Let go of the keeper, which kills what is left."""
+        _close(self._commands)
+
+    def _say(self, command: bytes) -> None:
+        with contextlib.suppress(BrokenPipeError):  # it has ended, and Ended is on its way
+            os.write(self._commands, command)
+
+
+def reap() -> None:
+    """Take the exit status of every child that has ended, so that none stays a zombie."""
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
+def resident_bytes(process: Process) -> int:
+    """Return the memory in use by all processes of a simulator, in bytes; shared pages count twice."""
+    below = found = keeper.children({process.keeper})
+    while found := keeper.children(found):
+        below |= found
+    return sum(_resident_pages(pid) for pid in below) * os.sysconf("SC_PAGE_SIZE")
+
+
+def _resident_pages(pid: int) -> int:
+    with contextlib.suppress(OSError, IndexError):  # it ended meanwhile
+        return int(Path(f"/proc/{pid}/statm").read_bytes().split()[1])
+    return 0
+
+
+def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
+    """Start the keeper with these of our descriptors as its own, out of reach of the terminal."""
+    return os.posix_spawn(
+        sys.executable,
+        [sys.executable, "-I", "-S", str(_KEEPER), *command.arguments],
+        dict(command.environment),
+        file_actions=[(os.POSIX_SPAWN_DUP2, ours, its) for its, ours in descriptors.items()],
+        setsid=True,
+    )
+
+
+def _watch(reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
+    """Report what the keeper says until it has ended."""
+    said: dict[str, int] = {}
+    with os.fdopen(reports) as lines:
+        for line in lines:
+            word, _, number = line.partition(" ")
+            said[word] = int(number)
+            if word == "started":
+                report(Started(pid=said[word]))
+    if "exit" not in said:
+        _end_orphans()
+    reader.join(_LAST_OUTPUT_S)
+    report(_ended(said, passage.last_line))
+
+
+def _end_orphans() -> None:
+    """Kill what a keeper left behind that was killed itself: it has become ours."""
+    while orphans := keeper.kill_children():
+        for pid in orphans:
+            with contextlib.suppress(ChildProcessError):  # reaped by the signal handler
+                os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+        reap()
+
+
+def _ended(said: Mapping[str, int], last_line: str) -> Ended:
+    if "error" in said:
+        return Ended(problem=f"it could not be run: {os.strerror(said['error'])}", last_line=last_line)
+    if "exit" not in said:
+        return Ended(problem="its keeper ended before it", last_line=last_line)
+    code = os.waitstatus_to_exitcode(said["exit"])
+    if code >= 0:
+        return Ended(code=code, last_line=last_line)
+    return Ended(signal=_signal_name(-code), last_line=last_line)
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"SIG{number}"  # a real-time signal between the two that have names
+
+
+def _close(*descriptors: int) -> None:
+    for descriptor in descriptors:
+        os.close(descriptor)

@@ -1,0 +1,199 @@
+"""The simulator of this sidecar: the one owner of its state.
+
+Requests, reports of the process, the deadline of a stop and the end of the container all become
+messages in one queue, and one thread takes them in order: so no two of them can act on the same
+state, and there is no lock. Other threads see `state`, an immutable value that is replaced as a whole.
+"""
+
+import logging
+import queue
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from palaestra_sim.protocol.control import LastExit, SimulatorState
+from palaestra_sim.sidecar import lifecycle
+from palaestra_sim.sidecar.lifecycle import Action, Event
+from palaestra_sim.sidecar.process import Command, Ended, Process, Started, resident_bytes
+
+SHUTDOWN_GRACE_S = 1.0  # from SIGTERM to SIGKILL; the whole shutdown has 2 s
+_ANSWER_S = 5.0
+
+FAULT_KINDS = ("code", "signal", "unknown")
+
+log = logging.getLogger(__name__)
+
+
+class NoAnswer(TimeoutError):
+    """The owner of the state did not come round to a request in time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """Whether a request was allowed, and the state after it."""
+
+    allowed: bool
+    state: SimulatorState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Message:
+    event: Event
+    deadline_s: float = 0.0
+    ended: Ended | None = None
+    answers: "queue.SimpleQueue[Answer] | None" = None
+
+
+class Simulator:
+    """One simulator, from the first start to the end of the container.
+
+    Attributes:
+        state: what it is now; may be read from any thread.
+        faults: by kind; may be read from any thread.
+
+    Args:
+        command: how it is started.
+        state: what it is before the first start.
+        clock: seconds, from anywhere.
+    """
+
+    def __init__(
+        self,
+        command: Command,
+        state: SimulatorState,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.state = state
+        self.faults: Mapping[str, int] = dict.fromkeys(FAULT_KINDS, 0)
+        self._command = command
+        self._clock = clock
+        self._inbox: queue.SimpleQueue[_Message | Started] = queue.SimpleQueue()
+        self._process: Process | None = None
+        self._kill_at: float | None = None
+        self._closing = False
+        self._actions: Mapping[Action, Callable[[_Message], None]] = {
+            Action.NOTHING: self._nothing,
+            Action.SPAWN: self._spawn,
+            Action.WAIT: self._wait,
+            Action.TERMINATE: self._terminate,
+            Action.KILL: self._kill,
+            Action.BLAME: self._blame,
+            Action.ACCEPT: self._accept,
+        }
+
+    def ask(self, event: Event, deadline_s: float = 0.0) -> Answer:
+        """Return what became of a request; from any thread but the owner's.
+
+        Raises:
+            NoAnswer: the owner is stuck, or has ended.
+        """
+        answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
+        self._inbox.put(_Message(event=event, deadline_s=deadline_s, answers=answers))
+        try:
+            return answers.get(timeout=_ANSWER_S)
+        except queue.Empty:
+            raise NoAnswer(f"no answer to {event} within {_ANSWER_S:g} s") from None
+
+    def shut_down(self) -> None:
+        """End the simulator and let `run` return; may be called from a signal handler."""
+        self._inbox.put(_Message(event=Event.SHUTDOWN))
+
+    def resident_bytes(self) -> int:
+        """Return the memory that its processes use, in bytes; 0 if none runs. From any thread."""
+        process = self._process
+        return 0 if process is None else resident_bytes(process)
+
+    def run(self) -> None:
+        """Take one message after the other, until a shutdown has left nothing running."""
+        while not (self._closing and self._process is None):
+            message = self._next()
+            if isinstance(message, Started):
+                self.state = replace(self.state, pid=message.pid)
+            else:
+                self._take(message)
+
+    def _next(self) -> _Message | Started:
+        wait_s = None if self._kill_at is None else max(0.0, self._kill_at - self._clock())
+        try:
+            return self._inbox.get(timeout=wait_s)
+        except queue.Empty:
+            return _Message(event=Event.DEADLINE)
+
+    def _take(self, message: _Message) -> None:
+        """Do what the table says about one message, and answer it."""
+        self._closing |= message.event is Event.SHUTDOWN
+        step = lifecycle.step(self.state.state, message.event)
+        if step is not None:
+            state, action = step
+            self.state = replace(self.state, state=state, detail="")
+            self._actions[action](message)
+            detail = f": {self.state.detail}" if self.state.detail else ""
+            log.info("%s%s", self.state.state.value, detail)
+        if message.answers is not None:
+            message.answers.put(Answer(allowed=step is not None, state=self.state))
+
+    def _nothing(self, _: _Message) -> None:
+        """Go on."""
+
+    def _spawn(self, _: _Message) -> None:
+        self.state = replace(self.state, starts=self.state.starts + 1)
+        try:
+            self._process = Process.start(self._command, self._report)
+        except OSError as error:
+            self._report(Ended(problem=f"it could not be run: {error.strerror}"))
+
+    def _wait(self, message: _Message) -> None:
+        self._end_within(message.deadline_s)
+
+    def _terminate(self, _: _Message) -> None:
+        if self._process is not None:
+            self._process.terminate()
+        self._end_within(SHUTDOWN_GRACE_S)
+
+    def _kill(self, _: _Message) -> None:
+        self._kill_at = None
+        self.state = replace(self.state, detail="killed at its deadline")
+        if self._process is not None:
+            self._process.kill()
+
+    def _blame(self, message: _Message) -> None:
+        kind, how = self._ended(message.ended or Ended(), expected=False)
+        self.faults = {**self.faults, kind: self.faults[kind] + 1}
+        self.state = replace(self.state, faults=self.state.faults + 1, detail=how)
+
+    def _accept(self, message: _Message) -> None:
+        self._ended(message.ended or Ended(), expected=True)
+
+    def _ended(self, ended: Ended, *, expected: bool) -> tuple[str, str]:
+        """Note an exit; return its kind, and a sentence about it."""
+        if self._process is not None:
+            self._process.close()
+        self._process = None
+        self._kill_at = None
+        last = LastExit(code=ended.code, signal=ended.signal, expected=expected)
+        self.state = replace(self.state, pid=None, last_exit=last)
+        kind, how = _described(ended)
+        said = f"; it said last: {ended.last_line}" if ended.last_line else ""
+        return kind, f"the simulator {how}{said}"
+
+    def _end_within(self, deadline_s: float) -> None:
+        """Kill it when the deadline has passed; an earlier one stays."""
+        kill_at = self._clock() + deadline_s
+        self._kill_at = kill_at if self._kill_at is None else min(self._kill_at, kill_at)
+        self.state = replace(self.state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
+
+    def _report(self, report: Started | Ended) -> None:
+        """Take a report from the process's thread."""
+        if isinstance(report, Ended):
+            self._inbox.put(_Message(event=Event.EXITED, ended=report))
+        else:
+            self._inbox.put(report)
+
+
+def _described(ended: Ended) -> tuple[str, str]:
+    """Return the kind of an end that was a fault, and how it ended in words."""
+    if ended.code is not None:
+        return "code", f"ended with code {ended.code}"
+    if ended.signal is not None:
+        return "signal", f"was ended by {ended.signal}"
+    return "unknown", f"ended: {ended.problem}"

@@ -1,0 +1,126 @@
+"""`palaestra-stub`: the command line, and the life of the process."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.stub.options import StubOptions
+from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
+from palaestra_sim.stub.simulation import Mode
+from palaestra_sim.stub.simulator import Simulator
+
+log = logging.getLogger(__name__)
+
+_MODES = {"pause": Mode.PAUSE, "realtime": Mode.REAL_TIME, "fast": Mode.FAST}
+_CHECK_MASTER_S = 1.0
+_WRONG_WORLD = 2
+_NO_MASTER = 1
+
+_EPILOG = """\
+Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes nothing.
+
+exit codes: 0 after SIGTERM; what `simulation_quit` says; 1 the ROS master does not answer, or not any more;
+2 the world or the options cannot be used
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the stub until a client or a signal ends it; return the exit code."""
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(level=logging.INFO, format="palaestra-stub: %(message)s", stream=sys.stderr)
+    try:
+        return _Process(options).run()
+    except SimError as error:
+        sys.stderr.write(f"palaestra-stub: {error}\n")
+    except MasterUnreachable as error:
+        sys.stderr.write(f"palaestra-stub: {error}\n")
+        return _NO_MASTER
+    except OSError as error:
+        sys.stderr.write(f"palaestra-stub: {error.filename or 'network'}: {error.strerror}\n")
+    return _WRONG_WORLD
+
+
+class _Process:
+    """The loop, the nodes in it, and the simulator between them."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        self._loop = Loop()
+        self._master_uri = os.environ.get("ROS_MASTER_URI", "http://localhost:11311")
+        self._nodes: dict[str, RosNode] = {}
+        self._exit_code = 0
+        self._simulator = Simulator(
+            options.world,
+            self._make_node,
+            options=StubOptions(
+                step_sleep_s=options.step_sleep_ms / 1000.0,
+                lost_wakeup=options.lost_wakeup,
+                publish_delay_s=options.publish_delay_ms / 1000.0,
+            ),
+            mode=_MODES[options.mode],
+        )
+        self._simulator.on_quit(self._end)
+
+    def run(self) -> int:
+        """Serve until the end; return the exit code."""
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: self._loop.post(lambda: self._end(0)))
+        self._simulator.start()
+        log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
+        self._loop.later(_CHECK_MASTER_S, self._check_master)
+        self._loop.run()
+        self._simulator.close()
+        self._loop.close()
+        return self._exit_code
+
+    def _make_node(self, name: str) -> RosNode:
+        node = RosNode(self._loop, name, self._master_uri)
+        node.on_end(lambda: self._lose(name))
+        self._nodes[name] = node
+        return node
+
+    def _lose(self, name: str) -> None:
+        """End one controller, because another node took its name; the simulation goes on without it."""
+        log.warning("another node took the name %s; its robot has no controller any more", name)
+        controller = self._simulator.controllers.pop(name, None)
+        if controller is not None:
+            controller.close()
+
+    def _end(self, status: int) -> None:
+        self._exit_code = status
+        self._loop.stop()
+
+    def _check_master(self) -> None:
+        """End when the master is gone: its names are lost, and a controller would end too."""
+        for name in self._simulator.controllers:
+            try:
+                self._nodes[name].check_master()
+            except MasterUnreachable as error:
+                log.warning("%s", error)
+                self._end(_NO_MASTER)
+                return
+        self._loop.later(_CHECK_MASTER_S, self._check_master)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="palaestra-stub",
+        description="Simulate a world, and answer over ROS 1 like the `ros` controller of Webots.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--version", action="version", version=version("palaestra-sim"))
+    add("world", type=Path, help="the .wbt file to load")
+    add("--mode", choices=_MODES, default="fast", help="how time passes at first (default: %(default)s)")
+    add("--step-sleep-ms", type=float, default=0.0, help="real time that each step takes at least")
+    add("--publish-delay-ms", type=float, default=0.0, help="from the end of a step to its messages")
+    add("--lost-wakeup", action="store_true", help="lose the messages of a step that comes too early")
+    return parser

@@ -1,0 +1,219 @@
+"""The `ros` controller of one robot: its services, its steps, and what it publishes after them.
+
+The real controller's main loop is a thread that polls; this one is a few rules:
+
+    time_step   refused unless it is 0 or a positive multiple of the basic step; while it is
+                pending the robot is `blocked`: Webots holds a mutex that every other service needs
+    publish     comes after the answer, once a step, for every enabled sensor that is due
+                by (count * step) % period, to the subscribers that are connected at that moment
+    the count   goes up before the step is made, and the step of the last accepted call counts:
+                a product, not a sum, so changing the step disturbs the phase of longer periods
+
+With `lost_wakeup` a step that is asked for while the loop is still at the one before is made and
+answered, but its messages never come. Without, the messages of the one before go out first.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.stub.arguments import Arguments
+from palaestra_sim.stub.nodes import SceneTree
+from palaestra_sim.stub.robot import Robot
+from palaestra_sim.stub.ros.node import LATER, ServiceFailed
+from palaestra_sim.stub.seam import Handler, Node, Publisher, Service
+from palaestra_sim.stub.services.motors import motor_services
+from palaestra_sim.stub.services.robot import RobotServices
+from palaestra_sim.stub.services.scene_fields import FieldServices
+from palaestra_sim.stub.services.scene_nodes import NodeServices
+from palaestra_sim.stub.services.sensors import (
+    Feed,
+    pseudo_feeds,
+    sensor_feed,
+    sensor_services,
+)
+from palaestra_sim.stub.services.supervisor import SupervisorServices
+from palaestra_sim.stub.simulation import Mode, Simulation
+from palaestra_sim.stub.stepping import Stepping
+
+if TYPE_CHECKING:
+    from palaestra_sim.stub.simulator import Simulator
+
+_MODEL_NAME = "/model_name"
+_CLOCK = "/clock"
+
+
+class Controller:
+    """The controller of one robot, from `start` to `close`.
+
+    Attributes:
+        blocked: whether a step is pending, so that every other request has to wait.
+    """
+
+    def __init__(
+        self, host: Simulator, stepping: Stepping, tree: SceneTree, robot: Robot, node: Node
+    ) -> None:
+        self.host = host
+        self.simulation: Simulation = tree.simulation
+        self.tree = tree
+        self.robot = robot
+        self.node = node
+        self.blocked = False
+        self._arguments: Arguments = host.arguments(robot)
+        self._options = host.options
+        self._host_clock = host.clock
+        self._stepping = stepping
+        self._feeds = {it.name: sensor_feed(it, node.name) for it in robot.sensors.values()}
+        self._pseudo_feeds = pseudo_feeds(node.name)
+        self._all_feeds = (*self._feeds.values(), *self._pseudo_feeds.values())
+        self._clock: Publisher | None = None
+        self._basic_ms = self.simulation.basic_step_ms
+        self._step_ms = self._basic_ms  # of the last accepted time_step
+        self._count = 0
+        self._call: object | None = None
+        self._answer: Any = None
+        self._asking = False  # the request for the step is still being handled
+        self._heard = True  # the main loop saw the last step
+        self._publish_due = False
+        self._published_s = -math.inf
+        self._paced_until_s = -math.inf
+        self._asked_ms = 0
+        self._closed = False
+
+    def start(self) -> None:
+        """Advertise everything, `robot/get_device_list` last."""
+        node = self.node
+        node.blocked = lambda: self.blocked
+        model_name = node.advertise(_MODEL_NAME, "std_msgs/String", latched=True)
+        model_name.send({"data": node.name})
+        if self._arguments.clock:
+            self._clock = node.advertise(_CLOCK, "rosgraph_msgs/Clock")
+        services = RobotServices(self)
+        self._serve(Service("robot/time_step", "webots_ros/set_int", self._time_step))
+        self._serve(*services.table())
+        if self.robot.parts.node.flag("supervisor", False):
+            for group in (SupervisorServices, NodeServices, FieldServices):
+                self._serve(*group(self).table())
+        self._serve_devices()
+        if self._arguments.auto_publish:
+            for feed in self._feeds.values():
+                feed.enable(node, self._basic_ms, self._basic_ms)
+        self._serve(services.device_list())
+        if self.robot.parts.node.flag("synchronization", True):
+            self._stepping.join(self.robot)
+
+    def close(self) -> None:
+        """End: nobody waits for this robot any more, its services and topics are gone."""
+        self._closed = True
+        self._publish_due = False
+        self._stepping.leave(self.robot)
+        self.node.close()
+
+    def publish(self) -> None:
+        """Send the messages of the last step, if they are not out yet."""
+        if not self._publish_due:
+            return
+        self._publish_due = False
+        if self._clock is not None:
+            seconds, rest_ms = divmod(self.simulation.time_ms, 1000)
+            self._clock.send({"clock": {"secs": seconds, "nsecs": rest_ms * 1_000_000}})
+        elapsed_ms = self._count * self._step_ms
+        for feed in self._all_feeds:
+            if feed.publishers:
+                feed.publish(elapsed_ms)
+        if self._options.lost_wakeup:
+            self._published_s = self._host_clock()
+
+    def _serve(self, *services: Service) -> None:
+        for path, type_name, handler in services:
+            self.node.serve(path, type_name, _told(handler))
+
+    def _serve_devices(self) -> None:
+        devices = self.robot.parts.devices
+        for name in devices.order:
+            if name in devices.motors:
+                self._serve(*motor_services(devices.motors[name], devices))
+            else:
+                self._serve(*sensor_services(devices.sensors[name]))
+                self._serve_feed(self._feeds[name].topic.rpartition("/")[0], self._feeds[name])
+        for path, feed in self._pseudo_feeds.items():
+            self._serve_feed(path, feed)
+
+    def _serve_feed(self, path: str, feed: Feed) -> None:
+        def enable(request: Any) -> dict[str, Any]:
+            return {"success": feed.enable(self.node, request.value, self._step_ms)}
+
+        self._serve(
+            Service(f"{path}/enable", "webots_ros/set_int", enable),
+            Service(
+                f"{path}/get_sampling_period",
+                "webots_ros/get_int",
+                lambda _: {"value": feed.period_ms},
+            ),
+        )
+
+    def _time_step(self, request: Any) -> Any:
+        step_ms = request.value
+        if step_ms < 0 or step_ms % self._basic_ms:
+            return {"success": False}
+        self._heard = self._loop_hears()
+        self._count = self._count + 1 if step_ms else 0
+        self._call = self.node.current_call
+        self._answer = LATER
+        self.blocked = self._asking = True
+        self._asked_ms = step_ms or self._basic_ms
+        self._stepping.ask(self.robot, self._asked_ms, self._stepped)
+        self._step_ms = step_ms or self._step_ms
+        self._asking = False
+        return self._answer
+
+    def _loop_hears(self) -> bool:
+        """Say whether the main loop will see that the count went up, or is too busy to."""
+        if not self._options.lost_wakeup:
+            self.publish()
+            return True
+        busy = self._host_clock() - self._published_s < self._options.publish_delay_s
+        return not (self._publish_due or busy)
+
+    def _stepped(self, done: bool) -> None:  # noqa: FBT001 - what Stepping calls back
+        """Take the end of a step: answer it now, or after the real time that it has to take."""
+        delay_s = self._delay_s() if done else 0.0
+        if delay_s > 0.0:
+            self.node.later(delay_s, lambda: self._finish(done))
+        else:
+            self._finish(done)
+
+    def _finish(self, done: bool) -> None:  # noqa: FBT001 - passed on
+        self.blocked = False
+        self._publish_due = self._publish_due or (done and self._heard)
+        if self._publish_due:
+            self.node.later(self._options.publish_delay_s, self.publish)
+        if self._asking:
+            self._answer = {"success": done}
+        elif not self._closed:
+            self.node.answer(self._call, {"success": done})
+
+    def _delay_s(self) -> float:
+        """Return the real time that the step has to take beyond what it took."""
+        delay_s = self._options.step_sleep_s
+        if self.simulation.mode is Mode.REAL_TIME:
+            now_s = self._host_clock()
+            # A client that was away is owed one basic step, not all that it missed.
+            owed_s = now_s - self._basic_ms / 1000.0
+            self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
+            delay_s = max(delay_s, self._paced_until_s - now_s)
+        return delay_s
+
+
+def _told(handler: Handler) -> Handler:
+    """Return the handler with our own errors turned into failures that the client reads."""
+
+    def handle(request: Any) -> Any:
+        try:
+            return handler(request)
+        except SimError as error:
+            raise ServiceFailed(str(error)) from error
+
+    return handle

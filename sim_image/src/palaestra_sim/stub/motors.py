@@ -1,0 +1,119 @@
+"""Motors and the shaft angles that position sensors tell.
+
+A motor is commanded as in Webots: a target position and a velocity. With a target of infinity it turns at
+that velocity; with a finite one it turns there, no faster than that velocity. Every command is taken
+without complaint, refused or not, because the ROS interface says success whatever happens.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+# The P of controlPID, whose default is 10 0 0. Source: Webots reference, Motor.
+POSITION_GAIN: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorSpec:
+    """A motor as the world describes it. Angles in rad, velocities in rad/s, torque in N m.
+
+    `acceleration_rad_s2` of -1 is unlimited; equal `min_rad` and `max_rad` mean no limits.
+    """
+
+    name: str
+    max_velocity_rad_s: float = 10.0
+    acceleration_rad_s2: float = -1.0
+    min_rad: float = 0.0
+    max_rad: float = 0.0
+    max_torque_nm: float = 10.0
+    multiplier: float = 1.0
+    model: str = ""
+
+
+class Motor:
+    """One motor: its commands, and how fast its shaft turns.
+
+    Attributes:
+        speed_rad_s: how fast the shaft turns.
+        angle_rad: of the shaft, since the start or the last reset.
+        changed: whether a command came since the physics looked; the physics sets it back.
+    """
+
+    __slots__ = (
+        "acceleration_rad_s2",
+        "angle_rad",
+        "available_torque_nm",
+        "changed",
+        "spec",
+        "speed_rad_s",
+        "target_rad",
+        "velocity_rad_s",
+    )
+
+    def __init__(self, spec: MotorSpec) -> None:
+        self.spec = spec
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the state of a new world: position control, at zero, as fast as allowed."""
+        self.target_rad = 0.0
+        self.velocity_rad_s = self.spec.max_velocity_rad_s
+        self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
+        self.available_torque_nm = self.spec.max_torque_nm
+        self.speed_rad_s = 0.0
+        self.angle_rad = 0.0
+        self.changed = True
+
+    def set_position(self, target_rad: float) -> None:
+        """Turn to `target_rad`, or with infinity at the commanded velocity. NaN is ignored."""
+        if math.isnan(target_rad):
+            return
+        low, high = self.spec.min_rad, self.spec.max_rad
+        if low != high and math.isfinite(target_rad):
+            target_rad = max(low, min(high, target_rad))
+        self.target_rad = target_rad
+        self.changed = True
+
+    def set_velocity(self, velocity_rad_s: float) -> None:
+        """Set the velocity, clamped to the motor's limit.
+
+        Ignored: NaN, and a negative velocity while the target is finite.
+        """
+        if math.isnan(velocity_rad_s):
+            return
+        if velocity_rad_s < 0.0 and math.isfinite(self.target_rad):
+            return
+        limit = self.spec.max_velocity_rad_s
+        self.velocity_rad_s = max(-limit, min(limit, velocity_rad_s))
+        self.changed = True
+
+    def set_acceleration(self, acceleration_rad_s2: float) -> None:
+        """Limit the acceleration; -1 is unlimited. NaN and other negative values are ignored."""
+        if acceleration_rad_s2 >= 0.0 or acceleration_rad_s2 == -1.0:
+            self.acceleration_rad_s2 = acceleration_rad_s2
+            self.changed = True
+
+    def set_available_torque(self, torque_nm: float) -> None:
+        """Set the torque that a client reads back; ignored beyond the motor's limit."""
+        if abs(torque_nm) <= self.spec.max_torque_nm:
+            self.available_torque_nm = torque_nm
+
+    def demand(self, step_s: float) -> float:
+        """Return the speed in rad/s that the motor is after in the next `step_s` seconds."""
+        if math.isinf(self.target_rad):
+            wanted = self.velocity_rad_s
+        else:
+            limit = abs(self.velocity_rad_s)
+            wanted = POSITION_GAIN * (self.target_rad - self.angle_rad)
+            wanted = max(-limit, min(limit, wanted))
+        if self.acceleration_rad_s2 < 0.0:
+            return wanted
+        change = self.acceleration_rad_s2 * step_s
+        return max(self.speed_rad_s - change, min(self.speed_rad_s + change, wanted))
+
+    @property
+    def steady(self) -> bool:
+        """Whether the shaft turns as commanded and will go on so until the next command."""
+        return math.isinf(self.target_rad) and self.speed_rad_s == self.velocity_rad_s

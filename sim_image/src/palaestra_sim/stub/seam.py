@@ -1,0 +1,90 @@
+"""What a controller needs of a ROS node, and what a service is before it has one.
+
+The wire is in `ros`; everything here can be had without a socket.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol
+
+Fields = Mapping[str, Any]
+Handler = Callable[[Any], Any]
+
+
+class Service(NamedTuple):
+    """One service: its path below the node's name, its type, and who answers."""
+
+    path: str
+    type_name: str
+    handler: Handler
+
+
+class Publisher(Protocol):
+    """Sends to the subscribers that are connected at that moment."""
+
+    @property
+    def subscribers(self) -> int:
+        """How many are connected."""
+        ...
+
+    def send(self, fields: Fields) -> None:
+        """Send a message of these fields."""
+        ...
+
+    def send_value(self, value: float) -> None:
+        """Send a message stamped with the wall clock: the template, and `value` in its last field."""
+        ...
+
+
+class Node(Protocol):
+    """A ROS node with a name that paths are relative to.
+
+    Attributes:
+        name: of the node.
+        blocked: whether requests have to wait; asked before each.
+        current_call: stands for the request that is being handled, for `answer`.
+    """
+
+    name: str
+    blocked: Callable[[], bool]
+    current_call: object | None
+
+    def serve(self, path: str, type_name: str, handler: Handler) -> None:
+        """Answer a service with what `handler` returns for a request, or later if that is LATER."""
+        ...
+
+    def advertise(
+        self,
+        path: str,
+        type_name: str,
+        *,
+        latched: bool = False,
+        template: Fields | None = None,
+    ) -> Publisher:
+        """Return a publisher of a topic, relative or with a leading slash."""
+        ...
+
+    def withdraw(self, publisher: Any) -> None:
+        """Take a publisher back."""
+        ...
+
+    def answer(self, call: Any, fields: Fields) -> None:
+        """Answer a call whose handler returned LATER."""
+        ...
+
+    def later(self, delay_s: float, callback: Callable[[], None]) -> None:
+        """Call back after a delay; 0 is after the answer of the present call was sent."""
+        ...
+
+    def close(self) -> None:
+        """Unregister and close everything."""
+        ...
+
+
+def topic_name(name: str) -> str:
+    """Return a name as the controller writes it in paths: five characters become underscores."""
+    return name.translate(_REPLACED)
+
+
+_REPLACED = str.maketrans("-. ()", "_____")

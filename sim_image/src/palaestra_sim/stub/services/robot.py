@@ -1,0 +1,79 @@
+"""Services under `robot/`, and those of the pseudo devices that every robot has."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.stub.seam import Handler, Service
+
+if TYPE_CHECKING:
+    from palaestra_sim.stub.controller import Controller
+
+Fields = dict[str, Any]
+
+
+class RobotServices:
+    """The services of one robot about itself, but for `time_step` and `get_device_list`."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._controller = controller
+        self._simulation = controller.simulation
+        self._robot = controller.robot
+
+    def table(self) -> tuple[Service, ...]:
+        """Return the services, with their paths below the robot's name."""
+        devices = self._robot.parts.devices
+        node = self._robot.parts.node
+        world_path = self._controller.host.world_path
+        rows: tuple[tuple[str, str, Handler], ...] = (
+            (
+                "wait_for_user_input_event",
+                "robot_wait_for_user_input_event",
+                lambda _: {"event": 0},
+            ),
+            ("get_time", "get_float", lambda _: {"value": self._simulation.time_ms / 1000.0}),
+            ("get_model", "get_string", lambda _: {"value": node.text("model") or ""}),
+            ("get_urdf", "get_urdf", _no_urdf),
+            ("get_custom_data", "get_string", self._get_custom_data),
+            ("set_custom_data", "set_string", self._set_custom_data),
+            ("get_data", "get_string", self._get_custom_data),
+            ("set_data", "set_string", self._set_custom_data),
+            ("get_mode", "get_int", lambda _: {"value": 0}),
+            ("set_mode", "robot_set_mode", lambda request: {"success": int(request.mode == 0)}),
+            ("get_supervisor", "get_bool", lambda _: {"value": node.flag("supervisor", False)}),
+            (
+                "get_synchronization",
+                "get_bool",
+                lambda _: {"value": node.flag("synchronization", True)},
+            ),
+            ("get_project_path", "get_string", lambda _: {"value": str(world_path.parent.parent)}),
+            ("get_world_path", "get_string", lambda _: {"value": str(world_path)}),
+            (
+                "get_basic_time_step",
+                "get_float",
+                lambda _: {"value": float(self._simulation.basic_step_ms)},
+            ),
+            ("get_number_of_devices", "get_int", lambda _: {"value": len(devices.order)}),
+            ("wwi_receive_text", "get_string", lambda _: {"value": ""}),
+            ("wwi_send_text", "set_string", lambda _: {"success": True}),
+        )
+        return tuple(
+            Service(f"robot/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
+        )
+
+    def device_list(self) -> Service:
+        """Return the service that is advertised last, so that whoever finds it finds all."""
+        names = list(self._robot.parts.devices.order)
+        return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
+
+    def _get_custom_data(self, _request: Any) -> Fields:
+        return {"value": self._robot.custom_data}
+
+    def _set_custom_data(self, request: Any) -> Fields:
+        self._robot.custom_data = request.value
+        return {"success": True}
+
+
+def _no_urdf(_request: Any) -> Fields:
+    raise ServiceFailed("the stub writes no URDF; use driver webots")

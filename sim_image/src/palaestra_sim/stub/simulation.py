@@ -1,0 +1,145 @@
+"""The simulated world, without ROS: load it, command motors, step it, read sensors.
+
+    simulation = Simulation.load(world_bytes)
+    robot = simulation.robots[0]
+    robot.motors["wheel0_joint"].set_position(math.inf)
+    robot.motors["wheel0_joint"].set_velocity(2.0)
+    simulation.step(192)
+    robot.sensors["ir1"].value
+
+Same world, same commands, same seed: same values, bit by bit. Time is what was stepped; nothing here
+looks at a clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+
+from palaestra_sim.stub.places import Place
+from palaestra_sim.stub.robot import Robot
+from palaestra_sim.stub.scene import Scene, read_scene
+from palaestra_sim.world import World, parse
+
+
+class Mode(IntEnum):
+    """How the simulator runs; the numbers are those of `simulation_set_mode`, R2021a and later."""
+
+    PAUSE = 0
+    REAL_TIME = 1
+    FAST = 2
+
+
+class Simulation:
+    """One loaded world. A reload makes another Simulation.
+
+    Attributes:
+        world: as read.
+        robots: in the order of the world file.
+        time_ms: simulated so far, back to 0 at a reset.
+        mode: for whoever paces the steps; `step` itself works in all three.
+        quit_status: the exit status that `quit` asked for; None before.
+    """
+
+    def __init__(self, world: World, scene: Scene, mode: Mode) -> None:
+        self.world = world
+        self.scene = scene
+        self.robots = tuple(Robot(parts, scene.random_seed) for parts in scene.robots)
+        self.time_ms = 0
+        self.mode = mode
+        self.quit_status: int | None = None
+        self._pending: list[Callable[[], None]] = []
+        self._reset_asked = False
+        self._step_s = scene.basic_step_ms / 1000.0
+        self._solids_moved = False
+        self._arrange()
+
+    @classmethod
+    def load(cls, source: bytes, name: str = "world", mode: Mode = Mode.REAL_TIME) -> Simulation:
+        """Return the simulation of a world file.
+
+        Raises:
+            WorldError: the file is wrong, or holds something that the stub cannot simulate.
+        """
+        world = parse(source, name)
+        return cls(world, read_scene(world, name), mode)
+
+    @property
+    def basic_step_ms(self) -> int:
+        """WorldInfo.basicTimeStep."""
+        return self.scene.basic_step_ms
+
+    def step(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`, then give the sensors their values.
+
+        Raises:
+            ValueError: the duration is no positive multiple of the basic step.
+        """
+        count, rest = divmod(duration_ms, self.scene.basic_step_ms)
+        if rest or count < 1:
+            raise ValueError(
+                f"step: {duration_ms} ms is no multiple of the basic step;"
+                f" use one of {self.scene.basic_step_ms} ms"
+            )
+        for _ in range(count):
+            self._basic_step()
+        for robot in self.robots:
+            robot.sense()
+
+    def before_next_step(self, change: Callable[[], None]) -> None:
+        """Have a change made when the next basic step begins, as writes to fields are."""
+        self._pending.append(change)
+
+    def reset(self) -> None:
+        """Have the world reset within the next basic step.
+
+        Restored: time, poses of all solids and robots, motors, noise (with the seed that customData
+        gives then). Not restored: other fields that were written.
+        """
+        self._reset_asked = True
+
+    def reset_physics(self) -> None:
+        """Take all motion away, at once."""
+        for robot in self.robots:
+            robot.halt()
+
+    def quit(self, status: int) -> None:
+        """Ask for the end of the simulator."""
+        self.quit_status = status
+
+    def place_of(self, first_byte: int) -> Place | None:
+        """Return the place of the node that begins there in the world file, None if it has none."""
+        return self.scene.places.get(first_byte)
+
+    def moved(self, place: Place) -> None:
+        """Look again at where the solids stand, if any stands on `place`."""
+        if any(place in shape.place.chain() for shape in self.scene.solids):
+            self._solids_moved = True
+            self._arrange()
+
+    def _arrange(self) -> None:
+        for robot in self.robots:
+            others = [it for it in self.robots if it is not robot]
+            robot.face(self.scene.solids, others)
+
+    def _basic_step(self) -> None:
+        if self._pending:
+            pending, self._pending = self._pending, []
+            for change in pending:
+                change()
+        for robot in self.robots:
+            robot.advance(self._step_s)
+        if self._reset_asked:
+            self._restore()
+        self.time_ms += self.scene.basic_step_ms
+
+    def _restore(self) -> None:
+        self._reset_asked = False
+        self.time_ms = 0
+        for place in self.scene.places.values():
+            place.return_to_start()
+        for robot in self.robots:
+            robot.reset()
+        if self._solids_moved:
+            self._solids_moved = False
+            self._arrange()

@@ -1,0 +1,74 @@
+"""Who has asked for a step, and when the world moves: when all that it waits for have asked.
+
+A robot whose `synchronization` is TRUE holds the world until it asks. Steps of different lengths are
+served piece by piece: the world advances by the shortest that is left. While the simulation is
+paused everyone waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from palaestra_sim.stub.robot import Robot
+from palaestra_sim.stub.simulation import Mode, Simulation
+
+Done = Callable[[bool], None]
+
+
+@dataclass(slots=True)
+class _Wish:
+    left_ms: int
+    done: Done
+
+
+class Stepping:
+    """The steps that the controllers of one simulation ask for."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._awaited: set[Robot] = set()
+        self._wishes: dict[Robot, _Wish] = {}
+
+    def join(self, robot: Robot) -> None:
+        """Let the world wait for this robot from now on."""
+        self._awaited.add(robot)
+
+    def leave(self, robot: Robot) -> None:
+        """Wait for this robot no more; what it asked for is forgotten."""
+        self._awaited.discard(robot)
+        self._wishes.pop(robot, None)
+        self.advance()
+
+    def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
+        """Have `done(True)` called when the world has moved on by `duration_ms`, perhaps at once.
+
+        `done(False)` says that the simulator ends.
+        """
+        self._wishes[robot] = _Wish(duration_ms, done)
+        self.advance()
+
+    def advance(self) -> None:
+        """Move the world as far as it was asked to."""
+        while self._wishes and self._awaited <= self._wishes.keys() and self._may_move():
+            duration_ms = min(wish.left_ms for wish in self._wishes.values())
+            self._simulation.step(duration_ms)
+            self._grant(duration_ms)
+
+    def end(self) -> None:
+        """Tell everyone who waits that the simulator ends."""
+        wishes, self._wishes = self._wishes, {}
+        for wish in wishes.values():
+            wish.done(False)
+
+    def _may_move(self) -> bool:
+        return self._simulation.mode is not Mode.PAUSE and self._simulation.quit_status is None
+
+    def _grant(self, duration_ms: int) -> None:
+        served = []
+        for robot, wish in self._wishes.items():
+            wish.left_ms -= duration_ms
+            if wish.left_ms <= 0:
+                served.append(robot)
+        for robot in served:
+            self._wishes.pop(robot).done(True)

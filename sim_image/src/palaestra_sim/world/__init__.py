@@ -1,0 +1,35 @@
+"""Worlds: read a `.wbt` file, and make one for each simulator, with its own ROS names.
+
+Pure: bytes in, bytes out. No clock, no network, no file but the worlds that ship.
+
+    parse(source)                              the tree of a world
+    generate(source, identity, clock=False)    the world of one simulator
+    robots(source)                             the robots in it that speak ROS
+    ros_name(identity, "robotino")             the name that such a robot gets
+    builtin("arena")                           a world that ships
+"""
+
+from palaestra_sim.errors import UnknownWorldError, WorldError
+from palaestra_sim.world.builtin import builtin
+from palaestra_sim.world.generate import generate
+from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
+from palaestra_sim.world.reader import parse
+from palaestra_sim.world.robots import WorldRobot, robots
+from palaestra_sim.world.tree import Item, Node, Value, World
+
+__all__ = [
+    "Item",
+    "Node",
+    "RunIdentity",
+    "UnknownWorldError",
+    "Value",
+    "World",
+    "WorldError",
+    "WorldRobot",
+    "builtin",
+    "generate",
+    "name_prefix",
+    "parse",
+    "robots",
+    "ros_name",
+]

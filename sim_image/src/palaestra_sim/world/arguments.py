@@ -1,0 +1,116 @@
+"""Decide what the `controllerArgs` of one robot must be, as edits of the fewest bytes.
+
+A string of the list is kept as it is written, replaced, or taken out; nothing is reordered. Two
+ways of writing arguments that would not reach the controller as meant are put right: a bare
+string, as worlds up to R2020a have it, becomes a list; and one string that holds several options
+becomes one string for each, because Webots hands each string over as a single argument.
+"""
+
+import re
+from itertools import chain
+
+from palaestra_sim.world.edits import Edit
+from palaestra_sim.world.robots import CLOCK, NAME, SYNCHRONIZE
+from palaestra_sim.world.tokens import Token, quoted, unquoted
+from palaestra_sim.world.tree import Node, Value, World
+
+_NO_COMMENT = re.compile(rb"[ \t\r\n,]*")
+_INDENT = re.compile(rb"\r?\n[ \t]*\Z")
+
+
+def asks_for_clock(robot: Node) -> bool:
+    """Say whether a robot's arguments hold a `--clock`."""
+    return any(CLOCK in _options(text) for text in robot.texts("controllerArgs"))
+
+
+def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Edit, ...]:
+    """Return the edits that give a robot its `--name=` and `--synchronize`.
+
+    Of several `--clock` the first stays if `clock` says so; none is ever added.
+    """
+    value = robot.fields.get("controllerArgs")
+    if value is None:
+        return (_new_field(world, robot, ros_name),)
+    strings = [token for token in world.inside(value) if token.kind == "string"]
+    if not value.bracketed:
+        return (_new_list(value, strings[0], ros_name, clock=clock),)
+    if not strings:
+        start = value.span[0] + 1
+        texts = _rows([], ros_name, clock=clock)[0]
+        return (Edit(start=start, end=start, text=b" ".join(texts), tokens=texts),)
+    rows = _rows(strings, ros_name, clock=clock)
+    changed = [pair for pair in zip(strings, rows, strict=True) if pair[1] != (pair[0].text,)]
+    separator = _gap_before(world, strings[0]) or b" "
+    return tuple(_new_row(world, token, row, separator) for token, row in changed)
+
+
+def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[bytes, ...]]:
+    """Return, for each string of a list, the strings to write instead; one row for an empty list.
+
+    What is missing goes behind the name, or to the front with it.
+    """
+    name, synchronize = quoted(NAME + ros_name), quoted(SYNCHRONIZE)
+    rows: list[list[bytes]] = []
+    for string in strings:
+        row: list[bytes] = []
+        rows.append(row)
+        options = _options(unquoted(string))
+        for option in options:
+            if option.startswith(NAME):
+                row += [] if name in chain(*rows) else [name]
+            elif option != CLOCK:
+                row.append(quoted(option) if len(options) > 1 else string.text)
+            elif clock:
+                row.append(quoted(CLOCK))
+                clock = False
+    rows = rows or [[]]
+    if name not in chain(*rows):
+        rows[0].insert(0, name)
+    if synchronize not in chain(*rows):
+        row = next(row for row in rows if name in row)
+        row.insert(row.index(name) + 1, synchronize)
+    return [tuple(row) for row in rows]
+
+
+def _options(text: str) -> list[str]:
+    """Return the options that one string holds: several only if each begins with `--`."""
+    words = text.split()
+    several = len(words) > 1 and all(word.startswith("--") for word in words)
+    return words if several else [text]
+
+
+def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Edit:
+    """Replace one string of a list; if by nothing, then with what parts it from the one before."""
+    start = token.start
+    if not row:
+        start -= len(_gap_before(world, token))
+    return Edit(start=start, end=token.end, text=separator.join(row), tokens=row)
+
+
+def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Edit:
+    """Replace a bare string by a list; an empty one says that there are no arguments."""
+    strings = [string] if unquoted(string) else []
+    texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
+    text = b"[" + b" ".join(texts) + b"]"
+    return Edit(start=value.span[0], end=value.span[1], text=text, tokens=(b"[", *texts, b"]"))
+
+
+def _new_field(world: World, robot: Node, ros_name: str) -> Edit:
+    """Add `controllerArgs` behind `controller`, on lines of its own if that has one."""
+    start, end = robot.fields["controller"].span
+    field = world.index(start) - 1
+    gap = world.source[world.tokens[field - 1].end : world.tokens[field].start]
+    indent = _INDENT.search(gap)
+    line = indent.group() if indent else b" "
+    inner = line + b"  " if indent else b""
+    texts = _rows([], ros_name, clock=False)[0]
+    items = (inner or b" ").join(texts)
+    text = line + b"controllerArgs [" + inner + items + (line if indent else b"") + b"]"
+    return Edit(start=end, end=end, text=text, tokens=(b"controllerArgs", b"[", *texts, b"]"))
+
+
+def _gap_before(world: World, token: Token) -> bytes:
+    """Return what lies between a token and the one before it; nothing if that has a comment."""
+    before = world.tokens[world.index(token.start) - 1]
+    gap = world.source[before.end : token.start]
+    return gap if _NO_COMMENT.fullmatch(gap) else b""

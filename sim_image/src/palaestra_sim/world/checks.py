@@ -1,0 +1,132 @@
+"""The worlds that can be read, but of which no simulator's world can be made.
+
+Each check looks for one thing and points at it. The order is the order in which a person would
+want to hear of them.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.world.robots import robot_name
+from palaestra_sim.world.source import Source
+from palaestra_sim.world.tokens import Token, unquoted
+from palaestra_sim.world.tree import Node, Value, World
+
+_ADDRESS_FIELD = re.compile(r"(?:url|sound|texture)\Z", re.IGNORECASE)
+_ABSOLUTE = re.compile(r"[a-z][a-z0-9+.-]*://|/", re.IGNORECASE)
+_ROS_REMAPPING = re.compile(r"__\w+:=")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """A world that names are to be written into, and its ROS robots."""
+
+    source: Source
+    world: World
+    robots: Sequence[Node]
+
+
+Check = Callable[[Candidate], WorldError | None]
+
+
+def robot_used_twice(candidate: Candidate) -> WorldError | None:
+    """A `USE` stands for the same robot once more, with the same ROS name.
+
+    Any DEF of that name counts, though a `USE` means the last one before it: such a world is
+    clearer with two names.
+    """
+    containers = {
+        node.def_name: robot
+        for node in candidate.world.walk()
+        for robot in candidate.robots
+        if node.def_name is not None and node.encloses(robot)
+    }
+    for node in candidate.world.walk():
+        if node.uses in containers:
+            robot = robot_name(containers[node.uses])
+            fact = f'USE {node.uses} repeats the robot "{robot}" and its ROS name'
+            return candidate.source.error(node.span[0], fact, "write the node out, with its own name")
+    return None
+
+
+def robots_of_one_name(candidate: Candidate) -> WorldError | None:
+    """Clients find a robot by its Robot.name, and its ROS name is made of it."""
+    seen = set()
+    for robot in candidate.robots:
+        name = robot_name(robot)
+        if name in seen:
+            fact = f'a second robot is called "{name}"'
+            return candidate.source.error(robot.span[0], fact, "give it a name of its own")
+        seen.add(name)
+    return None
+
+
+def arguments_that_are_no_strings(candidate: Candidate) -> WorldError | None:
+    """Arguments are strings; anything else was meant for another field."""
+    for value in _argument_values(candidate):
+        for token in candidate.world.inside(value):
+            if token.kind != "string" and token.text not in (b"[", b"]"):
+                fact = f"{token.text.decode()} in controllerArgs is not a string"
+                return candidate.source.error(token.start, fact, 'write a list like ["--clock"]')
+    return None
+
+
+def renamed_behind_its_name(candidate: Candidate) -> WorldError | None:
+    """A ROS remapping such as `__name:=x` would overrule the name that is written for the robot."""
+    for value in _argument_values(candidate):
+        for token in _strings(candidate.world, value):
+            if _ROS_REMAPPING.match(unquoted(token)):
+                fact = f"{token.text.decode()} overrules the generated ROS name"
+                return candidate.source.error(token.start, fact, "remove it")
+    return None
+
+
+def relative_address(candidate: Candidate) -> WorldError | None:
+    """A world that is not a file has no folder that an address could start from."""
+    for token in _addresses(candidate.world):
+        if not _ABSOLUTE.match(unquoted(token)):
+            fact = f"{token.text.decode()} is relative to the file of the world, and this one has none"
+            remedy = "begin it with webots:// or https://, or give the world as a file"
+            return candidate.source.error(token.start, fact, remedy)
+    return None
+
+
+def _argument_values(candidate: Candidate) -> Iterator[Value]:
+    """Yield the controllerArgs of every robot that has them."""
+    for robot in candidate.robots:
+        if "controllerArgs" in robot.fields:
+            yield robot.fields["controllerArgs"]
+
+
+def _addresses(world: World) -> Iterator[Token]:
+    """Yield the tokens of all strings that say where something is.
+
+    A texture without a dot is the name of one that Webots has, such as "mountains".
+    """
+    yield from world.externs
+    for node in world.walk():
+        for field, value in node.fields.items():
+            if _ADDRESS_FIELD.search(field):
+                named = field.lower().endswith("texture")
+                for token in _strings(world, value):
+                    if b"." in token.text or not named:
+                        yield token
+
+
+def _strings(world: World, value: Value) -> Iterator[Token]:
+    """Yield the tokens of the strings of a value that are not empty."""
+    return (token for token in world.inside(value) if token.kind == "string" and token.text != b'""')
+
+
+CHECKS: tuple[Check, ...] = (
+    robot_used_twice,
+    robots_of_one_name,
+    arguments_that_are_no_strings,
+    renamed_behind_its_name,
+)
+"""What every world must pass."""
+
+CHECKS_WITHOUT_FILE: tuple[Check, ...] = (*CHECKS, relative_address)
+"""What a world must pass that doesn't come from a file with others beside it."""

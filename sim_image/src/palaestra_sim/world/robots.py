@@ -1,0 +1,65 @@
+"""Find the robots of a world that speak ROS.
+
+A robot speaks ROS if its `controller` is "ros", whatever its type is: a plain Robot or a PROTO,
+at the top or nested in another node's children, endPoint or slots. A PROTO whose own default is
+"ros" is not seen; its world must say `controller "ros"`.
+"""
+
+from dataclasses import dataclass
+
+from palaestra_sim.world.reader import parse
+from palaestra_sim.world.tree import Node, World
+
+NAME = "--name="
+SYNCHRONIZE = "--synchronize"
+CLOCK = "--clock"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldRobot:
+    """A robot whose controller is "ros".
+
+    `robot` is its Robot.name; `ros_name` is the one that its `--name=` gives it, None without.
+    `supervisor` says whether it may see and change the whole scene, `synchronize` whether it
+    waits for a client to step.
+    """
+
+    robot: str
+    ros_name: str | None
+    supervisor: bool
+    synchronize: bool
+
+
+def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
+    """Return every robot of a world whose controller is "ros", in source order.
+
+    Raises:
+        WorldError: the bytes are no world file.
+    """
+    return tuple(_described(node) for node in ros_robots(parse(source, name)))
+
+
+def ros_robots(world: World) -> tuple[Node, ...]:
+    """Return the nodes of the robots whose controller is "ros", in source order."""
+    return tuple(node for node in world.walk() if node.text("controller") == "ros")
+
+
+def robot_name(node: Node) -> str:
+    """Return the Robot.name of a robot's node.
+
+    Without one, Webots calls a Robot "robot". A PROTO has a default of its own that the world
+    doesn't show, so its type stands in for it.
+    """
+    default = "robot" if node.type_name == "Robot" else node.type_name
+    return node.text("name") or default
+
+
+def _described(node: Node) -> WorldRobot:
+    arguments = node.texts("controllerArgs")
+    names = [argument.removeprefix(NAME) for argument in arguments if argument.startswith(NAME)]
+    return WorldRobot(
+        robot=robot_name(node),
+        ros_name=names[-1] if names else None,  # the controller takes the last one
+        supervisor=node.flag("supervisor", default=False),
+        synchronize=SYNCHRONIZE in arguments,
+    )

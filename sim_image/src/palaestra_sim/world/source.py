@@ -1,0 +1,45 @@
+"""The bytes of one world file, and how to point into them.
+
+Everything in this package works on byte offsets; people read lines and columns. This is the
+only place that turns one into the other, so that every error of a world says where.
+"""
+
+import re
+from dataclasses import dataclass
+
+from palaestra_sim.errors import WorldError
+
+_HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """The bytes of a world and the name that its errors call it by."""
+
+    data: bytes
+    name: str
+
+    def header(self) -> str:
+        """Return the first line, such as `#VRML_SIM R2023b utf8`.
+
+        Raises:
+            WorldError: the file isn't UTF-8, or doesn't begin with such a line.
+        """
+        try:
+            self.data.decode("utf-8")
+        except UnicodeDecodeError as error:
+            byte = self.data[error.start]
+            fact = f"byte 0x{byte:02x} is not UTF-8"
+            raise self.error(error.start, fact, "save the world as UTF-8") from None
+        match = _HEADER.match(self.data)
+        if match is None:
+            fact = "the first line is not the header of a Webots world"
+            raise self.error(0, fact, "make it #VRML_SIM R2023b utf8")
+        return match.group().decode()
+
+    def error(self, offset: int, fact: str, remedy: str) -> WorldError:
+        """Return the error that points at byte `offset`, for the caller to raise."""
+        line_start = self.data.rfind(b"\n", 0, offset) + 1
+        line = self.data.count(b"\n", 0, offset) + 1
+        column = len(self.data[line_start:offset].decode("utf-8", errors="replace")) + 1
+        return WorldError(self.name, line, column, fact, remedy)

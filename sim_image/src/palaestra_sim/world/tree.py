@@ -1,0 +1,114 @@
+"""Read a world file as nodes, fields and values.
+
+The reader knows the grammar of `.wbt` and no node: which fields a Robot has, what a PROTO's
+fields mean, whether a `USE` finds its `DEF`, is for others to say. Nothing is resolved, and every
+node and value tells which bytes it was read from.
+"""
+
+from bisect import bisect_left
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from palaestra_sim.world.tokens import Token
+
+Item: TypeAlias = "float | bool | str | Node | None"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Value:
+    """What a field holds: numbers, booleans, strings, nodes, `None` for NULL; in source order.
+
+    `translation 0 0 1` has three items and is not bracketed. The span is (start, end) in bytes,
+    brackets included.
+    """
+
+    items: tuple[Item, ...]
+    bracketed: bool
+    span: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """One node: `DEF def_name type_name { fields }`, or `USE uses` (then `type_name` is "").
+
+    A saved state, `hidden position_0_0 1`, is the field "hidden position_0_0".
+    The span is (start, end) in bytes, from `DEF` or the type to the closing brace.
+    """
+
+    type_name: str
+    def_name: str | None
+    uses: str | None
+    fields: dict[str, Value]
+    span: tuple[int, int]
+
+    def numbers(self, name: str) -> tuple[float, ...] | None:
+        """Return the numbers of a field; None if it is absent or holds anything else."""
+        value = self.fields.get(name)
+        if value is None:
+            return None
+        numbers = tuple(item for item in value.items if isinstance(item, float))
+        return numbers if len(numbers) == len(value.items) else None
+
+    def text(self, name: str) -> str | None:
+        """Return the first string of a field, unescaped; None if there is none."""
+        return next(iter(self.texts(name)), None)
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """Return the strings of a field, unescaped; () if it is absent."""
+        return tuple(item for item in self._items(name) if isinstance(item, str))
+
+    def flag(self, name: str, default: bool) -> bool:  # noqa: FBT001 - reads as in the world
+        """Return the TRUE or FALSE of a field, or `default` if it has none."""
+        return next((item for item in self._items(name) if isinstance(item, bool)), default)
+
+    def nodes(self, name: str) -> tuple["Node", ...]:
+        """Return the nodes of a field, those of a `USE` included; () if it is absent."""
+        return tuple(item for item in self._items(name) if isinstance(item, Node))
+
+    def encloses(self, other: "Node") -> bool:
+        """Say whether `other`, of the same world, is this node or lies inside it."""
+        return self.span[0] <= other.span[0] and other.span[1] <= self.span[1]
+
+    def _items(self, name: str) -> tuple[Item, ...]:
+        value = self.fields.get(name)
+        return () if value is None else value.items
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """A world file as read: its bytes, its first line, and its nodes in source order.
+
+    `externs` are the string tokens of its EXTERNPROTO lines; `tokens` end with one of kind `end`.
+    """
+
+    source: bytes
+    header: str
+    nodes: tuple[Node, ...]
+    externs: tuple[Token, ...] = field(repr=False)
+    tokens: tuple[Token, ...] = field(repr=False)
+
+    def walk(self) -> Iterator[Node]:
+        """Yield every node, parents before children, in source order."""
+        waiting = list(reversed(self.nodes))
+        while waiting:
+            node = waiting.pop()
+            yield node
+            inside = [
+                item for value in node.fields.values() for item in value.items if isinstance(item, Node)
+            ]
+            waiting.extend(reversed(inside))
+
+    def inside(self, value: Value) -> tuple[Token, ...]:
+        """Return the tokens of a value of this world, its brackets included."""
+        start, end = value.span
+        first = self.index(start)
+        return self.tokens[first : bisect_left(self.tokens, end, lo=first, key=_start)]
+
+    def index(self, offset: int) -> int:
+        """Return which token begins at byte `offset`, or is the first one after it."""
+        return bisect_left(self.tokens, offset, key=_start)
+
+
+def _start(token: Token) -> int:
+    return token.start

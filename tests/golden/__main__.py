@@ -1,0 +1,50 @@
+"""Record the generated files anew: `python -m tests.golden`.
+
+    tests/golden/<example>.<layout>.yaml    the whole plan of each manifests/examples/*.yaml
+    manifests/crd.yaml, docs/trainingjob.md what the API is made of
+
+A new example needs no new test: its plans are recorded here and compared by test_golden.py.
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from palaestra.api import load
+from palaestra.api.generated import generated_files
+from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
+from palaestra.plan.text import as_yaml
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "manifests" / "examples"
+IMAGES = Images.of_release("0.0.0")  # of no release, so that a release changes no plan
+UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
+
+
+def recorded() -> Iterator[tuple[Path, str]]:
+    """Yield every generated file and what belongs into it."""
+    for example in sorted(EXAMPLES.glob("*.yaml")):
+        job = identified(load(example.read_text(), example.name), UID)
+        layouts = {
+            "cluster": ClusterLayout(images=IMAGES),
+            "local": LocalLayout(images=IMAGES, job_directory=f"/runs/{job.metadata.name}"),
+        }
+        for name, layout in layouts.items():
+            path = ROOT / "tests" / "golden" / f"{example.stem}.{name}.yaml"
+            yield path, as_yaml(plan(job, layout).objects)
+    for name, text in generated_files(ROOT).items():
+        yield ROOT / name, text
+
+
+def main() -> int:
+    """Write every file; plans of examples that are gone are removed."""
+    current = dict(recorded())
+    for stale in set((ROOT / "tests" / "golden").glob("*.yaml")) - current.keys():
+        stale.unlink()
+    for path, text in current.items():
+        path.write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

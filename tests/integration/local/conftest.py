@@ -1,0 +1,112 @@
+"""Small pods of small programs, and what can be seen of them from outside."""
+
+import asyncio
+import os
+import shlex
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from palaestra.local.container import BackOff
+from palaestra.local.output import Log
+from palaestra.local.pod import Kubelet, RunningPod
+from palaestra.local.spec import Container, Pod
+from palaestra.local.watchdog import MARKER
+
+PATIENCE_S = 20.0  # for what takes milliseconds on a machine that does nothing else
+
+
+def alive(pod_uid: str) -> list[int]:
+    """Return the processes that carry the marker of a pod."""
+    wanted = f"{MARKER}={pod_uid}/".encode()
+    found = []
+    for entry in os.scandir("/proc"):
+        try:
+            environment = Path(f"/proc/{int(entry.name)}/environ").read_bytes()
+        except (OSError, ValueError):
+            continue
+        if any(mark.startswith(wanted) for mark in environment.split(b"\0")):
+            found.append(int(entry.name))
+    return found
+
+
+@pytest.fixture
+def eventually() -> Callable[[Callable[[], object]], None]:
+    """Wait until a claim holds; fail when it does not within the patience."""
+
+    def wait(claim: Callable[[], object]) -> None:
+        deadline = time.monotonic() + PATIENCE_S
+        while not claim():
+            assert time.monotonic() < deadline, f"{claim} never held"
+            time.sleep(0.01)
+
+    return wait
+
+
+@dataclass
+class Stage:
+    """A place where a pod is played: its folder, its events, its containers."""
+
+    folder: Path
+    opened: ExitStack
+    uid: str = field(default_factory=lambda: str(uuid.uuid4()))
+    start_deadline_s: float = PATIENCE_S
+    logs: dict[str, Log] = field(default_factory=dict)
+
+    @property
+    def events(self) -> list[str]:
+        """Return what the containers have written with `event`, in order."""
+        file = self.folder / "events"
+        return file.read_text().splitlines() if file.exists() else []
+
+    def container(self, name: str, script: str, **options: object) -> Container:
+        """Return a container that runs a bash script; `event x` in it writes `<name> x`."""
+        events = shlex.quote(str(self.folder / "events"))
+        helper = f'event() {{ echo "{name} $1" >> {events}; }}\n'
+        fields = {"env": {}, "sidecar": name != "main", **options}
+        return Container(name=name, command=("bash", "-c", helper + script), **fields)  # type: ignore[arg-type]
+
+    def sidecar(self, name: str, **options: object) -> Container:
+        """Return a sidecar that tells its start and its end, and ends on SIGTERM."""
+        script = "event start; trap 'event stop; exit 0' TERM; while :; do sleep 0.02; done"
+        return self.container(name, script, **options)
+
+    def pod(self, *init: Container, main: str, grace_s: float = PATIENCE_S) -> RunningPod:
+        """Return a pod that is ready to run."""
+        pod = Pod(
+            uid=self.uid,
+            init=init,
+            main=self.container("main", main),
+            grace_s=grace_s,
+            mounts={},
+        )
+        self.logs = {each.name: self.log(each.name) for each in pod.containers}
+        backoff = BackOff(first_s=0.02, most_s=0.2, calm_s=PATIENCE_S)
+        return RunningPod(
+            pod,
+            Kubelet(logs=self.logs, backoff=backoff, start_deadline_s=self.start_deadline_s),
+        )
+
+    def log(self, name: str) -> Log:
+        """Return a log that is closed with the test."""
+        log = Log(name, self.folder / "logs", None)
+        self.opened.callback(log.close)
+        return log
+
+    def run(self, *init: Container, main: str, grace_s: float = PATIENCE_S) -> int | None:
+        """Run a pod to its end and return the main container's exit code."""
+        pod = self.pod(*init, main=main, grace_s=grace_s)
+        return asyncio.run(asyncio.wait_for(pod.run(), PATIENCE_S * 2))
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Iterator[Stage]:
+    """A place where a pod is played; afterwards nothing of it may be left."""
+    with ExitStack() as opened:
+        yield (stage := Stage(folder=tmp_path, opened=opened))
+        assert alive(stage.uid) == []

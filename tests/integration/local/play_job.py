@@ -1,0 +1,19 @@
+"""Run a planned Job as `palaestra run` does: `python play_job.py JOB.json DIRECTORY`.
+
+A program of its own, because the tests kill it.
+"""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+from palaestra.local.container import BackOff
+from palaestra.local.replica import Setting, run_replica
+from palaestra.plan import ReplicaPlan
+
+job = json.loads(Path(sys.argv[1]).read_text())
+planned = ReplicaPlan(config_map={"data": {}}, claim=None, job=job)
+setting = Setting(directory=Path(sys.argv[2]), backoff=BackOff(first_s=0.02))
+outcome = asyncio.run(run_replica(planned, setting))
+sys.stdout.write(json.dumps({"code": outcome.exit_code, "pods": outcome.pods, "steps": outcome.steps}))

@@ -1,0 +1,189 @@
+"""A planned Job on this machine: its pods one after another, and what ends them all."""
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PLAY = Path(__file__).with_name("play_job.py")
+MARKER = "PALAESTRA_LOCAL_CONTAINER"
+POLICY = {
+    "rules": [
+        {"action": "Ignore", "onPodConditions": [{"type": "DisruptionTarget", "status": "True"}]},
+        {
+            "action": "Ignore",
+            "onExitCodes": {"containerName": "trainer", "operator": "In", "values": [75]},
+        },
+        {
+            "action": "FailJob",
+            "onExitCodes": {"containerName": "trainer", "operator": "In", "values": [2, 80, 81]},
+        },
+    ]
+}
+FORK = "setsid bash -c 'trap \"\" TERM HUP INT; echo $$ >> {pids}; sleep 300' &"
+
+
+class Play:
+    """One Job that is run by a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.pids = folder / "pids"
+        self.starts = folder / "starts"
+
+    def start(self, trainer: str, *, sidecar: str = "sleep 300", limit: int = 3) -> subprocess.Popen:
+        """Start the runner; every container writes its process ids to `pids`."""
+        count = f"echo $$ >> {shlex.quote(str(self.pids))}\n"
+        trainer = f"echo x >> {shlex.quote(str(self.starts))}\n{count}{trainer}"
+        env = [{"name": "FOLDER", "value": str(self.folder)}]
+        template = {
+            "spec": {
+                "terminationGracePeriodSeconds": 10,
+                "initContainers": [
+                    {
+                        "name": "sim-a",
+                        "restartPolicy": "Always",
+                        "command": ["bash", "-c", count + sidecar],
+                        "env": env,
+                    }
+                ],
+                "containers": [{"name": "trainer", "command": ["bash", "-c", trainer], "env": env}],
+                "volumes": [],
+            }
+        }
+        job = {"spec": {"backoffLimit": limit, "podFailurePolicy": POLICY, "template": template}}
+        file = self.folder / "job.json"
+        file.write_text(json.dumps(job))
+        return subprocess.Popen(
+            [sys.executable, PLAY, file, self.folder], stdout=subprocess.PIPE, text=True
+        )
+
+    def run(self, trainer: str, **options) -> dict:
+        """Run a Job to its end and return its outcome and the number of pods that were seen."""
+        out, _ = self.start(trainer, **options).communicate(timeout=60)
+        return json.loads(out.splitlines()[-1]) | {"seen": len(self.starts.read_text().split())}
+
+    def running(self) -> list[int]:
+        """Return those of the processes in `pids` that still run; zombies do not."""
+        return [pid for pid in map(int, self.pids.read_text().split()) if _runs(pid)]
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.fixture
+def play(tmp_path):
+    """A place to run a Job in."""
+    return Play(tmp_path)
+
+
+def test_a_trainer_that_is_done_completes_the_job(play):
+    """Exit code 0 needs no second pod."""
+    assert play.run("exit 0") == {"code": 0, "pods": 1, "steps": None, "seen": 1}
+
+
+@pytest.mark.parametrize("code", [2, 80, 81])
+def test_what_a_retry_cannot_mend_is_not_tried_again(play, code):
+    """A wrong configuration, a spent budget and a divergence come back every time."""
+    assert play.run(f"exit {code}")["seen"] == 1
+
+
+def test_other_failures_are_tried_again_up_to_the_limit(play):
+    """A limit of n means n + 1 pods."""
+    outcome = play.run("exit 82", limit=1)
+
+    assert outcome == {"code": 82, "pods": 2, "steps": None, "seen": 2}
+
+
+def test_an_interrupted_pod_is_not_counted(play):
+    """Exit code 75 is ignored, so that a limit of 0 does not end a run that lost its master."""
+    outcome = play.run('[ $(wc -l < "$FOLDER/starts") = 2 ] && exit 0; exit 75', limit=0)
+
+    assert outcome["code"] == 0
+    assert outcome["seen"] == 2
+
+
+def test_the_last_word_of_the_trainer_is_part_of_the_outcome(play):
+    """Its step is what a resumed run is compared with."""
+    word = json.dumps({"step": 1200, "reason": "Interrupted"})
+
+    outcome = play.run(f"echo {shlex.quote(word)} > $FOLDER/termination.json; exit 2")
+
+    assert outcome["steps"] == 1200
+
+
+def test_a_killed_runner_leaves_no_process_behind(play, eventually):
+    """Also no grandchild in a session of its own, which ignores every signal it can."""
+    fork = FORK.format(pids=shlex.quote(str(play.pids)))
+    runner = play.start(f"trap '' TERM\n{fork}\nsleep 300", sidecar=f"{fork}\nsleep 300")
+    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 4)
+
+    runner.kill()
+    runner.communicate()
+
+    eventually(lambda: not play.running())
+
+
+def test_the_first_ctrl_c_lets_the_trainer_save_and_ends_with_75(play, eventually):
+    """A person's Ctrl-C reaches the runner alone, and the run can be resumed."""
+    save = "trap 'echo saved > $FOLDER/saved; exit 75' TERM; while :; do sleep 0.02; done"
+    runner = play.start(save)
+    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+
+    os.kill(runner.pid, signal.SIGINT)
+    out, _ = runner.communicate(timeout=20)
+
+    assert json.loads(out.splitlines()[-1])["code"] == 75
+    assert (play.folder / "saved").exists()
+    assert not play.running()
+
+
+def test_the_second_ctrl_c_kills(play, eventually):
+    """Nobody has to wait for a checkpoint that hangs."""
+    runner = play.start("trap 'echo asked > $FOLDER/asked' TERM; while :; do sleep 0.02; done")
+    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+
+    os.kill(runner.pid, signal.SIGINT)
+    eventually((play.folder / "asked").exists)
+    os.kill(runner.pid, signal.SIGINT)
+    out, _ = runner.communicate(timeout=20)
+
+    assert json.loads(out.splitlines()[-1])["code"] == 130
+    assert not play.running()
+
+
+def test_a_run_that_was_done_when_it_was_interrupted_stays_done(play, eventually):
+    """The trainer had nothing left to save."""
+    runner = play.start("trap 'exit 0' TERM; while :; do sleep 0.02; done")
+    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+
+    os.kill(runner.pid, signal.SIGTERM)
+    out, _ = runner.communicate(timeout=20)
+
+    assert json.loads(out.splitlines()[-1])["code"] == 0
+
+
+def test_a_killed_sidecar_takes_its_simulator_with_it_and_comes_back(play, eventually):
+    """As in a container, where the end of the first process is the end of all."""
+    fork = FORK.format(pids=shlex.quote(str(play.pids)))
+    runner = play.start("while :; do sleep 0.02; done", sidecar=f"{fork}\nwait")
+    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 3)
+    first = play.running()
+
+    os.kill(first[0], signal.SIGKILL)
+    eventually(lambda: len(play.pids.read_text().split()) == 5)
+
+    still = set(first) & set(play.running())
+    os.kill(runner.pid, signal.SIGTERM)
+    runner.communicate(timeout=20)
+    assert len(still) == 1, "only the trainer may be left of the first three"
+    assert not play.running()

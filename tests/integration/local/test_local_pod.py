@@ -1,0 +1,212 @@
+"""A pod on this machine behaves as a kubelet's pod does: order, probes, restarts, shutdown."""
+
+import asyncio
+
+import pytest
+
+from palaestra.local.errors import StartFailed
+from palaestra.local.spec import Probe
+
+READY = Probe(command=("test", "-e", "READY"), period_s=0.02, timeout_s=10, failure_threshold=500)
+
+
+def ready(stage, file="ready"):
+    """Return a startup probe that passes once a file is there."""
+    return Probe(
+        command=("test", "-e", str(stage.folder / file)),
+        period_s=0.02,
+        timeout_s=10,
+        failure_threshold=500,
+    )
+
+
+def test_containers_start_in_order_and_sidecars_stop_in_reverse(stage):
+    """A simulator needs the ROS master before it, and the trainer needs both."""
+    wait_for_all = f"until [ $(wc -l < {stage.folder}/events) = 2 ]; do sleep 0.01; done"
+
+    code = stage.run(stage.sidecar("a"), stage.sidecar("b"), main=f"{wait_for_all}; event run")
+
+    assert code == 0
+    assert sorted(stage.events[:2]) == ["a start", "b start"]
+    assert stage.events[2:] == ["main run", "b stop", "a stop"]
+
+
+def test_a_sidecar_with_a_startup_probe_holds_back_its_successors(stage):
+    """Without it a simulator would look for a ROS master that does not listen yet."""
+    script = f"event start; sleep 0.3; event ready; touch {stage.folder}/ready; sleep 60"
+    slow = stage.container("slow", script, startup=ready(stage))
+
+    stage.run(slow, stage.sidecar("next"), main="until false; do sleep 0.1; break; done", grace_s=0.2)
+
+    assert stage.events[:3] == ["slow start", "slow ready", "next start"]
+
+
+def test_a_sidecar_that_ends_is_started_again_while_the_pod_lives(stage):
+    """A crash of a sidecar is not the end of a training."""
+    crash = f"event start; [ $(wc -l < {stage.folder}/events) -ge 3 ] && sleep 60; exit 3"
+    until = f"until [ $(wc -l < {stage.folder}/events) -ge 3 ]; do sleep 0.01; done; exit 7"
+
+    code = stage.run(stage.container("flaky", crash), main=until, grace_s=0.2)
+
+    assert code == 7
+    assert stage.events == ["flaky start"] * 3
+
+
+def test_a_sidecar_that_never_gets_ready_ends_the_pod_with_its_last_words(stage):
+    """Nothing waits for ever, and the person is told what the program said."""
+    broken = stage.container("broken", "echo port 11311 is taken; exit 1", startup=ready(stage))
+
+    with pytest.raises(StartFailed, match=r"broken ended 3 times .*: .*port 11311 is taken"):
+        stage.run(broken, main="event run")
+
+    assert stage.events == []
+
+
+def test_a_sidecar_that_hangs_before_it_is_ready_is_given_up_at_the_deadline(stage):
+    """A start that takes for ever is a failure too."""
+    stage.start_deadline_s = 0.3
+    silent = stage.container("silent", "sleep 60", startup=ready(stage))
+
+    with pytest.raises(StartFailed, match=r"silent was not ready within 0.3 s"):
+        stage.run(silent, main="event run", grace_s=0.2)
+
+    assert stage.events == []
+
+
+def test_a_failed_startup_probe_restarts_the_sidecar(stage):
+    """The kubelet's rule: a program that started but does not answer gets another try."""
+    file = stage.folder / "ready"
+    probe = Probe(command=("test", "-e", str(file)), period_s=0.05, timeout_s=10, failure_threshold=4)
+    script = f"event start; [ $(wc -l < {stage.folder}/events) = 2 ] && touch {file}; sleep 60"
+
+    stage.run(stage.container("late", script, startup=probe), main="event run", grace_s=0.1)
+
+    assert stage.events == ["late start", "late start", "main run"]
+
+
+def test_a_failed_liveness_probe_restarts_the_sidecar(stage):
+    """A sidecar that hangs is as bad as one that crashed."""
+    probe = Probe(command=("false",), period_s=0.05, timeout_s=10, failure_threshold=2)
+    until = f"until [ $(wc -l < {stage.folder}/events) -ge 2 ]; do sleep 0.01; done"
+
+    stage.run(stage.container("hung", "event start; sleep 60", liveness=probe), main=until, grace_s=0.1)
+
+    assert stage.events[:2] == ["hung start", "hung start"]
+
+
+def test_an_init_container_that_is_no_sidecar_runs_to_its_end_first(stage):
+    """Copying a program into a volume has to be over before anybody runs it."""
+    copy = stage.container("copy", "sleep 0.1; event done", sidecar=False)
+
+    stage.run(copy, stage.sidecar("a"), main="sleep 0.2; event run")
+
+    assert stage.events[:3] == ["copy done", "a start", "main run"]
+
+
+def test_an_init_container_that_fails_ends_the_pod(stage):
+    """Its successors could not work."""
+    copy = stage.container("copy", "echo no space; exit 4", sidecar=False)
+
+    with pytest.raises(StartFailed, match=r"copy ended with exit code 4: .*no space"):
+        stage.run(copy, main="event run")
+
+    assert stage.events == []
+
+
+def test_stopping_asks_the_trainer_first_and_waits_for_its_checkpoint(stage):
+    """The simulators are needed while the last checkpoint is written."""
+    main = "trap 'sleep 0.2; event saved; exit 75' TERM; event run; while :; do sleep 0.02; done"
+
+    async def interrupted():
+        pod = stage.pod(stage.sidecar("a"), main=main)
+        running = asyncio.create_task(pod.run())
+        while "main run" not in stage.events:
+            await asyncio.sleep(0.01)
+        pod.stop()
+        return await running
+
+    code = asyncio.run(asyncio.wait_for(interrupted(), 20))
+
+    assert code == 75
+    assert stage.events == ["a start", "main run", "main saved", "a stop"]
+
+
+def test_a_trainer_that_does_not_end_is_killed_when_the_grace_period_is_over(stage):
+    """And the sidecars share that period: it is over for them too."""
+    stubborn = "trap '' TERM; event run; while :; do sleep 0.02; done"
+
+    async def interrupted():
+        pod = stage.pod(stage.container("a", stubborn), main=stubborn, grace_s=0.3)
+        running = asyncio.create_task(pod.run())
+        while "main run" not in stage.events:
+            await asyncio.sleep(0.01)
+        pod.stop()
+        return await running
+
+    code = asyncio.run(asyncio.wait_for(interrupted(), 20))
+
+    assert code == 128 + 9
+
+
+def test_a_pod_that_is_stopped_during_its_start_never_starts_the_trainer(stage):
+    """Ctrl-C counts from the first moment."""
+    slow = stage.container("slow", "event start; sleep 60", startup=ready(stage))
+
+    async def interrupted():
+        pod = stage.pod(slow, main="event run", grace_s=0.2)
+        running = asyncio.create_task(pod.run())
+        while not stage.events:
+            await asyncio.sleep(0.01)
+        pod.stop()
+        return await running
+
+    code = asyncio.run(asyncio.wait_for(interrupted(), 20))
+
+    assert code is None
+    assert stage.events == ["slow start"]
+
+
+def test_killing_ends_everything_at_once(stage):
+    """The second Ctrl-C does not wait for anybody."""
+    stubborn = "trap '' TERM; event run; while :; do sleep 0.02; done"
+
+    async def killed():
+        pod = stage.pod(stage.container("a", stubborn), main=stubborn, grace_s=1000)
+        running = asyncio.create_task(pod.run())
+        while "main run" not in stage.events:
+            await asyncio.sleep(0.01)
+        pod.stop()
+        pod.kill()
+        return await running
+
+    code = asyncio.run(asyncio.wait_for(killed(), 20))
+
+    assert code == 128 + 9
+
+
+def test_what_a_container_left_behind_ends_with_the_pod(stage):
+    """A double fork into another session is out of reach for process groups."""
+    leave = "setsid bash -c 'trap \"\" TERM HUP; sleep 300' & disown; event run"
+
+    code = stage.run(main=leave)
+
+    assert code == 0
+
+
+def test_a_program_that_does_not_exist_ends_as_in_a_shell(stage):
+    """Exit code 127 is what people know for it."""
+    pod = stage.pod(main="exec /no/such/program")
+
+    code = asyncio.run(pod.run())
+
+    assert code == 127
+
+
+def test_output_goes_to_a_file_for_each_container(stage):
+    """Also what a crashed life of a container has said."""
+    main = "echo out; echo err >&2"
+
+    stage.run(stage.container("chatty", f"echo hello; {('sleep 60')}"), main=main, grace_s=0.1)
+
+    assert "hello\n" in (stage.folder / "logs" / "chatty.log").read_text()
+    assert {"out", "err"} <= set((stage.folder / "logs" / "main.log").read_text().splitlines())

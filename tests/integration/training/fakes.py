@@ -1,0 +1,92 @@
+"""A trainer whose simulators are fakes in its own process: `fakes.py CONFIG RUN [DEATHS]`.
+
+The same program as `palaestra-train` but for where simulators come from, so
+that signals, exit codes and resuming are tried on a real process. DEATHS are
+the numbers of the steps, separated by commas, at which `collect-0` dies.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+
+import palaestra_trainer.environments  # noqa: F401 - registers MoveToTargetEnv-v0
+from palaestra_trainer import training
+from palaestra_trainer.configuration import Configuration, load
+from palaestra_trainer.logs import configure_logs
+from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.testing import fake_arena
+
+
+class CountedResets(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment that knows how often it was reset."""
+
+    resets = 0
+
+    def reset(self, **options: Any) -> Any:
+        """Count it."""
+        self.resets += 1
+        return super().reset(**options)
+
+
+class FakeSimulator:
+    """A member of a run, without a simulator."""
+
+    def __init__(self, name: str, configuration: Configuration, deaths: Collection[int]) -> None:
+        self.name = name
+        self.log: list[str] = []
+        self.robot, scene = fake_arena(deaths)
+        task = configuration.environment
+        made = gymnasium.make(task.id, robot=self.robot, scene=scene, reward=task.reward, **task.options)
+        self.env = CountedResets(made)
+
+    @property
+    def resets(self) -> int:
+        """Resets since the last restart."""
+        return self.env.resets
+
+    def start(self) -> None:
+        """Begin to live."""
+        self.log.append("start")
+
+    def stop(self) -> None:
+        """Note it."""
+        self.log.append("stop")
+
+    def restart(self) -> None:
+        """Live again."""
+        self.log.append("restart")
+        self.robot.restart()
+        self.env.resets = 0
+
+    def pause(self) -> None:
+        """Note it."""
+        self.log.append("pause")
+
+    def run(self) -> None:
+        """Note it."""
+        self.log.append("run")
+
+
+def make_members(configuration: Configuration, deaths: Collection[int] = ()) -> list[FakeSimulator]:
+    """Return a fake for each simulator; the first one dies at `deaths`."""
+    first = configuration.simulators[0].name
+    return [
+        FakeSimulator(entry.name, configuration, deaths if entry.name == first else ())
+        for entry in configuration.simulators
+    ]
+
+
+def main(config: str, run: str, deaths: str = "") -> int:
+    """Train; return the exit code."""
+    configure_logs()
+    numbers = [int(number) for number in deaths.split(",") if number]
+    return training.run(load(Path(config)), RunDirectory(Path(run)), lambda it: make_members(it, numbers))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

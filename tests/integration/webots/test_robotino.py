@@ -1,0 +1,122 @@
+"""The simulated Robotino over a real simulator."""
+
+import math
+
+import numpy as np
+import pytest
+from palaestra_trainer.errors import NoSuchSensor, WrongData
+from palaestra_trainer.robots import Movement, Pose
+from palaestra_trainer.robots.robotino import Robotino, metres
+
+START = Pose(-1.5, 0.0, 0.0)
+
+
+def test_it_drives_where_it_is_told(arena):
+    """Half a metre a second for a second, less what the motors take to get there."""
+    arena.scene.reset(1, START, (1.0, 0.0))
+
+    arena.robot.move(Movement.FORWARD)
+    for _ in range(5):
+        arena.robot.advance()
+
+    pose = arena.robot.pose()
+    assert -1.1 < pose.x_m < -1.0
+    assert (pose.y_m, pose.heading_rad) == pytest.approx((0.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, -2.5, math.pi])
+def test_a_reset_puts_it_where_the_episode_begins(arena, heading):
+    """Also with the heading 0, whose quaternion Webots refuses."""
+    arena.scene.reset(1, Pose(0.2, -1.5, 2.0), (1.0, 0.0))
+    arena.scene.reset(2, Pose(1.4, 0.1, heading), (0.0, 1.5))
+
+    pose = arena.robot.pose()
+
+    assert (pose.x_m, pose.y_m) == pytest.approx((1.4, 0.1), abs=1e-6)
+    assert math.remainder(pose.heading_rad - heading, 2 * math.pi) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_after_a_reset_it_stands_and_obeys(arena):
+    """A reset takes velocity control away; the facade takes it back."""
+    arena.scene.reset(1, START, (1.0, 0.0))
+    arena.robot.drive(0.5, 0.0, 0.0)
+    arena.robot.advance()
+    arena.scene.reset(2, START, (1.0, 0.0))
+
+    before = arena.robot.pose()
+    arena.robot.advance()
+
+    assert arena.robot.pose() == before
+
+
+def test_the_same_seed_gives_the_same_readings(arena):
+    """The noise of the sensors too."""
+
+    def readings(seed):
+        arena.scene.reset(seed, Pose(-1.0, 0.0, 0.3), (1.0, 0.0))
+        arena.robot.drive(0.3, 0.1, 0.5)
+        return [(arena.robot.advance(), *arena.robot.distances()) for _ in range(10)]
+
+    first, again, other = readings(7), readings(7), readings(8)
+
+    assert first == again
+    assert first != other
+
+
+def test_it_feels_a_wall(arena):
+    """Forward first: the sensor that looks at the wall says so before the bumper does."""
+    arena.scene.reset(1, Pose(1.0, 0.0, 0.0), (-1.0, 0.0))
+    arena.robot.drive(0.5, 0.0, 0.0)
+
+    seen = []
+    while not arena.robot.bumped() and len(seen) < 20:
+        arena.robot.advance()
+        seen.append(float(arena.robot.distances()[0]))
+
+    assert arena.robot.bumped()
+    assert min(seen) < 0.08
+    assert np.argmin(arena.robot.distances()) == 0
+
+
+def test_volts_become_metres_within_the_sensors_range():
+    """The real robot tells metres, so the facade does."""
+    volts = np.array([3.03, 0.82, 0.31, 0.0], dtype=np.float32)
+
+    assert metres(volts) == pytest.approx([0.0327, 0.16, 0.40, 0.40], abs=0.01)
+
+
+def test_it_has_no_camera(arena):
+    """A typed error, so that an environment can do without."""
+    with pytest.raises(NoSuchSensor):
+        arena.robot.color_image()
+
+
+def test_a_lost_wake_up_costs_an_extra_step_and_no_fault(start):
+    """The real controller can sleep through a step that comes too early."""
+    arena = start("--lost-wakeup", "--publish-delay-ms=3")
+
+    extra = [arena.robot.advance() for _ in range(20)]
+
+    assert set(extra) <= {0, 1}
+
+
+def test_a_period_that_is_no_multiple_of_the_step_is_refused(arena):
+    """Webots would never send a message then."""
+    robot = Robotino(arena.webots, period_ms=50)
+
+    with pytest.raises(WrongData, match="refuses a period of 50 ms"):
+        robot.connect()
+
+    robot.close()
+
+
+def test_a_world_with_a_separate_supervisor_works_too(start):
+    """Both robots are stepped together, or the world would wait for ever."""
+    pair = start(world="two_robots", supervisor="supervisor", robot="robotino")
+    pair.scene.reset(1, START, (1.0, 0.0))
+
+    pair.robot.move(Movement.LEFT)
+    for _ in range(5):
+        pair.robot.advance()
+
+    assert 0.4 < pair.robot.pose().y_m < 0.5

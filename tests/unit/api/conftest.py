@@ -1,0 +1,61 @@
+"""The one builder of job files for these tests: what a test names matters, the rest is hidden."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from palaestra.api import validate
+from palaestra.errors import SpecErrors
+
+# How long an example takes says how busy the machine is, not whether a claim holds.
+settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("unhurried")
+
+_GROUPS = [{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}]
+
+
+def _job_data(changes: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Return a job as plain data; each change is a path in `spec`, with dots, and its value."""
+    data: dict[str, Any] = {
+        "apiVersion": "palaestra.dev/v1alpha1",
+        "kind": "TrainingJob",
+        "metadata": {"name": "reach"},
+        "spec": {"simulators": deepcopy(_GROUPS)},
+    }
+    for path, value in (changes or {}).items():
+        *above, last = path.split(".")
+        at: Any = data["spec"]
+        for piece in above:
+            at = at[int(piece)] if piece.isdigit() else at.setdefault(piece, {})
+        at[int(last) if last.isdigit() else last] = value
+    return data
+
+
+@pytest.fixture(scope="session")
+def job_data() -> Callable[..., dict[str, Any]]:
+    """`job_data({"trainer.steps": 0})`: the data of a job with that change."""
+    return _job_data
+
+
+@pytest.fixture(scope="session")
+def problems() -> Callable[..., list[str]]:
+    """`problems({"trainer.steps": 0})`: what is said about a job with that change."""
+
+    def tell(changes: dict[str, Any]) -> list[str]:
+        try:
+            validate(_job_data(changes))
+        except SpecErrors as error:
+            return list(error.problems)
+        return []
+
+    return tell
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The root of the checkout."""
+    return Path(__file__).parents[3]

@@ -1,0 +1,258 @@
+"""The CustomResourceDefinition: structural, bounded, small, and true to the models."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from palaestra.api import TrainingJob, as_data, validate
+from palaestra.api.crd import crd
+from palaestra.api.generated import crd_text
+from palaestra.api.tree import walk
+
+FORBIDDEN = {
+    "$ref", "$defs", "allOf", "anyOf", "oneOf", "not", "title", "const", "examples", "propertyNames",
+    "prefixItems", "patternProperties", "definitions", "uniqueItems", "nullable", "x-may-change",
+}  # fmt: skip
+FROZEN = "cannot be changed; make a new TrainingJob, which may go on with storage.resumeFrom"
+VERSION = crd()["spec"]["versions"][0]
+WHOLE = VERSION["schema"]["openAPIV3Schema"]
+
+
+def schemas(schema: dict[str, Any], path: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield every schema below `schema`, each with its path."""
+    yield path, schema
+    for name, inner in schema.get("properties", {}).items():
+        yield from schemas(inner, f"{path}.{name}".lstrip("."))
+    if "items" in schema:
+        yield from schemas(schema["items"], f"{path}[]")
+    if "additionalProperties" in schema:
+        yield from schemas(schema["additionalProperties"], f"{path}{{}}")
+
+
+ALL = dict(schemas(WHOLE))
+
+
+def rules_of(path: str) -> list[dict[str, str]]:
+    """Return the CEL rules at `path`."""
+    return ALL[path].get("x-kubernetes-validations", [])
+
+
+def frozen(path: str) -> bool:
+    """Return whether the field at `path` must stay as it was."""
+    above, _, name = path.rpartition(".")
+    here = any(rule["message"] == FROZEN for rule in rules_of(path))
+    return here or any(
+        rule["message"] == FROZEN and rule.get("fieldPath") == f".{name}" for rule in rules_of(above)
+    )
+
+
+def test_no_keyword_is_used_that_a_structural_schema_forbids() -> None:
+    """An API server refuses the whole definition for one of them."""
+    assert [path for path, schema in ALL.items() if FORBIDDEN & schema.keys()] == []
+
+
+def test_every_type_is_spelled_out() -> None:
+    """Quantities alone are either of two, with Kubernetes' own mark."""
+    untyped = [path for path, schema in ALL.items() if "type" not in schema]
+
+    assert untyped
+    assert all(ALL[path]["x-kubernetes-int-or-string"] is True for path in untyped)
+
+
+@pytest.mark.parametrize(
+    ("kind", "bounds"),
+    [
+        ("string", {"maxLength", "enum", "format"}),
+        ("array", {"maxItems"}),
+        (None, {"maxLength"}),
+    ],
+)
+def test_every_text_and_list_is_bounded(kind, bounds) -> None:
+    """The cost of a rule is estimated from the largest object that the schema admits."""
+    unbounded = [
+        path for path, schema in ALL.items()
+        if schema.get("type") == kind and not bounds & schema.keys()
+    ]  # fmt: skip
+
+    assert unbounded == []
+
+
+def test_every_map_is_bounded_and_every_object_has_fields() -> None:
+    """An object is known by its fields, or it is a map with a largest size."""
+    loose = [
+        path for path, schema in ALL.items()
+        if schema.get("type") == "object"
+        and "properties" not in schema and "maxProperties" not in schema
+    ]  # fmt: skip
+
+    assert loose == []
+
+
+def test_free_objects_keep_what_an_api_server_does_not_know() -> None:
+    """Hyperparameters would be pruned to nothing otherwise."""
+    free = [path for path, schema in ALL.items()
+            if schema.get("x-kubernetes-preserve-unknown-fields")]  # fmt: skip
+
+    assert free == [
+        "spec.trainer.environment.options",
+        "spec.trainer.algorithm.hyperparameters",
+        "spec.scheduling.affinity",
+    ]
+
+
+def test_every_field_is_described() -> None:
+    """`kubectl explain` is read by people."""
+    fields = [path for path in ALL if path.startswith(("spec", "status"))
+              and not path.endswith(("]", "}"))]  # fmt: skip
+
+    assert [path for path in fields if not ALL[path].get("description")] == []
+
+
+def test_the_definition_is_small_enough_to_be_applied() -> None:
+    """`kubectl apply` keeps a copy in an annotation, which has a largest size."""
+    assert len(crd_text().encode()) < 100_000
+
+
+def test_the_defaults_are_those_of_the_models(job_data) -> None:
+    """A job means the same with and without an API server that fills it in."""
+
+    def filled(schema: dict[str, Any], data: Any) -> Any:
+        if "items" in schema:
+            return [filled(schema["items"], item) for item in data]
+        if not isinstance(data, dict):
+            return data
+        given = {
+            name: inner["default"]
+            for name, inner in schema.get("properties", {}).items()
+            if "default" in inner
+        } | data
+        return {name: filled(schema.get("properties", {}).get(name, {}), value)
+                for name, value in given.items()}  # fmt: skip
+
+    data = filled(WHOLE, job_data())
+
+    expected = as_data(validate(job_data()))
+    assert data["spec"] == expected["spec"]
+
+
+def test_rules_stand_where_the_models_have_them() -> None:
+    """One rule in the models is one rule in the definition, word for word."""
+    for path, model in walk(TrainingJob):
+        at = WHOLE
+        for name in path:
+            at = at["properties"][name]
+            at = at.get("items", at)
+        told = {rule["message"] for rule in at.get("x-kubernetes-validations", [])} - {FROZEN}
+        assert told == {rule.message for rule in model.rules if rule.cel}, path
+
+
+def test_a_rule_names_a_field_that_the_object_has() -> None:
+    """An API server refuses a definition whose rule points at nothing."""
+    for path, schema in ALL.items():
+        for rule in schema.get("x-kubernetes-validations", []):
+            assert f"{path}{rule.get('fieldPath', '')}" in ALL
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "spec.suspend",
+        "spec.activeDeadlineSeconds",
+        "spec.stallDeadlineSeconds",
+        "spec.ttlSecondsAfterFinished",
+        "spec.simulators[].startDeadlineSeconds",
+    ],
+)
+def test_deadlines_ttl_and_suspend_may_change(path) -> None:
+    """They say how long to wait, not what is learned."""
+    assert not frozen(path)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *(
+            f"spec.{name}"
+            for name in ("replicas", "seed", "trainer", "storage", "backoffLimit", "scheduling",
+                         "imagePullSecrets", "managedBy", "simulators")
+        ),
+        *(
+            f"spec.simulators[].{name}"
+            for name in ("name", "role", "count", "image", "driver", "command", "world", "recycle",
+                         "options", "restart", "env", "resources")
+        ),
+    ],
+)  # fmt: skip
+def test_all_else_stays_as_it_was_accepted(path) -> None:
+    """A run that changed half-way could not be explained."""
+    assert frozen(path)
+
+
+def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
+    """A new field has to be decided about."""
+    free = [name for name in ALL["spec"]["properties"] if not frozen(f"spec.{name}")]
+
+    assert free == [
+        "suspend",
+        "activeDeadlineSeconds",
+        "stallDeadlineSeconds",
+        "ttlSecondsAfterFinished",
+    ]
+
+
+def test_groups_cannot_be_added_or_removed() -> None:
+    """Rules on items see only items that were there before."""
+    assert rules_of("spec.simulators")[-1]["rule"] == (
+        "size(self) == size(oldSelf) && self.all(item, oldSelf.exists(old, old.name == item.name))"
+    )
+
+
+def test_lists_of_named_things_are_maps_to_the_api_server() -> None:
+    """It refuses a name that is there twice, and finds an item's old self by its name."""
+    named = {path for path, schema in ALL.items() if schema.get("x-kubernetes-list-type") == "map"}
+
+    assert named == {
+        "spec.simulators",
+        "spec.simulators[].env",
+        "spec.trainer.env",
+        "spec.imagePullSecrets",
+        "status.conditions",
+        "status.replicas",
+    }
+
+
+def test_the_keys_of_such_a_list_are_required() -> None:
+    """An API server refuses the definition otherwise."""
+    for schema in ALL.values():
+        for key in schema.get("x-kubernetes-list-map-keys", []):
+            assert key in schema["items"]["required"]
+
+
+def test_of_the_metadata_only_the_name_is_bounded() -> None:
+    """An API server admits no more there; the name has to leave room for children's names."""
+    assert ALL["metadata"]["properties"].keys() == {"name"}
+    assert ALL["metadata.name"]["maxLength"] == 48
+
+
+def test_columns_show_what_there_is() -> None:
+    """A column with a wrong path stays empty for ever."""
+    for column in VERSION["additionalPrinterColumns"]:
+        path = column["jsonPath"].removeprefix(".")
+        assert path in ALL or path == "metadata.creationTimestamp"
+
+
+def test_the_columns_of_every_day_are_five() -> None:
+    """The others are for `-o wide`."""
+    columns = VERSION["additionalPrinterColumns"]
+
+    assert [column["name"] for column in columns if not column.get("priority")] == [
+        "Status", "Replicas", "Step", "Success", "Age",
+    ]  # fmt: skip
+
+
+def test_status_is_written_apart_and_the_short_name_is_tj() -> None:
+    """Who may edit a job may not edit what is told about it."""
+    assert VERSION["subresources"] == {"status": {}}
+    assert crd()["spec"]["names"]["shortNames"] == ["tj"]
+    assert crd()["metadata"]["name"] == "trainingjobs.palaestra.dev"

@@ -1,0 +1,178 @@
+"""All the mistakes of a job file, at once: what is told, what is not repeated, what is hidden."""
+
+import pytest
+
+from palaestra.api import load, validate
+from palaestra.errors import PalaestraError, SpecErrors, TrainingJobError
+
+FIVE_MISTAKES = """\
+apiVersion: palaestra.dev/v1alpha1
+kind: TrainingJob
+metadata:
+  name: Five_Mistakes
+spec:
+  replicas: "2"
+  simulators:
+    - {name: collect, role: Collect, world: {builtin: arena, file: /hall.wbt}}
+    - {name: evaluate, role: Eval}
+  trainer:
+    stepps: 1000
+"""
+
+
+def told(text: str) -> tuple[str, ...]:
+    """Return what is said about a wrong job file."""
+    with pytest.raises(SpecErrors) as caught:
+        load(text, "job.yaml")
+    return caught.value.problems
+
+
+def test_five_mistakes_are_five_lines() -> None:
+    """Nobody wants to run a program five times to find five mistakes."""
+    assert told(FIVE_MISTAKES) == (
+        (
+            'metadata.name: "Five_Mistakes" is not a name; '
+            "use a-z first, then a-z, 0-9 and '-', no '-' at the end"
+        ),
+        'spec.replicas: "2" is text; write a whole number without quotes',
+        'spec.simulators[1].role: "Eval" is not a role; use Collect or Evaluate',
+        "spec.trainer.stepps: is not a field; did you mean steps?",
+        (
+            "spec.simulators[0].world: needs exactly one of inline, configMap, builtin and file; "
+            "give one of them"
+        ),
+    )
+
+
+def test_the_error_reads_as_its_lines() -> None:
+    """A program that prints the error prints one line a mistake."""
+    error = SpecErrors("job.yaml", ("a: is wrong; mend it", "b: too; also"))
+
+    assert str(error) == "a: is wrong; mend it\nb: too; also"
+    assert isinstance(error, TrainingJobError)
+    assert isinstance(error, PalaestraError)
+    assert isinstance(error, ValueError)
+
+
+def test_a_rule_is_not_judged_on_a_field_that_is_wrong(problems) -> None:
+    """Whether one collects cannot be said while its role is none."""
+    assert problems({"simulators": [{"name": "a", "role": "collects"}]}) == [
+        'spec.simulators[0].role: "collects" is not a role; use Collect or Evaluate'
+    ]
+
+
+def test_a_rule_is_judged_when_only_other_fields_are_wrong(problems) -> None:
+    """A wrong count says nothing about the roles."""
+    group = {"name": "a", "role": "Evaluate", "startDeadlineSeconds": 0}
+
+    assert problems({"simulators": [group]}) == [
+        "spec.simulators[0].startDeadlineSeconds: 0 is less than 1; use 1 or more",
+        "spec.simulators: none of them collects; add a group with role Collect",
+    ]
+
+
+def test_a_rule_keeps_its_place_when_earlier_items_are_wrong(problems) -> None:
+    """Items are counted as their author counts them."""
+    groups = [
+        "nonsense",
+        {"name": "a", "role": "nonsense"},
+        {"name": "b", "role": "Collect", "world": {}},
+    ]
+
+    assert problems({"simulators": groups})[-1].startswith("spec.simulators[2].world: needs")
+
+
+def test_rules_of_the_spec_are_judged_under_a_wrong_name(job_data) -> None:
+    """The metadata has nothing to do with them."""
+    data = job_data({"suspend": True, "scheduling.queueName": "robots"})
+    data["metadata"] = {"name": "-"}
+
+    with pytest.raises(SpecErrors) as caught:
+        validate(data)
+
+    assert [line.split(":")[0] for line in caught.value.problems] == [
+        "metadata.name",
+        "spec.suspend",
+    ]
+
+
+def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> None:
+    """What is seen only in the second look is told as well."""
+    groups = [
+        {"name": "a", "role": "Collect", "count": 0},
+        {"name": "a", "role": "Evaluate"},
+    ]
+
+    assert problems({"simulators": groups}) == [
+        "spec.simulators[0].count: 0 is less than 1; use 1 or more",
+        'spec.simulators: "a" is the name of two of them; give each its own',
+    ]
+
+
+def test_no_simulators_is_not_the_same_as_nothing_said(problems) -> None:
+    """An empty list is somebody's mistake; a missing one is nobody's."""
+    assert problems({"simulators": []}) == ["spec.simulators: has no entry; give one or remove the line"]
+
+
+@pytest.mark.parametrize("key", ["apiVersion", "kind", "metadata", "spec"])
+def test_what_every_object_needs_is_asked_for(key, job_data) -> None:
+    """A file that kubectl refuses is refused here too."""
+    data = job_data()
+    del data[key]
+
+    with pytest.raises(SpecErrors, match=f"^{key}: is missing; add"):
+        validate(data)
+
+
+def test_another_kind_of_object_is_told_as_one(job_data) -> None:
+    """A Deployment has a hundred fields that are not ours; none of them is the mistake."""
+    data = {**job_data(), "apiVersion": "apps/v1", "kind": "Deployment", "spec": {"template": {}}}
+
+    with pytest.raises(SpecErrors) as caught:
+        validate(data)
+
+    assert caught.value.problems == (
+        'apiVersion: "apps/v1" is not known; use palaestra.dev/v1alpha1',
+        'kind: "Deployment" is not known; use TrainingJob',
+    )
+
+
+def test_a_wrong_version_alone_hides_nothing(job_data) -> None:
+    """Then it is meant as a TrainingJob."""
+    data = {**job_data({"replicas": 0}), "apiVersion": "palaestra.dev/v1"}
+
+    with pytest.raises(SpecErrors) as caught:
+        validate(data)
+
+    assert caught.value.problems == (
+        'apiVersion: "palaestra.dev/v1" is not known; use palaestra.dev/v1alpha1',
+        "spec.replicas: 0 is less than 1; use 1 or more",
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("", "the document is empty"),
+        ("# nothing\n", "the document is empty"),
+        ("- a\n- b\n", "the document is a list, not a mapping"),
+        ("just words", 'the document is "just words", not a mapping'),
+    ],
+)
+def test_a_document_that_is_no_mapping_is_refused(text, fact) -> None:
+    """The file's own name stands where a field's path would."""
+    assert told(text) == (f"job.yaml: {fact}; begin it with apiVersion: palaestra.dev/v1alpha1",)
+
+
+def test_a_file_that_is_no_yaml_is_told_with_its_place() -> None:
+    """Line and column, both from 1."""
+    problem = told("spec:\n  trainer: [1, 2\n")[0]
+
+    assert problem.startswith("job.yaml:3:1: not YAML: ")
+
+
+def test_snake_case_is_refused_as_in_a_cluster() -> None:
+    """What works on a laptop only is a trap."""
+    text = FIVE_MISTAKES.replace("stepps: 1000", "evaluation: {every_steps: 100}")
+
+    assert "spec.trainer.evaluation.every_steps: is not a field; did you mean everySteps?" in told(text)

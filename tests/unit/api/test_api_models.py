@@ -1,0 +1,143 @@
+"""What a TrainingJob is when its author says little: the defaults, and what is absent."""
+
+import pytest
+from pydantic import ValidationError
+
+from palaestra.api import Driver, Metadata, Role, SimulatorGroup, Spec, TrainingJob, validate
+
+
+@pytest.fixture
+def least(job_data) -> TrainingJob:
+    """A job whose author said nothing but two groups."""
+    return validate(job_data())
+
+
+def test_a_job_without_a_spec_collects_and_evaluates() -> None:
+    """The smallest job that learns anything has one simulator for each."""
+    job = TrainingJob(metadata=Metadata(name="least"), spec=Spec())
+
+    assert [(group.name, group.role, group.count) for group in job.spec.simulators] == [
+        ("collect", Role.COLLECT, 1),
+        ("evaluate", Role.EVALUATE, 1),
+    ]
+
+
+def test_a_group_is_of_stubs_in_the_arena(least) -> None:
+    """Nothing has to be installed for a first run."""
+    group = least.spec.simulators[0]
+
+    assert group.driver is Driver.STUB
+    assert group.world.builtin == "arena"
+    assert (group.image, group.command, group.options, group.env) == (None, (), (), ())
+
+
+def test_simulators_are_expected_to_fail_sometimes(least) -> None:
+    """Recycled before they leak, restarted ten times in ten minutes, a minute to come up."""
+    group = least.spec.simulators[0]
+
+    assert group.recycle.after_resets == 24
+    assert (group.restart.limit, group.restart.within_seconds) == (10, 600)
+    assert group.start_deadline_seconds == 60
+
+
+def test_the_trainer_learns_to_move_to_the_target(least) -> None:
+    """The task that ships, with the algorithm that is shown to solve it."""
+    trainer = least.spec.trainer
+
+    assert (trainer.environment.id, trainer.environment.reward) == ("MoveToTargetEnv-v0", "Dense")
+    assert (trainer.algorithm.name, trainer.steps) == ("DQN", 50_000)
+    assert (trainer.evaluation.every_steps, trainer.evaluation.episodes) == (2500, 20)
+    assert (trainer.checkpoint.every_steps, trainer.checkpoint.keep) == (5000, 3)
+
+
+def test_what_was_not_said_is_absent(least) -> None:
+    """None means that the release, the cluster or nobody decides; it is never a made-up value."""
+    spec = least.spec
+
+    assert (spec.trainer.image, spec.trainer.evaluation.stop_at_success_rate) == (None, None)
+    assert (spec.active_deadline_seconds, spec.ttl_seconds_after_finished) == (None, None)
+    assert (spec.storage.storage_class_name, spec.storage.existing_claim) == (None, None)
+    assert (spec.scheduling.queue_name, spec.managed_by) == (None, None)
+
+
+def test_a_run_is_kept_and_tried_again(least) -> None:
+    """Hours of training outlive the job, and three failures."""
+    spec = least.spec
+
+    assert (spec.storage.size, spec.storage.retain, spec.storage.ephemeral) == (
+        "1Gi", "Keep", False,
+    )  # fmt: skip
+    assert (spec.backoff_limit, spec.stall_deadline_seconds, spec.suspend) == (3, 600, False)
+
+
+def test_a_job_lies_in_the_namespace_default_and_has_no_uid(least) -> None:
+    """Only a cluster gives a uid."""
+    assert (least.metadata.namespace, least.metadata.uid) == ("default", None)
+
+
+def test_nobody_has_told_anything_about_a_new_job(least) -> None:
+    """A status is what was observed, so a job that was only read has none."""
+    status = least.status
+
+    assert (status.phase, status.observed_generation, status.start_time) == (None, None, None)
+    assert (status.conditions, status.replicas) == ((), ())
+
+
+def test_a_job_cannot_be_edited(least) -> None:
+    """A plan made from it must stay true."""
+    with pytest.raises(ValidationError, match="frozen"):
+        least.spec.replicas = 2
+
+
+def test_names_in_python_are_written_in_snake_case() -> None:
+    """YAML has camelCase, Python its own; both name the same field."""
+    group = SimulatorGroup(name="collect", role=Role.COLLECT, start_deadline_seconds=5)
+
+    assert group.model_dump(by_alias=True)["startDeadlineSeconds"] == 5
+
+
+@pytest.mark.parametrize(("written", "read"), [(2, "2"), ("500m", "500m"), ("0.5", "0.5"), ("1Gi", "1Gi")])
+def test_a_quantity_is_a_whole_number_or_a_text(written, read, job_data) -> None:
+    """As in a pod, `cpu: 2` needs no quotes."""
+    job = validate(job_data({"trainer.resources": {"limits": {"cpu": written}}}))
+
+    assert job.spec.trainer.resources.limits == {"cpu": read}
+
+
+def test_a_status_is_read_with_its_times_and_replicas(job_data) -> None:
+    """What the operator wrote is understood by whoever reads the job back."""
+    seen = "2026-01-31T12:00:00Z"
+    replica = {
+        "index": 0,
+        "phase": "Running",
+        "attempt": 2,
+        "step": 2500,
+        "target": 50_000,
+        "successRate": 0.4,
+        "lastCheckpoint": {"step": 2000, "time": seen},
+        "simulators": [{"name": "collect-0", "role": "Collect", "state": "ready", "restarts": 1}],
+        "restarts": {"trainer": 1, "simulator": 1, "disruption": 0},
+    }
+    condition = {
+        "type": "Running",
+        "status": "True",
+        "reason": "TrainersRun",
+        "message": "1 of 1 replicas runs",
+        "lastTransitionTime": seen,
+    }
+    status = {"phase": "Running", "startTime": seen, "conditions": [condition]}
+
+    job = validate(job_data() | {"status": {**status, "replicas": [replica]}})
+
+    assert job.status.start_time is not None
+    assert job.status.start_time.year == 2026
+    assert job.status.replicas[0].restarts.trainer == 1
+    assert job.status.replicas[0].simulators[0].last_fault is None
+
+
+def test_what_an_api_server_adds_to_the_metadata_is_passed_over(job_data) -> None:
+    """A job read back from a cluster is still a job file."""
+    data = job_data()
+    data["metadata"] |= {"uid": "5a0c", "generation": 3, "managedFields": [], "finalizers": []}
+
+    assert validate(data).metadata.uid == "5a0c"

@@ -1,0 +1,83 @@
+"""Paths of fields, and data with parts taken away."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.api import TrainingJob
+from palaestra.api.container import Variable
+from palaestra.api.paths import Pruned, shown
+from palaestra.api.simulators import World
+from palaestra.api.tree import model_at, walk
+
+
+@pytest.mark.parametrize(
+    ("path", "text"),
+    [
+        (("spec", "simulators", 1, "role"), "spec.simulators[1].role"),
+        (("metadata", "labels", "a.b/c"), 'metadata.labels["a.b/c"]'),
+        (('say "x"',), '["say \\"x\\""]'),
+        ((), ""),
+    ],
+)
+def test_a_path_is_shown_as_a_person_writes_it(path, text) -> None:
+    """Dots between words, numbers in brackets, the rest quoted."""
+    assert shown(path) == text
+
+
+def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:
+    """A mistake in the third group stays one in the third."""
+    pruned = Pruned({"groups": ["a", "b", {"role": "c"}]})
+
+    pruned.take(("groups", 0))
+
+    assert pruned.data() == {"groups": ["b", {"role": "c"}]}
+    assert pruned.original(("groups", 1, "role")) == ("groups", 2, "role")
+
+
+def test_what_is_not_there_cannot_be_taken() -> None:
+    """The caller then takes what it is missing from."""
+    pruned = Pruned({"a": {"b": 1}})
+
+    assert not pruned.take(("a", "c"))
+    assert not pruned.take(("x", "y"))
+    assert not pruned.take(("a", "b", "c"))
+    assert pruned.data() == {"a": {"b": 1}}
+
+
+def test_a_stand_in_is_put_once() -> None:
+    """A second time would mean that the stand-in is wrong itself."""
+    pruned = Pruned({"metadata": 3})
+
+    assert pruned.take(("metadata",), {"name": "stand-in"})
+    assert not pruned.take(("metadata",), {"name": "stand-in"})
+    assert pruned.data() == {"metadata": {"name": "stand-in"}}
+
+
+JSON = st.recursive(
+    st.integers(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
+    max_leaves=8,
+)
+
+
+@given(JSON)
+def test_nothing_taken_is_everything_left(data) -> None:
+    """Pruning starts from the very same data."""
+    assert Pruned(data).data() == data
+
+
+def test_the_model_at_a_path_is_found_through_lists() -> None:
+    """Nearest names are looked for where the mistake is."""
+    assert model_at(TrainingJob, ("spec", "simulators", 3, "world")) is World
+    assert model_at(TrainingJob, ("spec", "trainer", "env", 0)) is Variable
+    assert model_at(TrainingJob, ("spec", "seed")) is None
+    assert model_at(TrainingJob, ("spec", "nowhere", "else")) is None
+
+
+def test_the_tree_of_models_begins_with_the_job_itself() -> None:
+    """And reaches the smallest part of it."""
+    paths = [path for path, _ in walk(TrainingJob)]
+
+    assert paths[0] == ()
+    assert ("spec", "simulators", "env", "secretKeyRef") in paths

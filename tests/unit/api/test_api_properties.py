@@ -1,0 +1,201 @@
+"""Any job survives being written and read; any mutilated job is refused in words."""
+
+import re
+from copy import deepcopy
+
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.api import as_data, dump, load, validate
+from palaestra.errors import SpecErrors
+
+NAMES = st.from_regex(r"[a-z][a-z0-9]{0,8}", fullmatch=True)
+COUNTS = st.integers(1, 10_000)
+TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+FREE = st.dictionaries(
+    NAMES, st.integers() | NUMBERS | TEXTS | st.booleans() | st.lists(NUMBERS, max_size=3),
+    max_size=4,
+)  # fmt: skip
+VARIABLES = st.lists(
+    st.fixed_dictionaries({"name": NAMES, "value": TEXTS})
+    | st.fixed_dictionaries(
+        {"name": NAMES, "secretKeyRef": st.fixed_dictionaries({"name": NAMES, "key": NAMES})}
+    ),
+    max_size=3,
+    unique_by=lambda variable: variable["name"],
+)
+QUANTITIES = st.sampled_from([1, 8, "500m", "0.5", "512Mi", "2Gi"])
+RESOURCES = st.fixed_dictionaries(
+    {}, optional={"limits": st.dictionaries(st.sampled_from(["cpu", "memory"]), QUANTITIES)}
+)
+WORLDS = st.sampled_from(
+    [
+        {"builtin": "arena"},
+        {"inline": "#VRML_SIM R2023b utf8\nWorldInfo { }\n"},
+        {"configMap": {"name": "worlds", "key": "hall.wbt"}},
+        {"file": "/worlds/hall.wbt"},
+    ]
+)
+DRIVERS = st.sampled_from(
+    [{"driver": "stub"}, {"driver": "webots", "image": "webots:1"},
+     {"driver": "command", "image": "mine:1", "command": ["simulate", "no", "5e-4"]}]
+)  # fmt: skip
+
+
+def groups(role: str) -> st.SearchStrategy[dict]:
+    """Return groups of one role, named after it."""
+    optional = {
+        "count": st.integers(1, 16),
+        "world": WORLDS,
+        "recycle": st.fixed_dictionaries({}, optional={"afterResets": COUNTS}),
+        "restart": st.fixed_dictionaries({}, optional={"limit": st.integers(0, 9)}),
+        "startDeadlineSeconds": COUNTS,
+        "env": VARIABLES,
+        "resources": RESOURCES,
+        "options": st.lists(TEXTS.filter(bool), max_size=3),
+    }
+    fixed = st.fixed_dictionaries({"name": st.just(role.lower()), "role": st.just(role)}, optional=optional)
+    return st.builds(lambda group, driver: group | driver, fixed, DRIVERS)
+
+
+TRAINERS = st.fixed_dictionaries(
+    {},
+    optional={
+        "environment": st.fixed_dictionaries(
+            {}, optional={"reward": st.sampled_from(["Dense", "Sparse"]), "options": FREE}
+        ),
+        "algorithm": st.fixed_dictionaries(
+            {"name": st.sampled_from(["DQN", "PPO", "A2C", "REINFORCE"])},
+            optional={"hyperparameters": FREE},
+        ),
+        "steps": COUNTS,
+        "evaluation": st.fixed_dictionaries(
+            {}, optional={"everySteps": COUNTS, "stopAtSuccessRate": st.floats(0.01, 1)}
+        ),
+        "command": st.lists(TEXTS.filter(bool), max_size=3),
+        "env": VARIABLES,
+        "resources": RESOURCES,
+    },
+)
+SPECS = st.fixed_dictionaries(
+    {"simulators": st.tuples(groups("Collect"), groups("Evaluate")).map(list)},
+    optional={
+        "replicas": st.integers(1, 100),
+        "seed": COUNTS,
+        "trainer": TRAINERS,
+        "storage": st.sampled_from(
+            [{"ephemeral": True}, {"size": "2Gi"}, {"existingClaim": "a", "resumeFrom": "b"}]
+        ),
+        "suspend": st.booleans(),
+        "activeDeadlineSeconds": COUNTS,
+        "scheduling": st.fixed_dictionaries(
+            {}, optional={"nodeSelector": st.dictionaries(NAMES, NAMES, max_size=3), "affinity": FREE}
+        ),
+        "imagePullSecrets": st.just([{"name": "pull"}]),
+    },
+)
+JOBS = st.fixed_dictionaries(
+    {
+        "apiVersion": st.just("palaestra.dev/v1alpha1"),
+        "kind": st.just("TrainingJob"),
+        "metadata": st.fixed_dictionaries(
+            {"name": NAMES}, optional={"labels": st.dictionaries(NAMES, NAMES, max_size=3)}
+        ),
+        "spec": SPECS,
+    }
+)
+RUBBISH = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner,
+                                                                max_size=3),
+    max_leaves=6,
+)  # fmt: skip
+
+LINE = re.compile(r"""(\w+|\[").*?: .+; .+""")  # on one line: `.` is no line break
+
+
+def told(data: object) -> tuple[str, ...] | None:
+    """Return what is said about a wrong job, as text or as data; None when it is right."""
+    try:
+        load(data, "job.yaml") if isinstance(data, str) else validate(data)
+    except SpecErrors as error:
+        return error.problems
+    return None
+
+
+def well_told(problems: tuple[str, ...]) -> bool:
+    """Return whether there are lines, and each has a path, a fact and a remedy."""
+    return bool(problems) and all(LINE.fullmatch(line) for line in problems)
+
+
+@given(JOBS)
+def test_a_job_is_the_same_after_writing_and_reading(data) -> None:
+    """What `palaestra` writes down is the job that was run."""
+    job = validate(data)
+
+    assert load(dump(job), "job.yaml") == job
+
+
+@given(JOBS)
+def test_defaults_are_resolved_once(data) -> None:
+    """The job with its defaults written out is the same job."""
+    resolved = as_data(validate(data))
+
+    assert as_data(validate(resolved)) == resolved
+
+
+@given(JOBS)
+def test_a_job_does_not_change_what_it_was_read_from(data) -> None:
+    """The caller's data is the caller's."""
+    before = deepcopy(data)
+
+    validate(data)
+
+    assert data == before
+
+
+def places(data: object) -> list[tuple]:
+    """Return the containers and keys of everything in `data`."""
+    if isinstance(data, dict):
+        return [(data, key) for key in data] + [p for v in data.values() for p in places(v)]
+    if isinstance(data, list):
+        return [(data, index) for index in range(len(data))] + [p for v in data for p in places(v)]
+    return []
+
+
+@given(JOBS, st.data())
+def test_a_mutilated_job_is_accepted_or_refused_in_words(job, draw) -> None:
+    """Whatever is put anywhere: path, fact and remedy, and no other error."""
+    data = deepcopy(job)
+    for _ in range(draw.draw(st.integers(1, 3))):
+        holder, key = draw.draw(st.sampled_from(places(data)))
+        if isinstance(holder, dict) and draw.draw(st.booleans()):
+            key = draw.draw(st.text(max_size=8))
+        holder[key] = draw.draw(RUBBISH)
+
+    problems = told(data)
+
+    assert problems is None or well_told(problems), problems
+
+
+@given(JOBS, st.data())
+def test_whatever_is_taken_from_a_job_file_the_reader_copes(job, draw) -> None:
+    """Half a file is what an editor leaves after a crash."""
+    text = yaml.safe_dump(job)
+    start = draw.draw(st.integers(0, len(text)))
+    end = draw.draw(st.integers(start, len(text)))
+
+    problems = told(text[:start] + text[end:])
+
+    assert problems is None or well_told(problems), problems
+
+
+@given(RUBBISH.filter(lambda data: not isinstance(data, str)))
+def test_rubbish_is_refused(data) -> None:
+    """No value that is not a TrainingJob passes for one."""
+    problems = told(data)
+
+    assert problems is not None
+    assert well_told(problems), problems

@@ -1,0 +1,260 @@
+"""Every rule: the change that breaks it, the line that says so, and that its CEL twin is sound.
+
+Break a rule here and the API server refuses the same job with the same sentence: the expression
+and the check stand beside one another in the models.
+"""
+
+import re
+
+import pytest
+from pydantic import ValidationError
+
+from palaestra.api import TrainingJob, World
+from palaestra.api.tree import fields_of, walk
+
+COMMAND = {"name": "collect", "role": "Collect", "driver": "command"}
+
+# What breaks each rule, and the one line that is said about it.
+BROKEN = {
+    "no group collects": (
+        {"simulators": [{"name": "evaluate", "role": "Evaluate"}]},
+        "spec.simulators: none of them collects; add a group with role Collect",
+    ),
+    "too many simulators for a pod": (
+        {
+            "simulators": [
+                {"name": "a", "role": "Collect", "count": 16},
+                {"name": "b", "role": "Evaluate", "count": 16},
+                {"name": "c", "role": "Evaluate"},
+            ]
+        },
+        "spec.simulators: more than 32 simulators in one pod; lower the counts or use replicas",
+    ),
+    "nothing evaluates": (
+        {"simulators": [{"name": "collect", "role": "Collect"}]},
+        (
+            "spec.trainer.evaluation: no simulator evaluates; "
+            "add a group with role Evaluate, or set everySteps: 0"
+        ),
+    ),
+    "suspended by two": (
+        {"suspend": True, "scheduling.queueName": "robots"},
+        "spec.suspend: Kueue suspends a job that has a queueName; remove one of them",
+    ),
+    "a driver without its command": (
+        {"simulators.0.driver": "command", "simulators.0.image": "mine:1"},
+        "spec.simulators[0].command: belongs to driver command, which needs one; set both or neither",
+    ),
+    "a command without its driver": (
+        {"simulators.0.command": ["simulate"]},
+        "spec.simulators[0].command: belongs to driver command, which needs one; set both or neither",
+    ),
+    "a program in no image": (
+        {"simulators.0.driver": "command", "simulators.0.command": ["simulate"]},
+        (
+            "spec.simulators[0].image: driver command has no image of its own; "
+            "name the one that holds your program"
+        ),
+    ),
+    "two worlds": (
+        {"simulators.1.world": {"builtin": "arena", "file": "/worlds/hall.wbt"}},
+        (
+            "spec.simulators[1].world: needs exactly one of inline, configMap, builtin and file; "
+            "give one of them"
+        ),
+    ),
+    "no world": (
+        {"simulators.1.world": {}},
+        (
+            "spec.simulators[1].world: needs exactly one of inline, configMap, builtin and file; "
+            "give one of them"
+        ),
+    ),
+    "a variable with two values": (
+        {"trainer.env": [{"name": "A", "value": "1", "secretKeyRef": {"name": "keys", "key": "a"}}]},
+        "spec.trainer.env[0]: has both or neither of value and secretKeyRef; give one of them",
+    ),
+    "a variable that is ours": (
+        {"simulators.0.env": [{"name": "ROS_MASTER_URI", "value": "http://elsewhere"}]},
+        (
+            "spec.simulators[0].env[0].name: names beginning with PALAESTRA_ or ROS_ "
+            "are set by Palaestra; choose another"
+        ),
+    ),
+    "an evaluation that never is": (
+        {"trainer.evaluation": {"everySteps": 0, "stopAtSuccessRate": 0.9}},
+        (
+            "spec.trainer.evaluation.stopAtSuccessRate: nothing is evaluated while everySteps is 0; "
+            "remove it or evaluate"
+        ),
+    ),
+    "SAC with movements": (
+        {"trainer.algorithm.name": "SAC"},
+        (
+            "spec.trainer.algorithm.name: SAC needs continuous actions; "
+            "set environment.options.actions: continuous"
+        ),
+    ),
+    "DQN with twists": (
+        {"trainer.environment.options": {"actions": "continuous"}},
+        "spec.trainer.algorithm.name: DQN needs discrete actions; set environment.options.actions: discrete",
+    ),
+    "a claim for what is kept nowhere": (
+        {"storage": {"ephemeral": True, "existingClaim": "runs"}},
+        "spec.storage.ephemeral: excludes existingClaim; remove one of them",
+    ),
+    "a class for what is kept nowhere": (
+        {"storage": {"ephemeral": True, "storageClassName": "fast"}},
+        "spec.storage.ephemeral: excludes storageClassName, as no claim is made; remove one of them",
+    ),
+    "a class for a claim that is there": (
+        {"storage": {"existingClaim": "runs", "storageClassName": "fast"}},
+        "spec.storage.storageClassName: an existing claim has its class already; remove it or existingClaim",
+    ),
+    "somebody else's claim deleted": (
+        {"storage": {"existingClaim": "runs", "retain": "Delete"}},
+        "spec.storage.retain: a claim that was there before the job is never deleted with it; use Keep",
+    ),
+    "resumed from nowhere": (
+        {"storage.resumeFrom": "5a0c"},
+        "spec.storage.resumeFrom: needs existingClaim; name the claim that holds the run",
+    ),
+    "a label that is ours": (
+        {"scheduling.podLabels": {"palaestra.dev/job": "other"}},
+        (
+            "spec.scheduling.podLabels: keys of palaestra.dev and kueue.x-k8s.io "
+            "are set by Palaestra; remove them"
+        ),
+    ),
+    "an annotation that is Kueue's": (
+        {"scheduling.podAnnotations": {"kueue.x-k8s.io/queue": "other"}},
+        (
+            "spec.scheduling.podAnnotations: keys of palaestra.dev and kueue.x-k8s.io "
+            "are set by Palaestra; remove them"
+        ),
+    ),
+    "a toleration of what": (
+        {"scheduling.tolerations": [{"value": "gpu"}]},
+        "spec.scheduling.tolerations[0].key: is missing; name the taint's key, or use operator Exists",
+    ),
+    "a toleration of any value and one": (
+        {"scheduling.tolerations": [{"key": "gpu", "operator": "Exists", "value": "a100"}]},
+        "spec.scheduling.tolerations[0].value: operator Exists compares no value; remove it or use Equal",
+    ),
+    "a toleration that ends without an effect": (
+        {"scheduling.tolerations": [{"key": "gpu", "tolerationSeconds": 60}]},
+        (
+            "spec.scheduling.tolerations[0].tolerationSeconds: belongs to effect NoExecute; "
+            "set that effect or remove it"
+        ),
+    ),
+}
+
+# Their neighbours that are right: the same fields, in accord.
+KEPT = {
+    "no evaluation at all": {
+        "simulators": [{"name": "collect", "role": "Collect"}],
+        "trainer.evaluation": {"everySteps": 0},
+    },
+    "as many as a pod takes": {
+        "simulators": [
+            {"name": "a", "role": "Collect", "count": 16},
+            {"name": "b", "role": "Evaluate", "count": 16},
+        ]
+    },
+    "suspended by its author": {"suspend": True},
+    "suspended by Kueue": {"scheduling.queueName": "robots"},
+    "a program of one's own": {
+        "simulators.0": {**COMMAND, "image": "mine:1", "command": ["simulate", "--fast"]}
+    },
+    "a world in the image": {"simulators.0.world": {"file": "/worlds/hall.wbt"}},
+    "a world in the job": {"simulators.0.world": {"inline": "#VRML_SIM R2023b utf8\n"}},
+    "a world in a ConfigMap": {"simulators.0.world": {"configMap": {"name": "worlds", "key": "hall.wbt"}}},
+    "an empty variable": {"trainer.env": [{"name": "A", "value": ""}]},
+    "a secret variable": {"trainer.env": [{"name": "A", "secretKeyRef": {"name": "keys", "key": "a"}}]},
+    "a variable that is nearly ours": {"trainer.env": [{"name": "MY_ROS_", "value": "1"}]},
+    "SAC with twists": {
+        "trainer.algorithm.name": "SAC",
+        "trainer.environment.options": {"actions": "continuous"},
+    },
+    "SAC in a task that we do not know": {
+        "trainer.algorithm.name": "SAC",
+        "trainer.environment.id": "mine:Hall-v1",
+    },
+    "PPO with twists": {
+        "trainer.algorithm.name": "PPO",
+        "trainer.environment.options": {"actions": "continuous"},
+    },
+    "kept nowhere": {"storage.ephemeral": True},
+    "another job's run": {"storage": {"existingClaim": "runs", "resumeFrom": "5a0c"}},
+    "any taint": {"scheduling.tolerations": [{"operator": "Exists"}]},
+    "a taint for a minute": {
+        "scheduling.tolerations": [{"key": "gpu", "effect": "NoExecute", "tolerationSeconds": 60}]
+    },
+}
+
+
+# Every model with its rules, once, by a readable name.
+RULES = {
+    f"{model.__name__}.{rule.field}: {rule.message}": (model, rule)
+    for _, model in walk(TrainingJob)
+    for rule in model.rules
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_rule_is_told_in_one_line(name, problems) -> None:
+    """Path, fact and remedy, and nothing that merely follows from it."""
+    changes, line = BROKEN[name]
+
+    assert problems(changes) == [line]
+
+
+@pytest.mark.parametrize("name", KEPT)
+def test_what_keeps_the_rules_is_accepted(name, problems) -> None:
+    """A rule forbids no more than its sentence says."""
+    assert problems(KEPT[name]) == []
+
+
+def test_every_rule_is_broken_by_an_example_here() -> None:
+    """A rule that nobody has seen fail is a guess."""
+    told = {line.split(": ", 1)[1] for _, line in BROKEN.values()}
+
+    assert {rule.message for _, rule in RULES.values()} == told
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_a_rule_reads_only_fields_that_there_are(name) -> None:
+    """A renamed field must not leave its old name behind in an expression."""
+    model, rule = RULES[name]
+    known = {field for _, below in walk(model) for field in fields_of(below)}
+
+    read = re.findall(r"\b(?:self|group)((?:[.]\w+)+)\b(?!\()", rule.cel)
+
+    assert {piece for path in read for piece in path.split(".")} - {""} <= known
+    assert set(rule.field.split(".")) - {""} <= known
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_a_rule_is_one_fact_and_one_remedy(name) -> None:
+    """Two halves, the second told as a thing to do, no full stop."""
+    message = RULES[name][1].message
+
+    fact, remedy = message.split("; ")
+
+    assert fact
+    assert remedy[0].islower()
+    assert not message.endswith(".")
+
+
+def test_only_what_lies_in_options_has_no_expression() -> None:
+    """An API server cannot look into free objects; everything else it judges itself."""
+    without = [rule.message for _, rule in RULES.values() if not rule.cel]
+
+    assert sorted(message.split()[0] for message in without) == ["DQN", "SAC"]
+
+
+def test_a_job_built_in_python_keeps_the_rules_too() -> None:
+    """The rules belong to the models, not to the reading of files."""
+    with pytest.raises(ValidationError, match="needs exactly one of inline"):
+        World()

@@ -1,0 +1,178 @@
+"""Each kind of mistake in a field, and the sentence that its author reads."""
+
+import pytest
+
+from palaestra.api import validate
+from palaestra.errors import SpecErrors
+
+LONG = "x" * 2000
+
+SENTENCES = [
+    # A value outside its choice.
+    ({"simulators.1.role": "Eval"},
+     'spec.simulators[1].role: "Eval" is not a role; use Collect or Evaluate'),
+    ({"simulators.0.driver": "gazebo"},
+     'spec.simulators[0].driver: "gazebo" is not a driver; use stub, webots or command'),
+    ({"simulators.0.world": {"builtin": "maze"}},
+     'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena'),
+    ({"trainer.algorithm.name": "TD3"},
+     ('spec.trainer.algorithm.name: "TD3" is not an algorithm; '
+     "use DQN, PPO, A2C, SAC or REINFORCE")),
+    ({"trainer.environment.reward": "dense"},
+     'spec.trainer.environment.reward: "dense" is not a reward; use Dense or Sparse'),
+    ({"trainer.imagePullPolicy": "Sometimes"},
+     ('spec.trainer.imagePullPolicy: "Sometimes" is not an image pull policy; '
+     "use Always, IfNotPresent or Never")),
+    ({"storage.retain": True},
+     "spec.storage.retain: true is not a retain; use Keep or Delete"),
+    # A number outside its range.
+    ({"trainer.steps": 0}, "spec.trainer.steps: 0 is less than 1; use 1 or more"),
+    ({"replicas": 101}, "spec.replicas: 101 is more than 100; use 100 or less"),
+    ({"trainer.evaluation.stopAtSuccessRate": 0},
+     "spec.trainer.evaluation.stopAtSuccessRate: 0 is not more than 0; use more than 0"),
+    ({"trainer.evaluation.stopAtSuccessRate": 95},
+     "spec.trainer.evaluation.stopAtSuccessRate: 95 is more than 1; use 1 or less"),
+    # The wrong type, with YAML's traps.
+    ({"trainer.steps": "50000"},
+     'spec.trainer.steps: "50000" is text; write a whole number without quotes'),
+    ({"trainer.steps": 5e4},
+     "spec.trainer.steps: 50000 has a fraction or an exponent; write 50000"),
+    ({"trainer.steps": 1.5}, "spec.trainer.steps: 1.5 is not a whole number; write one"),
+    ({"trainer.steps": True}, "spec.trainer.steps: true is not a whole number; write one"),
+    ({"trainer.evaluation.stopAtSuccessRate": "0.9"},
+     'spec.trainer.evaluation.stopAtSuccessRate: "0.9" is text; write a number without quotes'),
+    ({"trainer.evaluation.stopAtSuccessRate": []},
+     "spec.trainer.evaluation.stopAtSuccessRate: a list is not a number; write one"),
+    ({"suspend": "yes"},
+     'spec.suspend: "yes" is neither true nor false; write one of them, without quotes'),
+    ({"simulators.0.env": [{"name": "SPEED", "value": 2}]},
+     'spec.simulators[0].env[0].value: 2 is a number where text is needed; quote it: "2"'),
+    ({"simulators.0.name": False},
+     ("spec.simulators[0].name: false is not text "
+     "(YAML reads yes, no, on and off as true or false); quote the word")),
+    ({"simulators.0.name": ["a"]},
+     "spec.simulators[0].name: a list is not text; write one text"),
+    ({"trainer.resources": {"limits": {"cpu": 0.5}}},
+     ("spec.trainer.resources.limits.cpu: 0.5 is a number where text is needed; "
+     'quote it: "0.5"')),
+    ({"trainer.command": "python train.py"},
+     ('spec.trainer.command: "python train.py" is not a list; '
+     """write ["python train.py"] or lines that begin with '- '""")),
+    ({"simulators.0.options": {"a": 1}},
+     ("spec.simulators[0].options: a mapping is not a list; "
+     "write [...] or lines that begin with '- '")),
+    ({"storage": "1Gi"},
+     """spec.storage: "1Gi" is not a mapping; write lines of 'field: value'"""),
+    ({"trainer.algorithm.hyperparameters": ["gamma"]},
+     ("spec.trainer.algorithm.hyperparameters: a list is not a mapping; "
+     "write lines of 'key: value'")),
+    # Nothing where something is needed.
+    ({"trainer": None}, "spec.trainer: is empty; give a value or remove the line"),
+    ({"simulators.0": {"role": "Collect"}}, "spec.simulators[0].name: is missing; add it"),
+    ({"simulators.0.name": ""},
+     "spec.simulators[0].name: is empty; give a value or remove the line"),
+    # Text of the wrong form.
+    ({"simulators.0.name": "Collect"},
+     ('spec.simulators[0].name: "Collect" is not a name; '
+     "use a-z first, then a-z, 0-9 and '-', no '-' at the end")),
+    ({"simulators.0.name": "a" * 21},
+     "spec.simulators[0].name: is longer than 20 characters; shorten it"),
+    ({"storage.size": "1GB"},
+     ('spec.storage.size: "1GB" is not a quantity; '
+     "write a number and a unit, as 500m, 2, 512Mi or 1Gi")),
+    ({"simulators.0.world": {"file": "hall.wbt"}},
+     ('spec.simulators[0].world.file: "hall.wbt" is not the path of a world; '
+     "give the absolute path of a .wbt file")),
+    ({"trainer.environment.id": "MoveToTarget"},
+     ('spec.trainer.environment.id: "MoveToTarget" is not the id of an environment; '
+     "write it as gymnasium knows it, as MoveToTargetEnv-v0")),
+    ({"storage": {"existingClaim": "runs", "resumeFrom": "../other"}},
+     ('spec.storage.resumeFrom: "../other" is not the name of a folder; '
+     "use letters, digits, '-', '_' and '.', no '/'")),
+    ({"trainer.image": "my image"},
+     'spec.trainer.image: "my image" is not an image; write it as registry/name:tag'),
+    ({"managedBy": "me"},
+     'spec.managedBy: "me" is not a name with a domain; write it as example.com/name'),
+    ({"scheduling.podLabels": {"team": "a b"}},
+     ('spec.scheduling.podLabels.team: "a b" is not the value of a label; '
+     "use letters, digits, '-', '_' and '.'")),
+    ({"trainer.env": [{"name": "2FAST", "value": ""}]},
+     ('spec.trainer.env[0].name: "2FAST" is not the name of a variable; '
+     "use letters, digits and '_', no digit first")),
+    # Too much.
+    ({"trainer.command": ["x"] * 65}, "spec.trainer.command: has more than 64 entries; remove some"),
+    ({"scheduling.nodeSelector": {f"k{n}": "" for n in range(33)}},
+     "spec.scheduling.nodeSelector: has more than 32 entries; remove some"),
+    ({"scheduling.podAnnotations": {"note": LONG}},
+     "spec.scheduling.podAnnotations.note: is longer than 1024 characters; shorten it"),
+    ({"trainer.environment.options": {"a": [[[[[[[[[]]]]]]]]]}},
+     "spec.trainer.environment.options: is nested deeper than 8; flatten it"),
+    ({"trainer.environment.options": {"a": list(range(1000))}},
+     "spec.trainer.environment.options: holds more than 1000 values; shorten it"),
+    ({"trainer.environment.options": {"a": "x" * 5000}},
+     "spec.trainer.environment.options: holds a text over 4096 characters; shorten it"),
+    ({"trainer.algorithm.hyperparameters": {"gamma": float("nan")}},
+     ("spec.trainer.algorithm.hyperparameters: holds a number that is not finite; "
+     "choose a finite one")),
+    ({"trainer.algorithm.hyperparameters": {"gamma": {1: 2}}},
+     "spec.trainer.algorithm.hyperparameters: has a key that is not text; quote it"),
+    ({"trainer.algorithm.hyperparameters": {"gamma": {1, 2}}},
+     ("spec.trainer.algorithm.hyperparameters: holds what JSON cannot carry; "
+     "use text and numbers")),
+    # Twice.
+    ({"imagePullSecrets": [{"name": "pull"}, {"name": "pull"}]},
+     'spec.imagePullSecrets: "pull" is the name of two of them; give each its own'),
+    # Unknown fields, with the nearest known name.
+    ({"trainer.stepps": 1}, "spec.trainer.stepps: is not a field; did you mean steps?"),
+    ({"simulators.0.start_deadline_seconds": 1},
+     ("spec.simulators[0].start_deadline_seconds: is not a field; "
+     "did you mean startDeadlineSeconds?")),
+    ({"steps": 1}, "spec.steps: is not a field here; did you mean spec.trainer.steps?"),
+    ({"simulators.0.recycle": {"x": 1}},
+     "spec.simulators[0].recycle.x: is not a field; use afterResets"),
+    ({"storage.x": 1},
+     ("spec.storage.x: is not a field; use size, storageClassName, retain, ephemeral, "
+     "existingClaim or resumeFrom")),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "line"), SENTENCES, ids=[line[:60] for _, line in SENTENCES])
+def test_a_mistake_is_told_with_path_fact_and_remedy(changes, line, problems) -> None:
+    """One mistake, one line, and all that its author needs to mend it."""
+    assert problems(changes) == [line]
+
+
+def test_a_path_with_a_key_that_is_no_word_shows_it_in_brackets(problems) -> None:
+    """Dots in a label's key are not dots of the path."""
+    assert problems({"scheduling.podLabels": {"a.b/c": 1}}) == [
+        'spec.scheduling.podLabels["a.b/c"]: 1 is a number where text is needed; quote it: "1"'
+    ]
+
+
+def test_a_key_that_is_too_long_is_told_at_its_map(problems) -> None:
+    """The key is the path, so the path says which."""
+    line = problems({"scheduling.podLabels": {LONG: "a"}})[0]
+
+    assert line.startswith("spec.scheduling.podLabels.xxx")
+    assert line.endswith("is longer than 317 characters; shorten it")
+
+
+def test_a_long_value_is_cut_in_the_sentence(problems) -> None:
+    """A line stays a line."""
+    (line,) = problems({"simulators.1.role": LONG})
+
+    assert len(line) < 150
+    assert "xxx..." in line
+
+
+def test_line_breaks_in_a_value_or_a_key_do_not_break_the_line(problems) -> None:
+    """One mistake is one line, whatever was written."""
+    (line,) = problems({"trainer.a\nb": 1})
+
+    assert "\n" not in line
+
+
+def test_a_wrong_time_is_told_with_an_example(job_data) -> None:
+    """A status comes from programs, whose authors read the message too."""
+    with pytest.raises(SpecErrors, match=r'^status.startTime: "noon" is not a time; write it as'):
+        validate(job_data() | {"status": {"startTime": "noon"}})

@@ -1,0 +1,22 @@
+"""Environments on the fake robot, with what matters to a test said in the test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from palaestra_trainer.environments import MoveToTargetEnv
+from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.testing import fake_arena
+
+
+@pytest.fixture
+def make_env() -> Callable[..., MoveToTargetEnv]:
+    """Make an environment on a fake robot: `deaths` for the robot, the rest are options."""
+
+    def with_options(deaths: tuple[int, ...] = (), **options: Any) -> MoveToTargetEnv:
+        return make(*fake_arena(deaths), **options)
+
+    return with_options

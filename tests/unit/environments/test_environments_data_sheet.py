@@ -1,0 +1,105 @@
+"""The docstring of the environment is a data sheet, and the data sheet is true."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from palaestra_trainer.environments import MoveToTargetEnv, Options
+from palaestra_trainer.environments.actions import SCALE
+from palaestra_trainer.environments.move_to_target import REACHED_M, STANDING_M_S
+from palaestra_trainer.environments.observation import PARTS
+from palaestra_trainer.environments.options import ACTIONS
+from palaestra_trainer.environments.rewards import TERMS, WEIGHTS
+from palaestra_trainer.robots import Movement
+from palaestra_trainer.testing import fake_arena
+
+SHEET = inspect.getdoc(MoveToTargetEnv) or ""
+Row = dict[str, str]
+
+
+def tables() -> Iterator[list[Row]]:
+    """Yield the tables of the docstring: a dictionary a row, by column."""
+    lines = [line.strip() for line in SHEET.splitlines()]
+    for is_table, group in itertools.groupby(lines, key=lambda line: line.startswith("|")):
+        if is_table:
+            head, _, *body = ([cell.strip() for cell in line[1:-1].split("|")] for line in group)
+            yield [dict(zip(head, cells, strict=True)) for cells in body]
+
+
+MOVEMENTS, TWIST, OBSERVATION, REWARD = tables()
+
+
+def bounds(part: str, column: str) -> list[float]:
+    """Return what the sheet says about one part: a bound for each of its numbers."""
+    numbers: dict[int, float] = {}
+    for row in OBSERVATION:
+        if row["part"] == part:
+            first, _, last = row["index"].partition("-")
+            numbers |= dict.fromkeys(range(int(first), int(last or first) + 1), float(row[column]))
+    assert list(numbers) == list(range(len(numbers))), "an index is missing or out of order"
+    return list(numbers.values())
+
+
+CHOICES = [choice for size in range(1, len(PARTS) + 1) for choice in itertools.permutations(PARTS, size)]
+
+
+def test_the_sheet_knows_the_parts_in_their_order():
+    """No part is undocumented, none is documented that went away."""
+    assert list(dict.fromkeys(row["part"] for row in OBSERVATION)) == list(PARTS)
+
+
+def test_the_space_of_every_choice_of_parts_is_the_one_on_the_sheet():
+    """Length, order and bounds, for all the ways to choose and order parts."""
+    robot, scene = fake_arena()
+    for choice in CHOICES:
+        space = MoveToTargetEnv(robot, scene, Options(observe=choice)).observation_space
+
+        assert isinstance(space, spaces.Box)
+        assert space.low.tolist() == [it for part in choice for it in bounds(part, "min")]
+        assert space.high.tolist() == [it for part in choice for it in bounds(part, "max")]
+        assert space.dtype == np.float32
+
+
+def test_movements_are_on_the_sheet_with_their_speeds():
+    """A row is an action by its number."""
+    on_the_sheet = [
+        (int(action), name, (float(forward), float(left), float(turning)))
+        for action, name, forward, left, turning in (row.values() for row in MOVEMENTS)
+    ]
+
+    assert on_the_sheet == [(it.value, it.name, it.twist) for it in Movement]
+
+
+def test_the_continuous_action_is_on_the_sheet_with_its_units():
+    """1 means what the unit column says."""
+    space = MoveToTargetEnv(*fake_arena(), Options(actions="continuous")).action_space
+
+    assert isinstance(space, spaces.Box)
+    assert space.low.tolist() == [float(row["min"]) for row in TWIST]
+    assert space.high.tolist() == [float(row["max"]) for row in TWIST]
+    assert [float(row["unit"].split()[0]) for row in TWIST] == list(SCALE)
+
+
+def test_rewards_are_on_the_sheet_with_their_weights():
+    """An empty cell is a term that this reward does not have."""
+    assert [row["term"] for row in REWARD] == list(TERMS)
+    for reward, weights in WEIGHTS.items():
+        assert {row["term"]: float(row[reward]) for row in REWARD if row[reward]} == weights
+
+
+@pytest.mark.parametrize("constant", [f"{REACHED_M:.2f} m", f"{STANDING_M_S:.2f} m/s"])
+def test_the_task_is_on_the_sheet_with_its_numbers(constant):
+    """What counts as standing on the target is not hidden in the code."""
+    assert constant in SHEET
+
+
+@pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe"])
+def test_options_are_on_the_sheet(word):
+    """Where they act."""
+    assert f"`{word}`" in SHEET

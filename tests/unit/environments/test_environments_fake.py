@@ -1,0 +1,260 @@
+"""The fake robot: it conforms, it is physical enough, and it dies on demand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.environments.arena import gap
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.robots import Movement, Pose
+from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, RobotinoAbc
+from palaestra_trainer.testing import (
+    FakeRobotino,
+    NotConforming,
+    check_robot,
+    check_scene,
+    fake_arena,
+)
+from palaestra_trainer.testing import conformance as rules
+
+
+def test_the_fake_is_a_robotino():
+    """It passes what the simulated and the real one have to pass."""
+    check_robot(FakeRobotino())
+
+
+def test_the_fake_has_a_scene():
+    """A reset places it, and decides all that follows."""
+    check_scene(*fake_arena(), Pose(0.2, -0.1, 1.0), (1.5, 1.5))
+
+
+def test_it_slides_along_a_wall_and_says_so():
+    """Running into a wall at an angle loses only the part of the motion that points into it."""
+    robot, scene = fake_arena()
+    scene.reset(0, Pose(1.7, 0.0, math.pi / 4), (0.0, 0.0))
+
+    robot.move(Movement.FORWARD)
+    for _ in range(3):
+        robot.advance()
+
+    assert robot.bumped()
+    assert robot.pose().x_m == pytest.approx(2.0 - RADIUS_M)
+    assert robot.pose().y_m > 0.15
+
+
+def test_a_bump_is_over_once_the_robot_is_free():
+    """The bumper tells of the last step, not of the past."""
+    robot, scene = fake_arena()
+    scene.reset(0, Pose(1.72, 0.0, 0.0), (0.0, 0.0))
+    robot.move(Movement.FORWARD)
+    robot.advance()
+    bumped = robot.bumped()
+
+    robot.move(Movement.BACKWARD)
+    robot.advance()
+    robot.advance()
+
+    assert bumped
+    assert not robot.bumped()
+
+
+def test_speeding_up_takes_time():
+    """The first control period of a movement is shorter than the second."""
+    robot = FakeRobotino()
+    robot.move(Movement.FORWARD)
+
+    robot.advance()
+    first = robot.pose().x_m
+    robot.advance()
+    second = robot.pose().x_m - first
+
+    assert 0.5 * second < first < second == pytest.approx(0.5 * robot.period_s)
+
+
+def test_infrared_measures_from_the_body_to_the_wall():
+    """A wall 0.2 m before the body reads 0.2 m in front and nothing to the left."""
+    robot, scene = fake_arena()
+
+    scene.reset(0, Pose(2.0 - RADIUS_M - 0.2, 0.0, 0.0), (0.0, 0.0))
+
+    assert robot.distances()[0] == pytest.approx(0.2, rel=0.03)
+    assert robot.distances()[2] == pytest.approx(SENSOR_RANGE_M[1])
+
+
+def test_infrared_sees_a_cylinder_on_the_left_with_the_sensors_on_the_left():
+    """Counter-clockwise from the front: of nine, the third looks 80 degrees to the left."""
+    robot, scene = fake_arena()
+
+    scene.reset(0, Pose(0.8, 0.25, math.radians(10.0)), (0.0, 0.0))
+
+    assert np.argmin(robot.distances()) == 2
+
+
+@given(
+    seed=st.integers(0, 2**31 - 1),
+    moves=st.lists(st.sampled_from(Movement), min_size=1, max_size=60),
+    heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
+)
+def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed, moves, heading_rad):
+    """Whatever it is told: the body stays out of walls and cylinders, distances within 3..40 cm."""
+    robot, scene = fake_arena()
+    scene.reset(seed, Pose(0.0, 0.0, heading_rad), (0.0, 0.0))
+
+    for move in moves:
+        robot.move(move)
+        robot.advance()
+        pose, distances = robot.pose(), robot.distances()
+
+        assert gap(pose.x_m, pose.y_m) >= RADIUS_M - 1e-6
+        assert -math.pi < pose.heading_rad <= math.pi
+        assert distances.min() >= np.float32(SENSOR_RANGE_M[0])
+        assert distances.max() <= np.float32(SENSOR_RANGE_M[1])
+
+
+def test_it_dies_at_the_steps_that_are_named():
+    """A training test says when its simulator breaks; steps count over the whole life."""
+    robot, _ = fake_arena(deaths=(2, 3))
+    robot.advance()
+
+    with pytest.raises(SimulatorDead, match="died at step 2; restart it"):
+        robot.advance()
+    robot.restart()
+    with pytest.raises(SimulatorDead, match="died at step 3"):
+        robot.advance()
+    robot.restart()
+
+    assert robot.advance() == 0
+
+
+def test_the_dead_answer_nothing_until_they_are_restarted():
+    """A simulator that is gone does not read sensors either, nor does it reset."""
+    robot, scene = fake_arena(deaths=(1,))
+    with pytest.raises(SimulatorDead):
+        robot.advance()
+
+    for call in (robot.distances, robot.pose, robot.bumped, robot.advance):
+        with pytest.raises(SimulatorDead):
+            call()
+    with pytest.raises(SimulatorDead):
+        scene.reset(0, Pose(0.0, 0.0, 0.0), (0.0, 0.0))
+    robot.restart()
+    scene.reset(0, Pose(1.0, 0.0, 0.0), (0.0, 0.0))
+
+    assert robot.pose() == Pose(1.0, 0.0, 0.0)
+
+
+OWN_ARRAY = np.full(9, 0.3, np.float32)
+
+
+class _Flawed(FakeRobotino):
+    """A robot that breaks one rule, by one method of its own."""
+
+    def __init__(self, method: str, answer) -> None:
+        super().__init__()
+        setattr(self, method, lambda *_: answer(super(_Flawed, self)))
+
+
+def _backwards(robot: RobotinoAbc) -> Pose:
+    pose = robot.pose()
+    return Pose(-pose.x_m, pose.y_m, pose.heading_rad)
+
+
+@pytest.mark.parametrize(
+    ("method", "answer", "rule"),
+    [
+        ("distances", lambda _: np.zeros(9, np.float32), rules.DISTANCES_ARE_METRES),
+        ("distances", lambda _: np.full(8, 0.3, np.float32), rules.DISTANCES_HAVE_SHAPE),
+        ("distances", lambda it: it.distances().astype(np.float64), rules.DISTANCES_HAVE_SHAPE),
+        ("distances", lambda _: OWN_ARRAY, rules.DISTANCES_ARE_OWN),
+        ("bumped", lambda _: 0.0, rules.BUMPED_IS_BOOL),
+        ("pose", lambda _: Pose(0.0, 0.0, 4.0), rules.POSE_IS_FINITE),
+        ("pose", lambda _: Pose(math.nan, 0.0, 0.0), rules.POSE_IS_FINITE),
+        ("pose", lambda _: Pose(0.0, 0.0, 0.0), rules.MOVEMENTS_MOVE),
+        ("pose", _backwards, rules.MOVEMENTS_MOVE),
+        ("advance", lambda it: it.advance() or None, rules.ADVANCE_COUNTS),
+        ("color_image", lambda _: np.zeros(3, np.uint8), rules.IMAGES_ARE_TYPED),
+    ],
+    ids=[
+        "out of range",
+        "eight sensors",
+        "float64",
+        "the robot's own array",
+        "bumped as a number",
+        "heading beyond pi",
+        "nowhere",
+        "stuck",
+        "mirrored",
+        "no count of extra periods",
+        "a flat image",
+    ],
+)
+def test_conformance_names_the_rule_that_a_robot_breaks(method, answer, rule):
+    """Every rule fails for some robot: a check that cannot fail proves nothing."""
+    with pytest.raises(NotConforming) as caught:
+        check_robot(_Flawed(method, answer))
+
+    assert str(caught.value).startswith(rule)
+
+
+def test_conformance_sees_a_robot_that_rolls_on():
+    """A robot that ignores STOP would drive through its target."""
+
+    class Rolling(FakeRobotino):
+        def move(self, movement: Movement) -> None:
+            super().move(Movement.FORWARD if movement is Movement.STOP else movement)
+
+    with pytest.raises(NotConforming) as caught:
+        check_robot(Rolling())
+
+    assert str(caught.value).startswith((rules.STOP_STOPS, rules.MOVEMENTS_MOVE))
+
+
+def test_conformance_sees_readings_that_change_between_steps():
+    """A pose that is asked for twice in a step must be the same one."""
+
+    class Restless(FakeRobotino):
+        def pose(self) -> Pose:
+            self._x_m += 1e-3
+            return super().pose()
+
+    with pytest.raises(NotConforming) as caught:
+        check_robot(Restless())
+
+    assert str(caught.value).startswith(rules.READINGS_STAND_STILL)
+
+
+def test_conformance_sees_a_scene_that_leaves_the_robot_where_it_was():
+    """An episode would begin where the last one ended."""
+
+    class Idle:
+        def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
+            pass
+
+    with pytest.raises(NotConforming) as caught:
+        check_scene(FakeRobotino(), Idle(), Pose(0.5, 0.0, 0.0), (0.0, 0.0))
+
+    assert str(caught.value).startswith(rules.RESET_PLACES)
+
+
+def test_conformance_sees_chance_that_no_seed_decides():
+    """An evaluation could not be repeated."""
+    robot = FakeRobotino()
+
+    class Careless:
+        rolls = 0
+
+        def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
+            self.rolls += 1
+            self.target = target
+            robot.place(start, seed + self.rolls)
+
+    near_a_wall = Pose(1.5, 0.0, 0.0)
+    with pytest.raises(NotConforming) as caught:
+        check_scene(robot, Careless(), near_a_wall, (0.0, 0.0))
+
+    assert str(caught.value).startswith(rules.RESET_DECIDES)

@@ -1,0 +1,112 @@
+"""Frames, units and bounds of what is observed."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.environments.observation import PARTS, Situation, observe, space, velocity
+from palaestra_trainer.robots import Pose
+
+SITUATION = Situation(
+    distances_m=np.full(9, 0.4, np.float32),
+    bumped=False,
+    pose=Pose(1.0, 0.0, math.pi / 2),
+    velocity=(0.5, 0.0, 0.0),
+    target=(1.0, 1.0),
+    time_left=0.75,
+)
+
+angles = st.floats(-math.pi, math.pi, exclude_min=True)
+metres = st.floats(-2.0, 2.0)
+poses = st.builds(Pose, metres, metres, angles)
+
+
+def numbers(part: str, **changes) -> list[float]:
+    """Return what one part says of a situation that differs from the usual one."""
+    return observe(replace(SITUATION, **changes), [part], space([part])).tolist()
+
+
+def test_the_target_is_seen_from_the_robot():
+    """A robot that looks along y has a target at y = 1 m before it, and one at x = 0 on its left."""
+    assert SITUATION.target_ahead == pytest.approx((1.0, 0.0))
+    assert replace(SITUATION, target=(0.0, 0.0)).target_ahead == pytest.approx((0.0, 1.0))
+
+
+@given(pose=poses, target=st.tuples(metres, metres))
+def test_the_distance_to_the_target_does_not_depend_on_where_the_robot_looks(pose, target):
+    """Turning on the spot is no progress."""
+    seen = replace(SITUATION, pose=pose, target=target)
+
+    assert seen.target_distance_m == pytest.approx(math.dist((pose.x_m, pose.y_m), target), abs=1e-9)
+
+
+def test_sensors_tell_how_near_things_are():
+    """0 is nothing in reach, 1 is as near as can be measured; the last number is the bumper."""
+    distances_m = np.array([0.03, 0.215, *[0.4] * 7], np.float32)
+
+    seen = numbers("sensors", distances_m=distances_m, bumped=True)
+
+    assert seen == pytest.approx([1.0, 0.5, *[0.0] * 7, 1.0], abs=1e-6)
+
+
+def test_velocity_is_in_units_of_the_movements():
+    """Driving FORWARD is 1, turning right at full speed -1."""
+    assert numbers("velocity", velocity=(0.5, -0.25, -1.0)) == pytest.approx([1.0, -0.5, -1.0])
+
+
+def test_position_is_in_the_worlds_frame():
+    """Half a floor is 1; the heading is on the unit circle, so it has no jump."""
+    assert numbers("position") == pytest.approx([0.5, 0.0, 0.0, 1.0], abs=1e-6)
+
+
+def test_time_left_counts_down():
+    """From 1 at the start to 0 when time is up."""
+    assert numbers("time_left") == [0.75]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_number_beyond_its_bound_is_cut_off(part):
+    """A robot that was thrown across the world must not throw the learner too."""
+    wild = observe(
+        replace(SITUATION, pose=Pose(1e6, -1e6, 3.0), velocity=(1e6, -1e6, 1e6), time_left=-1.0),
+        [part],
+        space([part]),
+    )
+
+    assert space([part]).contains(wild)
+
+
+@pytest.mark.parametrize("parts", list(itertools.combinations(PARTS, 2)), ids="-".join)
+def test_parts_follow_each_other_in_the_order_they_are_named(parts):
+    """So that an index in the data sheet can be found in an observation."""
+    seen = observe(SITUATION, parts, space(parts))
+
+    assert seen.tolist() == [*numbers(parts[0]), *numbers(parts[1])]
+    assert seen.dtype == np.float32
+
+
+@given(before=poses, ahead=st.tuples(metres, metres))
+def test_velocity_without_turning_is_the_way_over_the_time(before, ahead):
+    """Forward and left of where the robot looked, divided by the seconds that passed."""
+    c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)
+    after = Pose(
+        before.x_m + ahead[0] * c - ahead[1] * s,
+        before.y_m + ahead[0] * s + ahead[1] * c,
+        before.heading_rad,
+    )
+
+    assert velocity(before, after, 0.5) == pytest.approx((ahead[0] * 2, ahead[1] * 2, 0.0), abs=1e-9)
+
+
+def test_turning_is_measured_the_short_way_around():
+    """A heading that passes from pi to -pi did not turn a whole circle back."""
+    _, _, turning = velocity(Pose(0, 0, math.pi - 0.1), Pose(0, 0, -math.pi + 0.1), 0.2)
+
+    assert turning == pytest.approx(1.0)

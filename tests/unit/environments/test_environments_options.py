@@ -1,0 +1,60 @@
+"""What a job file may say about the task, and what it is told when it is wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from palaestra_trainer.environments.options import Options, parse
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots import Movement
+
+
+def test_nothing_said_gives_the_defaults():
+    """An example of two lines has to train."""
+    assert parse({}) == Options()
+
+
+def test_a_job_file_names_movements_and_parts_as_text():
+    """YAML has no enumerations."""
+    options = parse({"movements": ["STOP", "FORWARD"], "observe": ["target"], "max_steps": 50})
+
+    assert options == Options(movements=(Movement.STOP, Movement.FORWARD), observe=["target"], max_steps=50)
+
+
+def test_python_may_use_the_enumeration():
+    """A notebook says `Movement.LEFT`."""
+    assert parse({"movements": (Movement.LEFT,)}).movements == (Movement.LEFT,)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"reward": "dense"}, "reward: 'dense' is not a reward; use Dense or Sparse"),
+        ({"observe": ["camera"]}, "observe: 'camera' is not a part; use sensors, velocity"),
+        ({"observe": []}, "observe: is empty"),
+        ({"observe": ["target", "target"]}, "observe: names a part twice"),
+        ({"actions": "both"}, "actions: 'both' is not known; use discrete or continuous"),
+        ({"movements": ["JUMP"]}, "movements: JUMP not known; use STOP, FORWARD"),
+        ({"movements": []}, "movements: is empty"),
+        ({"movements": ["STOP", "STOP"]}, "movements: names a movement twice"),
+        ({"max_steps": 0}, "max_steps: 0 leaves no time; use at least 1"),
+        ({"steps": 7}, "steps: is not an option; use reward, observe, movements"),
+    ],
+    ids=lambda it: next(iter(it)) + str(next(iter(it.values()))) if isinstance(it, dict) else "",
+)
+def test_a_wrong_option_is_refused_with_fact_and_remedy(given, message):
+    """Before a simulator is started for it."""
+    with pytest.raises(ConfigurationError, match=message):
+        parse(given)
+
+
+def test_all_mistakes_are_told_at_once():
+    """A line for each, so that a file is mended in one go."""
+    with pytest.raises(ConfigurationError) as caught:
+        parse({"reward": "Rich", "actions": "none", "max_steps": -1})
+
+    assert [line.split(":")[0] for line in str(caught.value).splitlines()] == [
+        "reward",
+        "actions",
+        "max_steps",
+    ]

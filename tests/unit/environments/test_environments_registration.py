@@ -1,0 +1,111 @@
+"""The ways to come by an environment, and what checkers of other projects say about it."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
+
+import palaestra_trainer.environments
+from palaestra_trainer.environments import MoveToTargetEnv, configured
+from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.environments.observation import PARTS
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots import Movement
+from palaestra_trainer.testing import FakeRobotino, FakeScene, fake_arena
+
+NAME = "MoveToTargetEnv-v0"
+VARIANTS = [
+    {"actions": actions, "reward": reward, "observe": observe}
+    for actions, reward, observe in itertools.product(
+        ("discrete", "continuous"), ("Dense", "Sparse"), (tuple(PARTS), ("target",))
+    )
+]
+
+
+@pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(map(str, it.values())))
+def test_gymnasium_has_nothing_to_object_to(options):
+    """Seeds, spaces, types and determinism; every warning is an error in these tests."""
+    check_env(make(*fake_arena(), **options), skip_render_check=True)
+
+
+@pytest.mark.parametrize("options", VARIANTS, ids=lambda it: "-".join(map(str, it.values())))
+def test_stable_baselines3_has_nothing_to_object_to(options):
+    """Its own idea of what can be learned from."""
+    check_env_for_sb3(make(*fake_arena(), **options), skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", [NAME, f"palaestra_trainer.environments:{NAME}"])
+def test_the_environment_is_made_by_name(name):
+    """After an import of the package, or with the package in the name."""
+    robot, scene = fake_arena()
+
+    env = gymnasium.make(name, robot=robot, scene=scene, movements=["STOP", "LEFT"], max_steps=7)
+
+    assert isinstance(env.unwrapped, MoveToTargetEnv)
+    assert env.unwrapped.options.movements == (Movement.STOP, Movement.LEFT)
+    assert env.unwrapped.options.max_steps == 7
+
+
+def test_gymnasium_adds_no_time_limit_of_its_own():
+    """The environment counts its steps itself: Sparse rewards the last."""
+    spec = gymnasium.spec(NAME)
+
+    assert spec.max_episode_steps is None
+    assert spec.id in gymnasium.registry
+    assert palaestra_trainer.environments.MoveToTargetEnv is MoveToTargetEnv
+
+
+def test_a_robot_that_cannot_be_copied_can_be_used():
+    """Gymnasium likes to copy arguments; a robot holds sockets and threads."""
+    robot, scene = fake_arena()
+    robot.socket = threading.Lock()
+
+    env = gymnasium.make(NAME, robot=robot, scene=scene)
+    observation, _ = env.reset(seed=1)
+    env.step(env.action_space.sample())
+
+    assert env.observation_space.contains(observation)
+
+
+@pytest.mark.parametrize("mode", ["sync", "async"])
+def test_many_are_made_at_once_each_with_a_simulator_of_its_own(mode):
+    """`simulator` is called once for each environment, as the configuration is by default."""
+    envs = gymnasium.make_vec(NAME, num_envs=2, vectorization_mode=mode, simulator=fake_arena)
+
+    observations, infos = envs.reset(seed=[1, 2])
+    stepped = envs.step(np.array([0, 1]))
+    envs.close()
+
+    assert observations.shape == stepped[0].shape == (2, *envs.single_observation_space.shape)
+    assert infos["target"][0] != infos["target"][1]
+
+
+def test_a_robot_without_its_scene_is_refused():
+    """Episodes would begin wherever the last one ended."""
+    with pytest.raises(ConfigurationError, match="give both or neither"):
+        make(robot=FakeRobotino())
+
+
+def test_a_wrong_option_is_told_before_a_simulator_is_asked_for():
+    """Starting one takes seconds and another process."""
+
+    def never() -> tuple[FakeRobotino, FakeScene]:
+        raise AssertionError("asked for a simulator")
+
+    with pytest.raises(ConfigurationError, match="max_steps"):
+        make(simulator=never, max_steps=0)
+
+
+def test_without_robot_or_configuration_the_error_says_so(monkeypatch):
+    """The way out is in the message: the variable that names the configuration."""
+    monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
+    configured.configured_simulators.cache_clear()
+
+    with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG"):
+        gymnasium.make(NAME)

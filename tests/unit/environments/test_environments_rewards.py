@@ -1,0 +1,95 @@
+"""What each term is worth, and that a reward is their sum."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.environments import rewards
+from palaestra_trainer.environments.rewards import TERMS, WEIGHTS, Outcome, Transition, reward_terms
+
+
+def transition(before_m: float = 1.0, after_m: float = 1.0, outcome: Outcome = Outcome.RUNNING) -> Transition:
+    """Return a step in which nothing happened but what is said."""
+    return Transition(before_m=before_m, after_m=after_m, outcome=outcome)
+
+
+def test_progress_is_what_was_gained_toward_the_target():
+    """In metres, so that a whole drive earns the distance it began with."""
+    assert rewards.progress(transition(1.0, 0.9)) == pytest.approx(0.1)
+    assert rewards.progress(transition(0.9, 1.0)) == pytest.approx(-0.1)
+
+
+def test_standing_still_earns_no_progress():
+    """Exactly 0, or a policy could live on rounding."""
+    assert rewards.progress(transition(0.7, 0.7)) == 0.0
+
+
+@given(st.lists(st.floats(0.0, 5.0), min_size=2, max_size=20))
+def test_no_detour_earns_more_progress_than_the_straight_way(distances):
+    """Progress telescopes: driving in circles is worth nothing."""
+    total = sum(
+        rewards.progress(transition(before, after)) for before, after in itertools.pairwise(distances)
+    )
+
+    assert total == pytest.approx(distances[0] - distances[-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("term", "outcome"),
+    [
+        (rewards.success, Outcome.REACHED),
+        (rewards.collision, Outcome.COLLIDED),
+        (rewards.time_up, Outcome.TIME_UP),
+    ],
+)
+def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
+    """No two ends are mixed up, and none is paid twice."""
+    paid = {it: term(transition(outcome=it)) for it in Outcome}
+
+    assert paid == {it: float(it is outcome) for it in Outcome}
+
+
+def test_every_step_has_the_same_duration():
+    """Whatever else happens in it."""
+    assert {rewards.duration(transition(outcome=it)) for it in Outcome} == {1.0}
+
+
+@pytest.mark.parametrize("reward", WEIGHTS)
+def test_a_reward_is_made_of_known_terms(reward):
+    """A weight without its term would be a typing error that costs a training run."""
+    assert set(WEIGHTS[reward]) <= set(TERMS)
+
+
+def test_terms_are_reported_weighted():
+    """What is plotted by name adds up to what was learned from."""
+    step = transition(1.0, 0.9, Outcome.REACHED)
+
+    terms = reward_terms("Dense", step)
+
+    assert terms == {name: weight * TERMS[name](step) for name, weight in WEIGHTS["Dense"].items()}
+
+
+def test_sparse_pays_at_the_end_only():
+    """A step on the way is worth nothing, however much progress it makes."""
+    assert sum(reward_terms("Sparse", transition(2.0, 1.9)).values()) == 0.0
+    assert sum(reward_terms("Sparse", transition(outcome=Outcome.REACHED)).values()) > 0.0
+    assert sum(reward_terms("Sparse", transition(outcome=Outcome.COLLIDED)).values()) < 0.0
+    assert sum(reward_terms("Sparse", transition(outcome=Outcome.TIME_UP)).values()) < 0.0
+
+
+@pytest.mark.parametrize("reward", WEIGHTS)
+def test_reaching_the_target_is_the_best_end(reward):
+    """Neither giving up nor running into a cylinder early may pay."""
+    worth = {it: sum(reward_terms(reward, transition(outcome=it)).values()) for it in Outcome}
+
+    assert max(worth, key=worth.__getitem__) is Outcome.REACHED
+    assert min(worth, key=worth.__getitem__) is Outcome.COLLIDED
+
+
+def test_the_end_of_the_time_is_no_end_of_the_task():
+    """So a learner goes on estimating from there."""
+    assert [it for it in Outcome if it.terminal] == [Outcome.REACHED, Outcome.COLLIDED]

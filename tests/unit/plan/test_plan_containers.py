@@ -1,0 +1,201 @@
+"""The containers of a pod: their order, ports, commands, environment and resources."""
+
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.api.container import Resources
+from palaestra.plan import resources
+
+TWO_GROUPS = [
+    {"name": "collect", "role": "Collect", "count": 2},
+    {"name": "evaluate", "role": "Evaluate"},
+]
+
+
+def containers(planned) -> dict[str, dict]:
+    """Return the containers of the first replica by name, in the order of their start."""
+    spec = planned.replicas[0].job["spec"]["template"]["spec"]
+    return {each["name"]: each for each in (*spec["initContainers"], *spec["containers"])}
+
+
+def environment(container) -> dict[str, object]:
+    """Return a container's variables."""
+    return {each["name"]: each.get("value", each.get("valueFrom")) for each in container["env"]}
+
+
+def test_the_ros_master_starts_first_and_the_trainer_last(in_cluster):
+    """Native sidecars start in the order of the list."""
+    names = list(containers(in_cluster(simulators=TWO_GROUPS)))
+
+    assert names == ["ros-master", "sim-collect-0", "sim-collect-1", "sim-evaluate-0", "trainer"]
+
+
+def test_only_the_ros_master_has_a_startup_probe(in_cluster):
+    """Several of them may block the trainer for ever (Kubernetes issue 132826)."""
+    probed = [name for name, each in containers(in_cluster()).items() if "startupProbe" in each]
+
+    assert probed == ["ros-master"]
+
+
+def test_sidecars_are_restarted_and_the_trainer_is_not(in_cluster):
+    """The trainer's restart is a new pod, decided by the Job."""
+    policies = {name: each.get("restartPolicy") for name, each in containers(in_cluster()).items()}
+
+    assert policies.pop("trainer") is None
+    assert set(policies.values()) == {"Always"}
+
+
+def test_the_ports_of_simulators_count_up(in_cluster):
+    """All containers share the pod's network."""
+    planned = containers(in_cluster(simulators=TWO_GROUPS))
+    arguments = [" ".join(planned[name]["args"]) for name in planned if name.startswith("sim-")]
+
+    for place, text in enumerate(arguments):
+        assert f"--control=127.0.0.1:{7100 + place} --health=0.0.0.0:{7200 + place}" in text
+
+
+def test_one_simulator_of_a_replica_keeps_the_clock(in_cluster):
+    """Two times on one topic are none."""
+    planned = containers(in_cluster(simulators=TWO_GROUPS))
+
+    assert [name for name, each in planned.items() if "--clock" in each.get("args", ())] == [
+        "sim-collect-0"
+    ]
+
+
+def test_control_ports_are_on_loopback_only(in_cluster):
+    """ROS and the sidecars' control know no authentication."""
+    for container in containers(in_cluster()).values():
+        assert not any(
+            arg.startswith("--control=") and "127.0.0.1" not in arg
+            for arg in container.get("args", ())
+        )
+
+
+def test_every_container_knows_master_configuration_run_and_pod(in_cluster):
+    """The pod's contract."""
+    for container in containers(in_cluster()).values():
+        variables = environment(container)
+        assert variables["ROS_MASTER_URI"] == "http://127.0.0.1:11311"
+        assert variables["ROS_HOSTNAME"] == "localhost"
+        assert variables["PALAESTRA_CONFIG"] == "/etc/palaestra/training.yaml"
+        assert variables["PALAESTRA_POD_UID"] == {"fieldRef": {"fieldPath": "metadata.uid"}}
+        assert variables["OMP_NUM_THREADS"] == "1"
+
+
+def test_threads_follow_the_cpu_limit(in_cluster):
+    """PyTorch would otherwise start a thread for each core of the node."""
+    trainer = containers(in_cluster(trainer={"resources": {"limits": {"cpu": "3500m"}}}))["trainer"]
+
+    assert environment(trainer)["OMP_NUM_THREADS"] == "4"
+
+
+def test_variables_of_the_job_win_and_stand_once(in_cluster):
+    """A list with a name twice is refused by server-side apply."""
+    env = [
+        {"name": "OMP_NUM_THREADS", "value": "2"},
+        {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}},
+    ]
+    trainer = containers(in_cluster(trainer={"env": env}))["trainer"]
+    names = [each["name"] for each in trainer["env"]]
+
+    assert len(names) == len(set(names))
+    assert environment(trainer)["OMP_NUM_THREADS"] == "2"
+    assert environment(trainer)["TOKEN"] == {"secretKeyRef": {"name": "hub", "key": "token"}}
+
+
+def test_two_replicas_of_two_simulators_fit_on_two_cores_with_the_operator(in_cluster):
+    """What a laptop's cluster has."""
+    requests = [each["resources"]["requests"]["cpu"] for each in containers(in_cluster()).values()]
+
+    assert sum(int(cpu.removesuffix("m")) for cpu in requests) <= 450
+
+
+def test_the_jobs_own_program_replaces_the_loop_and_need_not_serve_health(in_cluster):
+    """A script of twenty lines has no web server."""
+    trainer = containers(in_cluster(trainer={"command": ["python", "mine.py"]}))["trainer"]
+
+    assert trainer["command"] == ["python", "mine.py"]
+    assert "livenessProbe" not in trainer
+
+
+def test_images_are_the_jobs_or_the_releases(in_cluster):
+    """A job names an image only where it differs."""
+    simulators = [
+        {"name": "a", "role": "Collect", "driver": "webots"},
+        {"name": "b", "role": "Evaluate", "image": "mine:2"},
+    ]
+    planned = containers(in_cluster(simulators=simulators))
+
+    assert planned["sim-a-0"]["image"] == "webots:1"
+    assert planned["sim-b-0"]["image"] == "mine:2"
+    assert planned["trainer"]["image"] == planned["ros-master"]["image"] == "trainer:1"
+
+
+COMMAND = [
+    {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim", "{world}"]},
+    {"name": "evaluate", "role": "Evaluate"},
+]
+
+
+def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluster):
+    """Its image need not know Palaestra."""
+    planned = containers(in_cluster(simulators=COMMAND))
+
+    assert next(iter(planned)) == "install-sidecar"
+    assert planned["sim-own-0"]["command"] == ["/palaestra/palaestra-sidecar"]
+    assert planned["sim-own-0"]["args"][-3:] == ["--", "sim", "{world}"]
+    assert planned["sim-evaluate-0"]["command"] == ["palaestra-sidecar"]
+
+
+def test_on_a_laptop_nothing_is_copied(on_laptop):
+    """The sidecar is installed beside the runner."""
+    planned = containers(on_laptop(simulators=COMMAND))
+
+    assert "install-sidecar" not in planned
+    assert planned["sim-own-0"]["command"] == ["palaestra-sidecar"]
+
+
+def test_on_a_laptop_everything_lies_in_the_run_directory_and_on_loopback(on_laptop):
+    """Nothing of a run is found anywhere else on a person's machine."""
+    replica = on_laptop().replicas[0]
+    planned = containers(on_laptop())
+    mounts = [mount["mountPath"] for each in planned.values() for mount in each["volumeMounts"]]
+    training = yaml.safe_load(replica.config_map["data"]["training.yaml"])
+
+    assert all(path == "/runs/job/0" or path.startswith("/runs/job/0/") for path in mounts)
+    assert training["statusAddress"] == "127.0.0.1:4001"
+    assert [each["control"] for each in training["simulators"]] == [
+        "http://127.0.0.1:4100",
+        "http://127.0.0.1:4101",
+    ]
+    assert "0.0.0.0" not in str(replica.job)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "planned"),
+    [
+        ({}, {"requests": {"cpu": "1", "memory": "1Gi"}, "limits": {"cpu": "2"}}),
+        ({"limits": {"cpu": "500m"}}, {"requests": {"memory": "1Gi"}, "limits": {"cpu": "500m"}}),
+        ({"requests": {"cpu": "8"}}, {"requests": {"memory": "1Gi", "cpu": "8"}}),
+    ],
+)
+def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
+    """A request above its limit is refused by the API server."""
+    default = Resources(requests={"cpu": "1", "memory": "1Gi"}, limits={"cpu": "2"})
+
+    assert resources.resources(Resources(**wanted), default) == planned
+
+
+@given(st.integers(min_value=1, max_value=200_000))
+def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
+    """Rounded up: half a core is good for one thread."""
+    threads = resources.threads({"limits": {"cpu": f"{millis}m"}})
+
+    assert threads >= 1
+    assert 0 <= threads * 1000 - millis < 1000
+
+

@@ -1,0 +1,183 @@
+"""The objects of a replica: which there are, how they are called, what they promise."""
+
+import pytest
+import yaml
+
+from palaestra.plan import ClusterLayout, Images, PlanError, plan
+
+LAYOUT = ClusterLayout(images=Images.of_release("1"))
+
+
+def pod(planned, replica=0):
+    """Return the pod's spec of a replica."""
+    return planned.replicas[replica].job["spec"]["template"]["spec"]
+
+
+def test_a_replica_is_a_config_map_a_claim_and_a_job_in_this_order(in_cluster):
+    """A pod that is made before its volumes exist waits for them for no reason."""
+    kinds = [each["kind"] for each in in_cluster(replicas=2).objects]
+
+    assert kinds == ["ConfigMap", "PersistentVolumeClaim", "Job"] * 2
+
+
+def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_cluster):
+    """Safety from names: whoever plans again makes the same objects, and is refused."""
+    first, second = in_cluster(replicas=3), in_cluster(replicas=3)
+    names = [(each["kind"], each["metadata"]["name"]) for each in first.objects]
+
+    assert first == second
+    assert len(set(names)) == len(names)
+
+
+def test_the_name_of_a_config_map_follows_from_its_content(in_cluster):
+    """It never changes, so another content needs another name."""
+    names = {
+        in_cluster(seed=seed).replicas[0].config_map["metadata"]["name"] for seed in (1, 2)
+    }
+
+    assert len(names) == 2
+
+
+def test_objects_go_with_the_job_and_the_claim_stays(in_cluster):
+    """Deleting a TrainingJob must not delete what it has learned, unless it says so."""
+    replica = in_cluster().replicas[0]
+
+    assert replica.job["metadata"]["ownerReferences"][0]["controller"]
+    assert replica.config_map["metadata"]["ownerReferences"]
+    assert "ownerReferences" not in replica.claim["metadata"]
+
+
+def test_a_claim_that_is_not_retained_goes_with_the_job(in_cluster):
+    """`retain: Delete` is an owner reference."""
+    claim = in_cluster(storage={"retain": "Delete"}).replicas[0].claim
+
+    assert claim["metadata"]["ownerReferences"][0]["kind"] == "TrainingJob"
+
+
+def test_a_job_that_is_made_again_gets_a_new_claim(make_job):
+    """Its uid is in the name: the run of its predecessor is not continued by accident."""
+    claims = {
+        plan(make_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"
+    }
+
+    assert len(claims) == 2
+
+
+@pytest.mark.parametrize(
+    ("storage", "volume"),
+    [
+        ({"ephemeral": True, "size": "2Gi"}, {"emptyDir": {"sizeLimit": "2Gi"}}),
+        ({"existingClaim": "mine"}, {"persistentVolumeClaim": {"claimName": "mine"}}),
+    ],
+)
+def test_no_claim_is_made_where_none_is_wanted(in_cluster, storage, volume):
+    """An existing claim is somebody else's, and an ephemeral run needs none."""
+    planned = in_cluster(storage=storage)
+
+    assert planned.replicas[0].claim is None
+    assert {"name": "run", **volume} in pod(planned)["volumes"]
+
+
+def test_a_claim_has_the_size_and_class_of_the_job(in_cluster):
+    """Replay buffers of images need more than the default."""
+    claim = in_cluster(storage={"size": "5Gi", "storageClassName": "fast"}).replicas[0].claim
+
+    assert claim["spec"]["resources"] == {"requests": {"storage": "5Gi"}}
+    assert claim["spec"]["storageClassName"] == "fast"
+
+
+def test_the_end_of_the_trainer_decides_and_always_by_name(in_cluster):
+    """A rule without a name would match the sidecars' exit codes and hide the trainer's."""
+    rules = in_cluster().replicas[0].job["spec"]["podFailurePolicy"]["rules"]
+
+    assert [rule["action"] for rule in rules] == ["Ignore", "Ignore", "FailJob"]
+    assert rules[0]["onPodConditions"] == [{"type": "DisruptionTarget", "status": "True"}]
+    assert [rule["onExitCodes"]["values"] for rule in rules[1:]] == [[75], [2, 80, 81]]
+    assert {rule["onExitCodes"]["containerName"] for rule in rules[1:]} == {"trainer"}
+
+
+def test_one_pod_at_a_time(in_cluster):
+    """Two pods of a replica would write to one run directory."""
+    spec = in_cluster(backoffLimit=5).replicas[0].job["spec"]
+
+    assert spec["podReplacementPolicy"] == "Failed"
+    assert spec["template"]["spec"]["restartPolicy"] == "Never"
+    assert spec["backoffLimit"] == 5
+
+
+def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
+    """Two owners of one field would undo each other's work for ever."""
+    queued = in_cluster(scheduling={"queueName": "robots"}).replicas[0].job
+    own = in_cluster(suspend=True).replicas[0].job
+
+    assert queued["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] == "robots"
+    assert "suspend" not in queued["spec"]
+    assert own["spec"]["suspend"] is True
+
+
+def test_a_job_without_a_uid_has_no_plan(make_job):
+    """Its names and its owner references would be those of no object."""
+    job = make_job()
+    nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
+
+    with pytest.raises(PlanError, match=r"^metadata.uid: "):
+        plan(nobody, LAYOUT)
+
+
+def test_the_pod_is_restricted(in_cluster):
+    """As Pod Security's *restricted* asks, sidecars included."""
+    spec = pod(in_cluster())
+
+    assert spec["automountServiceAccountToken"] is False
+    assert spec["securityContext"]["runAsNonRoot"]
+    for container in (*spec["initContainers"], *spec["containers"]):
+        security = container["securityContext"]
+        assert security["readOnlyRootFilesystem"]
+        assert not security["allowPrivilegeEscalation"]
+        assert security["capabilities"] == {"drop": ["ALL"]}
+
+
+def test_scheduling_reaches_the_pod(in_cluster):
+    """What a platform engineer sets is passed on as it is."""
+    planned = in_cluster(
+        scheduling={
+            "nodeSelector": {"gpu": "yes"},
+            "tolerations": [{"key": "gpu", "operator": "Exists"}],
+            "runtimeClassName": "nvidia",
+            "priorityClassName": "low",
+            "podLabels": {"team": "robots"},
+            "podAnnotations": {"note": "x"},
+        },
+        imagePullSecrets=[{"name": "pull"}],
+    )
+    spec = pod(planned)
+    metadata = planned.replicas[0].job["spec"]["template"]["metadata"]
+
+    assert spec["nodeSelector"] == {"gpu": "yes"}
+    assert spec["tolerations"] == [{"key": "gpu", "operator": "Exists"}]
+    assert spec["runtimeClassName"] == "nvidia"
+    assert spec["imagePullSecrets"] == [{"name": "pull"}]
+    assert metadata["labels"]["team"] == "robots"
+    assert metadata["annotations"] == {"note": "x"}
+
+
+def test_every_mount_has_a_volume_and_every_volume_a_mount(in_cluster):
+    """An API server refuses the one, and the other is waste."""
+    spec = pod(in_cluster())
+    mounted = {
+        mount["name"]
+        for container in (*spec["initContainers"], *spec["containers"])
+        for mount in container["volumeMounts"]
+    }
+
+    assert {volume["name"] for volume in spec["volumes"]} == mounted
+
+
+def test_seeds_of_replicas_differ(in_cluster):
+    """Replicas are the same training with other luck."""
+    seeds = [
+        yaml.safe_load(each.config_map["data"]["training.yaml"])["seed"]
+        for each in in_cluster(seed=7, replicas=3).replicas
+    ]
+
+    assert seeds == [7, 8, 9]

@@ -1,0 +1,130 @@
+"""Values that travel between trainer, sidecar and operator, and JSON of every kind."""
+
+import pytest
+from hypothesis import strategies as st
+
+from palaestra_sim.protocol.control import LastExit, RobotName, SidecarState, SimulatorState
+from palaestra_sim.protocol.status import (
+    CheckpointStatus,
+    SimulatorRole,
+    SimulatorStatus,
+    Termination,
+    TrainerStatus,
+)
+
+counts = st.integers(0, 2**53)
+texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=500)
+names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=255)
+shares = st.floats(0.0, 1.0)
+times = st.datetimes().map(lambda time: f"{time.isoformat(timespec='seconds')}Z")
+
+checkpoints = st.builds(CheckpointStatus, step=counts, time=times)
+
+SHAPES = {
+    SimulatorState: st.builds(
+        SimulatorState,
+        state=st.sampled_from(SidecarState),
+        driver=names,
+        world=texts,
+        robots=st.lists(
+            st.builds(RobotName, robot=names, ros_name=names, supervisor=st.booleans()), max_size=3
+        ).map(tuple),
+        pid=st.none() | st.integers(1, 2**22),
+        starts=counts,
+        faults=counts,
+        last_exit=st.none()
+        | st.builds(
+            LastExit,
+            code=st.none() | st.integers(0, 255),
+            signal=st.none() | st.sampled_from(["SIGBUS", "SIGKILL", "SIG35"]),
+            expected=st.booleans(),
+        ),
+        detail=texts,
+    ),
+    TrainerStatus: st.builds(
+        TrainerStatus,
+        step=counts,
+        target=counts,
+        episodes=counts,
+        phase=names,
+        mean_return=st.none() | st.floats(allow_nan=False, allow_infinity=False),
+        success_rate=st.none() | shares,
+        steps_per_second=st.none() | st.floats(0.0, 1e9),
+        simulators=st.lists(
+            st.builds(
+                SimulatorStatus,
+                name=names,
+                role=st.sampled_from([role.value for role in SimulatorRole]),
+                state=st.sampled_from([state.value for state in SidecarState]),
+                restarts=counts,
+                last_fault=st.none() | texts,
+            ),
+            max_size=3,
+        ).map(tuple),
+        last_checkpoint=st.none() | checkpoints,
+        last_progress=st.none() | times,
+    ),
+    Termination: st.builds(
+        Termination,
+        step=counts,
+        reason=texts,
+        success_rate=st.none() | shares,
+        last_checkpoint=st.none() | checkpoints,
+    ),
+}
+
+scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20)
+anything = st.recursive(
+    scalars, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4)
+)
+
+
+@st.composite
+def bent(draw, shape):
+    """Draw a right message in which one field, at any depth, was replaced or taken away."""
+    whole = draw(SHAPES[shape]).to_json()
+    part = whole
+    while True:
+        name = draw(st.sampled_from(sorted(part)))
+        inner = part[name][0] if isinstance(part[name], list) and part[name] else part[name]
+        if not isinstance(inner, dict) or draw(st.booleans()):
+            break
+        part = inner
+    if draw(st.booleans()):
+        del part[name]
+    else:
+        part[name] = draw(anything)
+    return whole
+
+
+@pytest.fixture(scope="session")
+def messages():
+    """Return how to draw messages: of a shape, of a shape and bent, or anything that JSON can say."""
+
+    class Messages:
+        right = staticmethod(SHAPES.__getitem__)
+        bent = staticmethod(bent)
+        anything = anything
+
+    return Messages
+
+
+@pytest.fixture
+def state():
+    """Return how to make the state of a simulator; the test says what matters."""
+
+    def make(**changes):
+        plain = {"state": SidecarState.IDLE, "driver": "stub", "world": "/worlds/collect-0.wbt"}
+        return SimulatorState(**plain | changes)
+
+    return make
+
+
+@pytest.fixture
+def status():
+    """Return how to make the status of a trainer; the test says what matters."""
+
+    def make(**changes):
+        return TrainerStatus(**{"step": 0, "target": 1, "episodes": 0, "phase": "training"} | changes)
+
+    return make

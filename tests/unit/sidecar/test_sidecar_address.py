@@ -1,0 +1,20 @@
+"""The addresses that a sidecar listens on."""
+
+import pytest
+
+from palaestra_sim.sidecar.server import Address
+
+
+@pytest.mark.parametrize("text", ["127.0.0.1:7100", "0.0.0.0:0", "[::1]:65535"])
+def test_an_address_is_written_as_it_is_read(text) -> None:
+    """The first line that a sidecar prints is read by programs."""
+    assert str(Address.parse(text)) == text
+
+
+@pytest.mark.parametrize(
+    "text", ["", "7100", ":7100", "localhost:1", "127.0.0.1:65536", "127.0.0.1:x", "::1"]
+)
+def test_what_is_no_address_with_a_port_is_refused(text) -> None:
+    """A name could be anybody's address tomorrow, so there are none."""
+    with pytest.raises(ValueError, match=""):
+        Address.parse(text)

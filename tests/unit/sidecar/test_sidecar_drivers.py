@@ -1,0 +1,84 @@
+"""The command lines of the simulators."""
+
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.sidecar.drivers import Driver, Launch, command
+from palaestra_sim.sidecar.errors import SidecarError
+
+WORLD = Path("/worlds/collect-0.wbt")
+
+
+@pytest.fixture
+def path(tmp_path):
+    """Return a PATH on which the named programs are."""
+
+    def make(*programs):
+        for program in programs:
+            (tmp_path / program).write_text("#!/bin/sh\n")
+            (tmp_path / program).chmod(0o755)
+        return str(tmp_path)
+
+    return make
+
+
+def test_the_stub_gets_the_world_and_its_options(path) -> None:
+    """Options come last, so that they are next to what the job's author wrote."""
+    folder = path("palaestra-stub")
+
+    started = command(
+        Driver.STUB, Launch(world=WORLD, options=["--step-sleep=3"]), {"PATH": folder, "A": "b"}
+    )
+
+    assert started.arguments == (f"{folder}/palaestra-stub", str(WORLD), "--step-sleep=3")
+    assert started.environment == {"PATH": folder, "A": "b"}
+
+
+def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
+    """The trainer sets the mode when it is there to step."""
+    folder = path("webots")
+
+    started = command(Driver.WEBOTS, Launch(world=WORLD, options=["--port=1235"]), {"PATH": folder})
+
+    assert " ".join(started.arguments) == (
+        f"{folder}/webots --batch --mode=pause --stdout --stderr --minimize --no-rendering "
+        f"{WORLD} --port=1235"
+    )
+
+
+@pytest.mark.parametrize(("given", "user"), [({}, "palaestra"), ({"USER": "maria"}, "maria")])
+def test_webots_always_has_a_user(path, given, user) -> None:
+    """Its temporary folder is named after one, and a container has none."""
+    started = command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": path("webots"), **given})
+
+    assert started.environment["USER"] == user
+
+
+def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None:
+    """`{world}` may be a part of an argument."""
+    folder = path("my-sim")
+    launch = Launch(world=WORLD, options=["--fast"], program=["my-sim", "--scene={world}", "-v"])
+
+    started = command(Driver.COMMAND, launch, {"PATH": folder})
+
+    assert started.arguments == (f"{folder}/my-sim", f"--scene={WORLD}", "-v", "--fast")
+
+
+def test_a_missing_program_is_named(tmp_path) -> None:
+    """That is known before anything is started, and trying again cannot help."""
+    with pytest.raises(SidecarError, match="^--driver webots: there is no program webots; install it"):
+        command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": str(tmp_path)})
+
+
+def test_a_driver_without_a_program_says_where_to_put_one() -> None:
+    """The two dashes are easily forgotten."""
+    with pytest.raises(SidecarError, match=r"^--driver command: has no program; give it behind --"):
+        command(Driver.COMMAND, Launch(world=WORLD), {})
+
+
+def test_the_programs_beside_our_own_python_are_found_without_a_path(tmp_path) -> None:
+    """A virtual environment works without being activated."""
+    started = command(Driver.STUB, Launch(world=WORLD), {"PATH": str(tmp_path)})
+
+    assert Path(started.arguments[0]).name == "palaestra-stub"

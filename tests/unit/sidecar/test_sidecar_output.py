@@ -1,0 +1,67 @@
+"""What a simulator prints comes out line by line, whatever it prints."""
+
+import logging
+import os
+import threading
+
+import pytest
+
+from palaestra_sim.sidecar.output import MOST_LINE, LineHandler, Passage
+
+
+@pytest.fixture
+def passed_on(capfdbinary):
+    """Return what comes out for what goes in, and the last line that was kept."""
+
+    def through(*pieces):
+        source, sink = os.pipe()
+        passage = Passage(source)
+        reader = threading.Thread(target=passage.run)
+        reader.start()
+        for piece in pieces:
+            os.write(sink, piece)
+        os.close(sink)
+        reader.join(10)
+        return capfdbinary.readouterr().out, passage.last_line
+
+    return through
+
+
+def test_lines_come_out_as_they_went_in(passed_on) -> None:
+    """Also when a line comes in two pieces, and when lines are empty."""
+    out, last = passed_on(b"one\ntw", b"o\n\nthree\n")
+
+    assert out == b"one\ntwo\n\nthree\n"
+    assert last == "three"
+
+
+def test_the_last_line_needs_no_newline(passed_on) -> None:
+    """A simulator that dies in the middle of its last words has said them."""
+    out, last = passed_on(b"Aborted")
+
+    assert (out, last) == (b"Aborted\n", "Aborted")
+
+
+@pytest.mark.parametrize("end", [b"", b"\n"])
+def test_a_line_without_end_is_passed_on_in_pieces(passed_on, end) -> None:
+    """It must not be kept until its end: it may have none."""
+    out, _ = passed_on(b"x" * 3 * MOST_LINE + end)
+
+    assert {len(line) for line in out.splitlines(keepends=True)[:-1]} == {MOST_LINE}
+    assert out.replace(b"\n", b"") == b"x" * 3 * MOST_LINE
+
+
+def test_bytes_that_are_no_text_are_passed_on(passed_on) -> None:
+    """A log is bytes; only the last line becomes text, for /state."""
+    out, last = passed_on(b"\xff\xfe\n")
+
+    assert (out, last) == (b"\xff\xfe\n", "\ufffd\ufffd")
+
+
+def test_our_own_lines_say_that_they_are_ours(capfdbinary) -> None:
+    """And stay one line, whatever a simulator said last."""
+    record = logging.makeLogRecord({"msg": "failed: %s", "args": ("a\nb",)})
+
+    LineHandler().emit(record)
+
+    assert capfdbinary.readouterr().out == b"palaestra-sidecar: failed: a b\n"

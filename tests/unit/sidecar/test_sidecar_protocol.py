@@ -1,0 +1,258 @@
+"""What trainer, sidecar and operator say to each other, and what they refuse to hear."""
+
+import json
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.protocol.control import (
+    LastExit,
+    PlainRequest,
+    ProtocolError,
+    RobotName,
+    SidecarState,
+    SimulatorState,
+    StopRequest,
+)
+from palaestra_sim.protocol.fields import MOST_BYTES, decoded
+from palaestra_sim.protocol.status import (
+    CheckpointStatus,
+    ExitCode,
+    SimulatorStatus,
+    Termination,
+    TrainerStatus,
+)
+
+SHAPES = [SimulatorState, TrainerStatus, Termination]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@given(data=st.data())
+@settings(max_examples=50)
+def test_what_is_written_is_read_back(messages, shape, data) -> None:
+    """Both ends are ours, and a message goes through JSON text between them."""
+    message = data.draw(messages.right(shape))
+
+    assert shape.from_json(json.loads(json.dumps(message.to_json()))) == message
+
+
+@pytest.mark.parametrize("shape", [*SHAPES, StopRequest, PlainRequest])
+@given(data=st.data())
+@settings(max_examples=100)
+def test_no_json_at_all_breaks_a_reader(messages, shape, data) -> None:
+    """A pod may answer anything: a reader knows one error only."""
+    content = data.draw(messages.anything)
+
+    try:
+        shape.from_json(content)
+    except ProtocolError as error:
+        assert str(error)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@given(data=st.data())
+@settings(max_examples=100)
+def test_one_wrong_field_breaks_no_reader(messages, shape, data) -> None:
+    """Nearly right is harder than random: it gets to the last check."""
+    content = data.draw(messages.bent(shape))
+
+    try:
+        message = shape.from_json(content)
+    except ProtocolError:
+        return
+    json.dumps(message.to_json(), allow_nan=False).encode()
+
+
+@given(data=st.binary(max_size=200))
+def test_no_bytes_break_the_decoder(data) -> None:
+    """Bytes come off a socket before anything else is known of them."""
+    try:
+        decoded(data)
+    except ProtocolError as error:
+        assert str(error).startswith("body: ")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"state": "happy"}, "state: 'happy' is not one of idle, starting, ready, stopping, failed"),
+        ({"state": 3}, "state: a number is no text"),
+        ({"world": "x" * 5000}, "world: has 5000 characters, not 0 to 4096"),
+        ({"detail": "\ud800"}, "detail: holds half a character"),
+        ({"pid": 0}, "pid: is not within 1 to 4194304"),
+        ({"pid": True}, "pid: true or false is no integer"),
+        ({"starts": 1.0}, "starts: a number is no integer"),
+        ({"faults": -1}, "faults: is not within 0 to 9007199254740992"),
+        ({"faults": 10**6000}, "faults: is not within 0 to 9007199254740992"),
+        ({"robots": {}}, "robots: an object is no list"),
+        ({"robots": [{}] * 33}, "robots: has 33 entries, more than 32"),
+        ({"robots": [7]}, "robots[0]: a number is no object"),
+        ({"robots": [{"robot": "r", "ros_name": ""}]}, "robots[0].ros_name: has 0 characters, not 1"),
+        ({"last_exit": {"code": 256}}, "last_exit.code: is not within 0 to 255"),
+        ({"last_exit": {"code": 1, "expected": 1}}, "last_exit.expected: a number is not true or"),
+    ],
+)
+def test_a_refusal_names_the_field_and_the_fact(state, changes, message) -> None:
+    """The person who reads it has the program that sent it, not this one."""
+    with pytest.raises(ProtocolError) as refusal:
+        SimulatorState.from_json(state().to_json() | changes)
+
+    assert str(refusal.value).startswith(message)
+
+
+@pytest.mark.parametrize("field", ["state", "driver", "world", "robots", "starts", "faults", "detail"])
+def test_a_missing_field_is_named(state, field) -> None:
+    """Nothing is guessed: a default would hide a broken sidecar."""
+    content = state().to_json()
+    del content[field]
+
+    with pytest.raises(ProtocolError, match=f"^{field}: is missing$"):
+        SimulatorState.from_json(content)
+
+
+def test_a_field_that_a_newer_release_added_is_ignored_in_an_answer(state) -> None:
+    """Images of one job may be of different releases."""
+    content = state().to_json() | {"colour": "green"}
+
+    assert SimulatorState.from_json(content) == state()
+
+
+def test_a_field_that_does_not_belong_is_refused_in_a_request() -> None:
+    """A misspelled deadline must not become no deadline."""
+    with pytest.raises(ProtocolError, match="^deadline: is not a field of this request$"):
+        StopRequest.from_json({"deadline": 5})
+
+
+@pytest.mark.parametrize("deadline_s", [-0.1, 3600.1, math.nan, math.inf, 10**400, "5", None, True])
+def test_a_deadline_is_a_number_of_seconds_within_an_hour(deadline_s) -> None:
+    """Nothing waits for ever, and nothing waits for not-a-number."""
+    with pytest.raises(ProtocolError, match="^deadline_s: "):
+        StopRequest.from_json({"deadline_s": deadline_s})
+
+
+def test_a_deadline_may_be_now() -> None:
+    """That is how a simulator that hangs is ended."""
+    assert StopRequest.from_json({"deadline_s": 0}).to_json() == {"deadline_s": 0.0}
+
+
+def test_an_answer_that_is_too_long_is_not_even_read() -> None:
+    """Reading JSON takes many times its size."""
+    with pytest.raises(ProtocolError, match="^body: 524289 bytes are more than 524288$"):
+        decoded(b" " * (MOST_BYTES + 1))
+
+
+def test_nesting_without_end_is_refused_as_any_other_nonsense() -> None:
+    """A parser that runs out of stack raises no ValueError."""
+    with pytest.raises(ProtocolError, match=r"^body: is no JSON \(RecursionError\)$"):
+        decoded(b"[" * 100_000)
+
+
+def test_the_longest_messages_fit_in_an_answer(state, status) -> None:
+    """Else a sidecar with many robots, or a trainer with many faults, would fall silent."""
+    robot = RobotName(robot="\U0001f916" * 300, ros_name="\U0001f916" * 300, supervisor=True)
+    fault = SimulatorStatus(
+        name="\U0001f916" * 300, role="Collect", state="ready", last_fault="\U0001f916" * 600
+    )
+    longest = [
+        state(robots=(robot,) * 40, world="\U0001f916" * 5000, detail="\U0001f916" * 600),
+        status(simulators=(fault,) * 40),
+    ]
+
+    for message in longest:
+        assert type(message).from_json(decoded(json.dumps(message.to_json()).encode()))
+
+
+def test_a_text_that_is_too_long_is_cut_by_its_writer(state) -> None:
+    """A long error must not make the whole state unreadable."""
+    read = SimulatorState.from_json(state(detail="x" * 501 + "\ud800").to_json())
+
+    assert read.detail == "x" * 500
+
+
+def test_a_number_that_json_cannot_say_is_not_known(status) -> None:
+    """A mean of diverged returns is not-a-number, and no JSON."""
+    read = TrainerStatus.from_json(status(mean_return=math.nan, steps_per_second=math.inf).to_json())
+
+    assert (read.mean_return, read.steps_per_second) == (None, None)
+
+
+@pytest.mark.parametrize("share", [-0.01, 1.01])
+def test_a_success_rate_is_a_share(status, share) -> None:
+    """Percent would pass for a very good policy."""
+    with pytest.raises(ProtocolError, match="^success_rate: is not within 0 to 1$"):
+        TrainerStatus.from_json(status(success_rate=share).to_json())
+
+
+@pytest.mark.parametrize("time", ["yesterday", "2025-02-30T00:00:00Z", "2025-01-31", "2025-01-31T12:00:00"])
+def test_a_time_is_one_that_kubernetes_takes(status, time) -> None:
+    """It is copied into a TrainingJob's status, whose schema says date-time."""
+    content = status(last_progress=time).to_json()
+
+    with pytest.raises(ProtocolError, match="^last_progress: is no time such as 2025-01-31T12:00:00Z$"):
+        TrainerStatus.from_json(content)
+
+
+def test_a_nested_mistake_says_where_it_is(status) -> None:
+    """There may be sixteen simulators in the list."""
+    good = SimulatorStatus(name="collect-0", role="Collect", state="ready")
+    bad = SimulatorStatus(name="collect-1", role="Eval", state="ready")
+
+    with pytest.raises(ProtocolError, match=r"^simulators\[1\]\.role: 'Eval' is not one of Collect, "):
+        TrainerStatus.from_json(status(simulators=(good, bad)).to_json())
+
+
+@given(reason=st.text(max_size=3000))
+def test_the_last_word_fits_in_a_termination_message(reason) -> None:
+    """Kubernetes cuts it at 4096 bytes, and half a JSON says nothing at all."""
+    checkpoint = CheckpointStatus(step=2**53, time="2025-01-31T12:00:00.123456789+00:00")
+    word = Termination(step=2**53, reason=reason, success_rate=1 / 3, last_checkpoint=checkpoint)
+
+    message = word.to_message()
+
+    assert len(message.encode()) <= 4096
+    assert Termination.from_message(message).last_checkpoint == checkpoint
+
+
+def test_the_longest_reason_is_cut_and_nothing_else() -> None:
+    """Every character of it takes twelve bytes."""
+    message = Termination(step=7, reason="\U0001f916" * 3000, success_rate=0.5).to_message()
+
+    read = Termination.from_message(message)
+    assert (read.step, read.success_rate) == (7, 0.5)
+    assert 300 < len(read.reason) < 341
+
+
+@pytest.mark.parametrize("message", ["", "Traceback (most recent call last):", "{" * 5000, "\ud800"])
+def test_the_end_of_a_log_is_no_last_word(message) -> None:
+    """FallbackToLogsOnError puts one there."""
+    with pytest.raises(ProtocolError):
+        Termination.from_message(message)
+
+
+def test_the_exit_codes_are_those_that_a_job_decides_by() -> None:
+    """They stand in every plan's podFailurePolicy: changing one needs a new release of all parts."""
+    assert {code.name: code.value for code in ExitCode} == {
+        "DONE": 0,
+        "CONFIGURATION": 2,
+        "INTERRUPTED": 75,
+        "FAULT_BUDGET": 80,
+        "DIVERGED": 81,
+        "STALLED": 82,
+    }
+
+
+def test_an_end_without_code_and_signal_is_one_that_nobody_saw(state) -> None:
+    """A program that could not be run has neither."""
+    unseen = LastExit(code=None, signal=None, expected=False)
+    failed = state(state=SidecarState.FAILED, last_exit=unseen)
+
+    assert SimulatorState.from_json(failed.to_json()).last_exit == unseen
+
+
+def test_a_protocol_error_is_one_of_this_package_and_a_value_error() -> None:
+    """So that either may be caught where it is read."""
+    assert issubclass(ProtocolError, (SimError,))
+    assert issubclass(ProtocolError, ValueError)

@@ -1,0 +1,298 @@
+"""A ROS without sockets: nodes whose services are called by path, as a client would, and topics that keep what was sent.
+
+Requests and responses go through the real message types, so a field that the type does not have is an error here too.
+"""
+
+import heapq
+import itertools
+import math
+from collections import deque
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from palaestra_sim.protocol.rostypes import service_type
+from palaestra_sim.stub.options import StubOptions
+from palaestra_sim.stub.ros.node import LATER, ServiceFailed
+from palaestra_sim.stub.simulation import Mode
+from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.world import builtin
+
+PENDING = object()
+
+
+class FakePublisher:
+    """Keeps what was sent while somebody was subscribed."""
+
+    def __init__(self, topic, type_name, template, latched):
+        self.topic = topic
+        self.type_name = type_name
+        self.template = template
+        self.latched = latched
+
+    @property
+    def subscribers(self):
+        return len(self.topic.inboxes)
+
+    def send(self, fields):
+        self.topic.deliver({**self.template, **fields})
+
+    def send_value(self, value):
+        self.topic.deliver(value)
+
+
+class FakeTopic:
+    """A topic: its publishers and the inboxes of its subscribers."""
+
+    def __init__(self):
+        self.publishers = []
+        self.inboxes = []
+
+    def deliver(self, message):
+        for inbox in self.inboxes:
+            inbox.append(message)
+
+
+class FakeNode:
+    """A node as the controller sees it, and as a client does: `call`."""
+
+    def __init__(self, ros, name):
+        self.name = name
+        self.blocked = lambda: False
+        self.current_call = None
+        self.services = {}
+        self.answers = {}
+        self.closed = False
+        self._ros = ros
+        self._waiting = deque()
+        self._calls = itertools.count()
+
+    def serve(self, path, type_name, handler):
+        assert path not in self.services, f"{path} served twice"
+        self.services[path] = (service_type(type_name), handler)
+
+    def advertise(self, path, type_name, *, latched=False, template=None):
+        topic = self._ros.topic(path if path.startswith("/") else f"/{self.name}/{path}")
+        publisher = FakePublisher(topic, type_name, dict(template or {}), latched)
+        topic.publishers.append(publisher)
+        return publisher
+
+    def withdraw(self, publisher):
+        publisher.topic.publishers.remove(publisher)
+
+    def answer(self, call, fields):
+        number, type_ = call
+        self.answers[number] = _travelled(type_.response, fields)
+        self.later(0, self._take_waiting)
+
+    def later(self, delay_s, callback):
+        self._ros.later(delay_s, callback)
+
+    def close(self):
+        self.closed = True
+        self.services.clear()
+
+    def ask(self, path, **fields):
+        """Send a request and return its number; the answer is in `answers`, once there is one."""
+        number = next(self._calls)
+        if self.blocked():
+            self._waiting.append((number, path, fields))
+        else:
+            self._handle(number, path, fields)
+        return number
+
+    def call(self, path, **fields):
+        """Call a service as a client does, with what happens right after the answer; PENDING if none comes."""
+        number = self.ask(path, **fields)
+        self._ros.advance(0)
+        answer = self.answers.get(number, PENDING)
+        if isinstance(answer, ServiceFailed):
+            raise answer
+        return answer
+
+    def get(self, path, **fields):
+        """Call a service and return the one field of its response."""
+        (value,) = _fields(self.call(path, **fields))
+        return value
+
+    def inbox(self, path):
+        """Subscribe, and return the list that messages come into."""
+        messages = []
+        name = path if path.startswith("/") else f"/{self.name}/{path}"
+        self._ros.topic(name).inboxes.append(messages)
+        return messages
+
+    def publishers(self, path):
+        return self._ros.topic(f"/{self.name}/{path}").publishers
+
+    def _handle(self, number, path, fields):
+        type_, handler = self.services[path]
+        self.current_call = (number, type_)
+        try:
+            answer = handler(_travelled(type_.request, fields))
+        except ServiceFailed as error:
+            self.answers[number] = error
+            return
+        if answer is not LATER:
+            self.answers[number] = _travelled(type_.response, answer)
+
+    def _take_waiting(self):
+        while self._waiting and not self.blocked():
+            self._handle(*self._waiting.popleft())
+
+
+class FakeRos:
+    """Nodes, topics and a clock that only `advance` moves."""
+
+    def __init__(self):
+        self.now_s = 100.0
+        self.nodes = []
+        self._topics = {}
+        self._timers = []
+        self._order = itertools.count()
+
+    def make_node(self, name):
+        node = FakeNode(self, name)
+        self.nodes.append(node)
+        return node
+
+    def node(self, name):
+        """Return the newest node of that name."""
+        return [it for it in self.nodes if it.name == name][-1]
+
+    def topic(self, name):
+        return self._topics.setdefault(name, FakeTopic())
+
+    def clock(self):
+        return self.now_s
+
+    def later(self, delay_s, callback):
+        heapq.heappush(self._timers, (self.now_s + delay_s, next(self._order), callback))
+
+    def advance(self, duration_s):
+        """Let time pass, and everything happen that was to happen by then."""
+        end_s = self.now_s + duration_s
+        while self._timers and self._timers[0][0] <= end_s:
+            due_s, _, callback = heapq.heappop(self._timers)
+            self.now_s = max(self.now_s, due_s)
+            callback()
+        self.now_s = end_s
+
+
+def _travelled(codec, fields):
+    return codec.decode(codec.encode(fields))
+
+
+def _fields(message):
+    names = getattr(message, "_fields", None) or message.__slots__
+    return [getattr(message, name) for name in names]
+
+
+@pytest.fixture
+def ros():
+    """An empty ROS."""
+    return FakeRos()
+
+
+@pytest.fixture
+def start(ros, tmp_path):
+    """Start a stub: `start(world=..., mode=..., options=...)` returns the Simulator."""
+
+    def begin(world=None, mode=Mode.FAST, **options):
+        path = tmp_path / "worlds" / "arena.wbt"
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(builtin("arena") if world is None else world)
+        simulator = Simulator(
+            path, ros.make_node, options=StubOptions(**options), mode=mode, clock=ros.clock
+        )
+        simulator.start()
+        return simulator
+
+    return begin
+
+
+@pytest.fixture
+def robot(ros, start):
+    """The node of the shipped arena's robot, running fast."""
+    start()
+    return ros.node("robotino")
+
+
+@pytest.fixture
+def two_robots(ros, start):
+    """The nodes of the shipped world with a separate supervisor: supervisor, robot."""
+    start(builtin("two_robots"))
+    return ros.node("supervisor"), ros.node("robotino")
+
+
+@pytest.fixture
+def drive():
+    """`drive(node, vx, vy, omega)`: command the wheels over ROS, as a facade does."""
+
+    def command(node, vx, vy, omega):
+        speeds = (
+            (vy - 0.1826 * omega) / 0.063,
+            (-math.sqrt(0.75) * vx - 0.5 * vy - 0.1826 * omega) / 0.063,
+            (math.sqrt(0.75) * vx - 0.5 * vy - 0.1826 * omega) / 0.063,
+        )
+        for index, speed in enumerate(speeds):
+            node.call(f"wheel{index}_joint/set_position", value=math.inf)
+            node.call(f"wheel{index}_joint/set_velocity", value=speed)
+
+    return command
+
+
+@pytest.fixture
+def position():
+    """`position(node, "ROBOTINO")`: x, y, z of a node by its DEF, over ROS."""
+
+    def ask(node, def_name):
+        handle = node.get("supervisor/get_from_def", name=def_name)
+        point = node.get("supervisor/node/get_position", node=handle)
+        return point.x, point.y, point.z
+
+    return ask
+
+
+@pytest.fixture
+def world():
+    """`world(objects, robot=...)`: a world file around a few nodes, with a robot unless told otherwise."""
+
+    def write(objects="", robot=ROBOT, info=""):
+        return f"#VRML_SIM R2023b utf8\nWorldInfo {{ {info} }}\n{objects}\n{robot}\n".encode()
+
+    return write
+
+
+def _wheel(index):
+    return f"""HingeJoint {{
+      device [ RotationalMotor {{ name "wheel{index}_joint" maxVelocity 137.46 }}
+               PositionSensor {{ name "wheel{index}_joint_sensor" }} ] }}"""
+
+
+ROBOT = f"""DEF ROBOTINO Robot {{
+  name "robotino" controller "ros" controllerArgs [ "--name=robotino" "--synchronize" ]
+  supervisor TRUE
+  children [
+    {_wheel(0)} {_wheel(1)} {_wheel(2)}
+    DEF IR DistanceSensor {{
+      translation 0.2 0 0.05 name "ir1" lookupTable [ 0 1 0, 0.5 0.5 0, 1 0 0 ] }}
+    TouchSensor {{
+      translation 0 0 0.15 name "touch sensor" boundingObject Cylinder {{ radius 0.2 height 0.2 }} }}
+  ]
+  boundingObject Pose {{
+    translation 0 0 0.15 children [ Cylinder {{ radius 0.2 height 0.2 }} ] }}
+}}"""
+
+
+@pytest.fixture
+def simple_robot():
+    """The text of a robot of radius 0.2 m with one noiseless ray that tells 1 - distance."""
+    return ROBOT
+
+
+@pytest.fixture
+def namespace():
+    """`namespace(**fields)`: an object with attributes."""
+    return SimpleNamespace

@@ -1,0 +1,159 @@
+"""Discs and blocks: pushing robots out and stopping rays, checked against what a fine ruler says."""
+
+import math
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from palaestra_sim.stub.obstacles import Block, Disc, Neighbourhood
+
+places = st.floats(-3, 3)
+angles = st.floats(-math.pi, math.pi)
+sizes = st.floats(0.05, 2)
+discs = st.builds(Disc, places, places, sizes)
+blocks = st.builds(Block, places, places, angles, st.tuples(sizes, sizes))
+obstacles = st.one_of(discs, blocks)
+AHEAD = ((0.0, 0.0, 1.0, 0.0),)
+
+
+def cast(obstacle, x, y, heading, reach=10.0):
+    """How far one ray travels from x, y."""
+    distances = [reach]
+    obstacle.scan((x, y, math.cos(heading), math.sin(heading)), AHEAD, distances)
+    return distances[0]
+
+
+@given(obstacle=obstacles, x=places, y=places, radius=st.floats(0.05, 1))
+def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(obstacle, x, y, radius):
+    """The push is the shortest way out that the contact tells."""
+    contact = obstacle.contact(x, y, radius)
+    assume(contact is not None)
+    nx, ny, depth = contact
+
+    assert math.hypot(nx, ny) == pytest.approx(1.0)
+    assert depth > 0.0
+    assert obstacle.gap(x + nx * depth, y + ny * depth) == pytest.approx(radius, abs=1e-9)
+
+
+@given(obstacle=obstacles, x=places, y=places, radius=st.floats(0.05, 1))
+def test_there_is_a_contact_exactly_where_the_gap_is_smaller_than_the_radius(obstacle, x, y, radius):
+    """Contact and gap are two views of one shape."""
+    gap = obstacle.gap(x, y)
+    assume(abs(gap - radius) > 1e-9)
+
+    assert (obstacle.contact(x, y, radius) is not None) == (gap < radius)
+
+
+@given(obstacle=obstacles, x=places, y=places, heading=angles)
+def test_a_ray_ends_at_the_surface_and_crosses_nothing_before(obstacle, x, y, heading):
+    """Sphere tracing: no point on the way is nearer than what was left to go."""
+    assume(obstacle.gap(x, y) > 1e-6)
+    met = cast(obstacle, x, y, heading)
+    end = (x + met * math.cos(heading), y + met * math.sin(heading))
+
+    if met < 10.0:
+        assert obstacle.gap(*end) == pytest.approx(0.0, abs=1e-6)
+    for i in range(50):
+        way = met * i / 50
+        assert obstacle.gap(x + way * math.cos(heading), y + way * math.sin(heading)) > -1e-9
+
+
+@given(obstacle=obstacles, x=places, y=places)
+def test_a_ray_towards_the_middle_meets_the_shape(obstacle, x, y):
+    """Whatever the direction it comes from."""
+    assume(obstacle.gap(x, y) > 1e-6)
+
+    met = cast(obstacle, x, y, math.atan2(obstacle.y - y, obstacle.x - x))
+
+    assert met < 10.0
+
+
+@given(obstacle=obstacles, x=places, y=places)
+def test_a_ray_away_from_the_shape_does_not_turn_round(obstacle, x, y):
+    """What is behind isn't seen."""
+    assume(obstacle.gap(x, y) > 1e-3)
+
+    assert cast(obstacle, x, y, math.atan2(y - obstacle.y, x - obstacle.x)) == 10.0
+
+
+@given(x=places, y=places, heading=angles, ray_heading=angles)
+def test_turning_robot_and_ray_is_turning_the_ray(x, y, heading, ray_heading):
+    """A ray in the robot's frame is turned with it."""
+    block = Block(0.3, -0.2, 0.7, (1.0, 0.5))
+    assume(block.gap(x, y) > 1e-3)
+    distances = [10.0]
+    ray = (0.0, 0.0, math.cos(ray_heading), math.sin(ray_heading))
+    block.scan((x, y, math.cos(heading), math.sin(heading)), (ray,), distances)
+
+    assert distances[0] == pytest.approx(cast(block, x, y, heading + ray_heading), abs=1e-6)
+
+
+def test_a_ray_begins_at_its_own_origin():
+    """Sensors sit on the rim, not in the middle."""
+    distances = [10.0]
+
+    Disc(2.0, 0.0, 0.5).scan((0.0, 0.0, 1.0, 0.0), ((0.2, 0.0, 1.0, 0.0),), distances)
+
+    assert distances[0] == pytest.approx(1.3)
+
+
+def test_a_ray_along_a_face_misses_a_parallel_wall():
+    """A direction of exactly 0 across the wall must not divide by it."""
+    wall = Block(0.0, 1.0, 0.0, (4.0, 0.1))
+
+    assert cast(wall, -3.0, 0.0, 0.0) == 10.0
+    assert cast(wall, -3.0, 1.0, 0.0) == pytest.approx(1.0)
+
+
+def test_a_ray_from_inside_is_0_long():
+    """A sensor that was put into a wall sees the wall."""
+    assert cast(Block(0.0, 0.0, 0.0, (1.0, 1.0)), 0.1, 0.1, 0.3) == 0.0
+
+
+def test_a_longer_obstacle_does_not_hide_a_nearer_one():
+    """Scans only ever shorten."""
+    distances = [10.0]
+    frame = (0.0, 0.0, 1.0, 0.0)
+    Disc(2.0, 0.0, 0.5).scan(frame, AHEAD, distances)
+    Disc(5.0, 0.0, 0.5).scan(frame, AHEAD, distances)
+
+    assert distances == [1.5]
+
+
+def test_a_robot_in_the_middle_of_a_disc_is_pushed_somewhere():
+    """Where no direction is the nearest, one has to be taken."""
+    assert Disc(1.0, 1.0, 0.5).contact(1.0, 1.0, 0.2) == (1.0, 0.0, 0.7)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "normal"), [(0.9, 0.0, (1, 0)), (-0.9, 0.0, (-1, 0)), (0, 0.4, (0, 1)), (0, -0.4, (0, -1))]
+)
+def test_a_robot_whose_middle_is_in_a_block_leaves_by_the_nearest_face(x, y, normal):
+    """So that a robot put into a wall comes out on the side that it was put to."""
+    contact = Block(0.0, 0.0, 0.0, (2.0, 1.0)).contact(x, y, 0.1)
+
+    assert contact[:2] == pytest.approx(normal)
+
+
+@given(
+    obstacles=st.lists(obstacles, max_size=5),
+    x=st.floats(-600, 600),
+    y=st.floats(-600, 600),
+    reach=st.floats(0, 2),
+)
+def test_a_neighbourhood_forgets_nothing_in_reach(obstacles, x, y, reach):
+    """It may tell too many, never too few."""
+    near = Neighbourhood(obstacles, reach).near(x, y)
+
+    assert [it for it in obstacles if it.gap(x, y) <= reach and it not in near] == []
+
+
+def test_a_neighbourhood_is_bounded():
+    """A robot that drives away for ever must not fill the memory."""
+    neighbourhood = Neighbourhood([Disc(0.0, 0.0, 1.0)], 0.5)
+
+    for i in range(2 * Neighbourhood.LIMIT):
+        neighbourhood.near(i * 0.2, 0.0)
+
+    assert len(neighbourhood._squares) <= Neighbourhood.LIMIT

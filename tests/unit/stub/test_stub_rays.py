@@ -1,0 +1,121 @@
+"""From metres to volts: the lookup table of a sensor, and the fan of rays of a robot."""
+
+import math
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_sim.stub.obstacles import Disc, Neighbourhood
+from palaestra_sim.stub.rays import Fan, LookupTable
+
+ROWS = [(0.1, 3.0, 0.0), (0.2, 2.0, 0.0), (0.4, 1.0, 0.0)]
+
+
+def silent(_mean, _deviation):
+    raise AssertionError("a sensor without noise drew some")
+
+
+def one(_mean, deviation):
+    """A draw of exactly one deviation."""
+    return deviation
+
+
+def test_rows_answer_their_own_value():
+    """The table is exact where it says something."""
+    table = LookupTable(ROWS)
+
+    assert [table.response(row[0], silent) for row in ROWS] == pytest.approx([3.0, 2.0, 1.0])
+
+
+@pytest.mark.parametrize(("distance", "volts"), [(0.15, 2.5), (0.3, 1.5), (0.25, 1.75)])
+def test_between_rows_it_is_linear(distance, volts):
+    """As in Webots."""
+    assert LookupTable(ROWS).response(distance, silent) == pytest.approx(volts)
+
+
+@pytest.mark.parametrize(("distance", "volts"), [(0.0, 3.0), (0.05, 3.0), (0.41, 1.0), (1e9, 1.0)])
+def test_beyond_both_ends_the_end_value_holds(distance, volts):
+    """Nothing is extrapolated, in both directions."""
+    assert LookupTable(ROWS).response(distance, silent) == volts
+
+
+def test_noise_is_a_fraction_of_the_response():
+    """One deviation of a noise of 10 % on 2 V is 0.2 V."""
+    table = LookupTable([(d, v, 0.1) for d, v, _ in ROWS])
+
+    assert table.response(0.2, one) == pytest.approx(2.2)
+    assert table.response(0.0, one) == pytest.approx(3.3)
+    assert table.response(9.0, one) == pytest.approx(1.1)
+
+
+def test_noise_is_interpolated_too():
+    """Each row has its own."""
+    table = LookupTable([(0.0, 1.0, 0.0), (1.0, 1.0, 0.2)])
+
+    assert table.response(0.5, one) == pytest.approx(1.1)
+
+
+def test_an_empty_table_answers_metres():
+    """As in Webots."""
+    assert LookupTable([]).response(0.37, silent) == pytest.approx(0.37)
+
+
+@given(distance=st.floats(0, 2))
+def test_a_response_lies_between_the_limits(distance):
+    """What min_range and max_range of the message promise, without noise."""
+    table = LookupTable(ROWS)
+    low, high = table.limits
+
+    assert low <= table.response(distance, silent) <= high
+
+
+def test_noise_has_the_spread_that_the_table_says():
+    """0.5 % of the response, over many draws."""
+    table = LookupTable([(0.0, 2.0, 0.005)])
+    gauss = random.Random(1).gauss
+    draws = [table.response(0.1, gauss) for _ in range(5000)]
+    mean = sum(draws) / len(draws)
+    deviation = math.sqrt(sum((draw - mean) ** 2 for draw in draws) / len(draws))
+
+    assert mean == pytest.approx(2.0, abs=0.001)
+    assert deviation == pytest.approx(0.01, rel=0.05)
+
+
+def fan_of(obstacles):
+    """Two rays on the rim of a robot: ahead and to the left."""
+    fan = Fan([(0.2, 0.0, 1.0, 0.0), (0.0, 0.2, 0.0, 1.0)], [0.4, 0.4])
+    fan.face(Neighbourhood(obstacles, fan.reach_m), ())
+    return fan
+
+
+def test_rays_that_meet_nothing_have_their_full_reach():
+    """Which the table turns into its last value."""
+    assert fan_of([]).cast((0.0, 0.0, 1.0, 0.0)) == [0.4, 0.4]
+
+
+def test_each_ray_is_stopped_for_itself():
+    """By what stands in its own way."""
+    assert fan_of([Disc(0.0, 0.5, 0.1)]).cast((0.0, 0.0, 1.0, 0.0)) == pytest.approx([0.4, 0.2])
+
+
+def test_rays_turn_with_the_robot():
+    """Turned left, what was on the left is ahead."""
+    left = math.pi / 2
+
+    distances = fan_of([Disc(0.0, 0.5, 0.1)]).cast((0.0, 0.0, math.cos(left), math.sin(left)))
+
+    assert distances == pytest.approx([0.2, 0.4])
+
+
+def test_rays_meet_robots_that_drive():
+    """Where these are now, not where they were when the scene was read."""
+    other = Disc(5.0, 0.0, 0.2)
+    fan = Fan([(0.2, 0.0, 1.0, 0.0)], [0.4])
+    fan.face(Neighbourhood((), fan.reach_m), [other])
+    assert fan.cast((0.0, 0.0, 1.0, 0.0)) == [0.4]
+
+    other.x = 0.7
+
+    assert fan.cast((0.0, 0.0, 1.0, 0.0)) == pytest.approx([0.3])

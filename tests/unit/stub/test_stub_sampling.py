@@ -1,0 +1,302 @@
+"""Sensors over ROS: the rules of `enable`, when messages come, and what is in them."""
+
+import pytest
+
+from palaestra_sim.stub.simulation import Mode
+
+
+def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):
+    """Anything else answers false and leaves the sensor off."""
+    assert robot.get("ir1/enable", value=31) is False
+    assert robot.get("ir1/get_sampling_period") == 0
+
+    assert robot.get("ir1/enable", value=64) is True
+    assert robot.get("ir1/get_sampling_period") == 64
+
+
+def test_enable_takes_multiples_of_the_last_step_afterwards(robot):
+    """32 was fine before; after a step of 192 it isn't any more."""
+    robot.call("robot/time_step", value=192)
+
+    assert robot.get("ir1/enable", value=32) is False
+    assert robot.get("ir1/enable", value=384) is True
+
+
+def test_a_refused_step_does_not_change_what_enable_takes(robot):
+    """Only accepted steps count."""
+    robot.call("robot/time_step", value=33)
+
+    assert robot.get("ir1/enable", value=32) is True
+
+
+def test_negative_multiples_pass_as_in_webots(robot):
+    """-32 % 32 is 0; the guard is the client's."""
+    assert robot.get("ir1/enable", value=-32) is True
+    assert robot.get("ir1/get_sampling_period") == -32
+
+
+def test_the_same_period_again_changes_nothing(robot):
+    """One publisher, one message a step."""
+    robot.call("ir1/enable", value=32)
+
+    assert robot.get("ir1/enable", value=32) is True
+    assert len(robot.publishers("ir1/value")) == 1
+
+
+def test_another_period_adds_a_second_publisher(robot):
+    """Messages of both come mixed on one topic: why a client disables first."""
+    robot.call("ir1/enable", value=64)
+    robot.call("ir1/enable", value=32)
+    inbox = robot.inbox("ir1/value")
+
+    for _ in range(2):
+        robot.call("robot/time_step", value=32)
+
+    assert len(robot.publishers("ir1/value")) == 2
+    assert len(inbox) == 3
+    assert robot.get("ir1/get_sampling_period") == 32
+
+
+def test_enable_0_takes_all_publishers_back(robot):
+    """The way to change a period: enable(0), enable(p)."""
+    robot.call("ir1/enable", value=64)
+    robot.call("ir1/enable", value=32)
+
+    assert robot.get("ir1/enable", value=0) is True
+    assert robot.publishers("ir1/value") == []
+    assert robot.get("ir1/get_sampling_period") == 0
+
+
+def test_no_message_comes_before_the_next_step(robot, ros):
+    """The main loop sleeps until the count goes up."""
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=32)
+    ros.advance(60)
+    assert inbox == []
+
+    robot.call("robot/time_step", value=32)
+
+    assert len(inbox) == 1
+
+
+def test_each_due_sensor_sends_one_message_a_step(robot):
+    """The contract that a facade matches messages by."""
+    paths = [f"ir{i}/value" for i in range(1, 10)] + ["touch_sensor/value", "wheel0_joint_sensor/value"]
+    inboxes = [robot.inbox(path) for path in paths]
+    for path in paths:
+        robot.call(path.replace("value", "enable"), value=192)
+
+    for _ in range(5):
+        robot.call("robot/time_step", value=192)
+
+    assert [len(inbox) for inbox in inboxes] == [5] * len(paths)
+
+
+def test_a_period_of_three_steps_sends_every_third_time(robot):
+    """Due when count times step is a multiple of the period."""
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=96)
+    sizes = []
+
+    for _ in range(6):
+        robot.call("robot/time_step", value=32)
+        sizes.append(len(inbox))
+
+    assert sizes == [0, 0, 1, 1, 1, 2]
+
+
+def test_the_phase_is_a_product_not_a_sum(robot):
+    """Two steps of 32 and one of 64 are 3 * 64 = 192 for the controller, not 128."""
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=192)
+    for _ in range(2):
+        robot.call("robot/time_step", value=32)
+
+    robot.call("robot/time_step", value=64)
+
+    assert len(inbox) == 1
+
+
+def test_a_step_of_0_sets_the_count_back(robot):
+    """With a count of 0 everything that is enabled is due."""
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=3200)
+    robot.call("robot/time_step", value=32)
+    assert inbox == []
+
+    robot.call("robot/time_step", value=0)
+
+    assert len(inbox) == 1
+
+
+def test_messages_come_after_the_answer(ros, start):
+    """Right after by default; later with publish_delay_s."""
+    start(publish_delay_s=0.002)
+    robot = ros.node("robotino")
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=32)
+
+    assert robot.get("robot/time_step", value=32) is True
+    assert inbox == []
+    ros.advance(0.002)
+
+    assert len(inbox) == 1
+
+
+def test_an_impatient_client_gets_every_message_without_the_fault(ros, start):
+    """The messages of a step go out before the next one begins."""
+    start(publish_delay_s=0.002)
+    robot = ros.node("robotino")
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=32)
+
+    for _ in range(3):
+        robot.call("robot/time_step", value=32)
+    ros.advance(0.002)
+
+    assert len(inbox) == 3
+
+
+def test_an_impatient_client_loses_messages_with_the_fault(ros, start):
+    """Step k+1 came while the loop was busy with k: its messages never come."""
+    start(publish_delay_s=0.002, lost_wakeup=True)
+    robot = ros.node("robotino")
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=32)
+
+    for _ in range(2):
+        assert robot.get("robot/time_step", value=32) is True
+    ros.advance(1)
+
+    assert len(inbox) == 1
+
+
+def test_a_client_that_waits_for_the_message_can_lose_the_next_one(ros, start):
+    """The loop has sent all but not yet remembered the count: waiting for messages is not enough."""
+    start(publish_delay_s=0.002, lost_wakeup=True)
+    robot = ros.node("robotino")
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=32)
+    robot.call("robot/time_step", value=32)
+    ros.advance(0.002)
+    assert len(inbox) == 1
+
+    robot.call("robot/time_step", value=32)
+    ros.advance(1)
+    assert len(inbox) == 1
+    robot.call("robot/time_step", value=32)
+    ros.advance(1)
+
+    assert len(inbox) == 2
+
+
+def test_a_distance_sensor_sends_its_constants_with_every_value(robot):
+    """Range in volts: min and max are those of the table's second column."""
+    robot.call("ir2/enable", value=32)
+
+    (publisher,) = robot.publishers("ir2/value")
+
+    assert publisher.type_name == "sensor_msgs/Range"
+    assert publisher.template == {
+        "header": {"frame_id": "robotino/ir2"},
+        "radiation_type": 0,
+        "field_of_view": 1.5708,
+        "min_range": 0.31,
+        "max_range": 3.03,
+    }
+
+
+def test_an_infra_red_sensor_says_so(ros, start, world, simple_robot):
+    """radiation_type is 1 for the type "infra-red" alone."""
+    start(world(robot=simple_robot.replace('name "ir1"', 'name "ir1" type "infra-red"')))
+    robot = ros.node("robotino")
+    robot.call("ir1/enable", value=32)
+
+    (publisher,) = robot.publishers("ir1/value")
+
+    assert publisher.template["radiation_type"] == 1
+    assert robot.get("ir1/get_type") == 1
+
+
+def test_a_bumper_sends_booleans_and_a_position_sensor_numbers(robot):
+    """By the kind of sensor, as in the table of topics."""
+    types = {}
+    for device in ("touch_sensor", "wheel0_joint_sensor", "battery_sensor", "keyboard"):
+        robot.call(f"{device}/enable", value=32)
+    for topic in ("touch_sensor/value", "wheel0_joint_sensor/value", "battery_sensor/value", "keyboard/key"):
+        types[topic] = robot.publishers(topic)[0].type_name
+
+    assert types == {
+        "touch_sensor/value": "webots_ros/BoolStamped",
+        "wheel0_joint_sensor/value": "webots_ros/Float64Stamped",
+        "battery_sensor/value": "webots_ros/Float64Stamped",
+        "keyboard/key": "webots_ros/Int32Stamped",
+    }
+
+
+def test_pseudo_devices_can_be_enabled_and_have_nothing_to_tell(robot):
+    """Every robot has them, plugged in or not."""
+    keys = robot.inbox("keyboard/key")
+
+    for device in ("battery_sensor", "keyboard", "joystick"):
+        assert robot.get(f"{device}/enable", value=64) is True
+        assert robot.get(f"{device}/get_sampling_period") == 64
+        robot.call("robot/time_step", value=32)
+        assert robot.get(f"{device}/enable", value=0) is True
+
+    assert keys == []
+
+
+def test_a_distance_sensor_tells_its_table(robot):
+    """What a facade needs to turn volts into metres."""
+    table = robot.get("ir1/get_lookup_table")
+
+    assert list(table[:6]) == [0.03, 3.03, 0.005, 0.035, 2.78, 0.005]
+    assert len(table) == 3 * 18
+    assert robot.get("ir1/get_min_value") == 0.31
+    assert robot.get("ir1/get_max_value") == 3.03
+    assert robot.get("ir1/get_aperture") == 1.5708
+    assert robot.get("ir1/get_type") == 0
+
+
+def test_devices_tell_their_names_and_kinds(robot):
+    """Node types by number, as in webots/nodes.h."""
+    assert robot.get("touch_sensor/get_name") == "touch sensor"
+    assert robot.get("touch_sensor/get_type") == 0
+    assert robot.get("touch_sensor/get_node_type") == 60
+    assert robot.get("ir1/get_node_type") == 42
+    assert robot.get("wheel0_joint/get_node_type") == 57
+    assert robot.get("wheel0_joint_sensor/get_node_type") == 52
+
+
+def test_the_clock_tells_simulated_time(robot):
+    """Whole milliseconds, after each step, by the one controller that has --clock."""
+    inbox = robot.inbox("/clock")
+
+    for _ in range(40):
+        robot.call("robot/time_step", value=32)
+
+    assert inbox[0] == {"clock": {"secs": 0, "nsecs": 32_000_000}}
+    assert inbox[-1] == {"clock": {"secs": 1, "nsecs": 280_000_000}}
+
+
+def test_only_a_robot_with_the_argument_publishes_the_clock(ros, two_robots):
+    """At most one on a master."""
+    assert len(ros.topic("/clock").publishers) == 1
+
+
+def test_auto_publish_enables_every_sensor(ros, start, world, simple_robot):
+    """With the basic step as period."""
+    start(world(robot=simple_robot.replace('"--synchronize"', '"--synchronize" "--auto-publish"')))
+    robot = ros.node("robotino")
+
+    periods = [robot.get(f"{name}/get_sampling_period") for name in ("ir1", "touch_sensor", "wheel2_joint_sensor")]
+
+    assert periods == [32, 32, 32]
+
+
+def test_enabling_is_possible_in_pause(ros, start):
+    """As a facade prepares a simulator that was started with --mode=pause."""
+    start(mode=Mode.PAUSE)
+
+    assert ros.node("robotino").get("ir1/enable", value=192) is True

@@ -1,0 +1,231 @@
+"""Worlds: what is read from them, and what is refused, by line and column."""
+
+import math
+
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.scene import read_scene
+from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.world import builtin, parse
+
+
+def scene_of(source):
+    return read_scene(parse(source), "my.wbt")
+
+
+def distance(simulation):
+    """What the noiseless ray ahead of the simple robot measures in metres."""
+    simulation.step(32)
+    return 1.0 - simulation.robots[0].sensors["ir1"].value
+
+
+def test_the_shipped_arena_is_read_whole():
+    """Four walls and the floor, four cylinders; the target stands in nobody's way."""
+    scene = scene_of(builtin("arena"))
+
+    kinds = [shape.kind for shape in scene.solids]
+    (robot,) = scene.robots
+
+    assert kinds == ["box"] * 5 + ["cylinder"] * 4
+    assert scene.basic_step_ms == 32
+    assert robot.name == "robotino"
+    assert robot.body.radius == pytest.approx(0.2286)
+    assert len(robot.devices.of_distance()) == 9
+
+
+def test_rays_sit_on_the_rim_and_count_counter_clockwise():
+    """ir1 is the front, ir2 at 40 degrees."""
+    (robot,) = scene_of(builtin("arena")).robots
+
+    azimuths = [
+        math.degrees(math.atan2(it.ray[3], it.ray[2])) for it in robot.devices.of_distance()
+    ]
+
+    assert azimuths == pytest.approx([0, 40, 80, 120, 160, -160, -120, -80, -40], abs=0.1)
+
+
+def test_walls_stand_where_the_file_has_them():
+    """Inner faces at 2 m."""
+    walls = scene_of(builtin("arena")).solids[1:5]
+
+    assert [wall.obstacle().gap(0.0, 0.0) for wall in walls] == pytest.approx([2.0] * 4)
+
+
+def test_a_robot_without_a_body_watches_only(world):
+    """A separate supervisor: nothing runs into it, and it is not seen."""
+    watcher = """Robot { name "eye" supervisor TRUE controller "ros"
+      controllerArgs ["--name=eye" "--synchronize"] }"""
+    simulation = Simulation.load(world(watcher))
+
+    assert simulation.robots[0].body is None
+    simulation.step(32)
+    assert simulation.robots[1].body.touched is False
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, math.pi / 2, -2.0])
+def test_a_box_may_have_any_heading(world, angle):
+    """A square crate 1 m ahead, turned about z: its face or its corner comes nearer."""
+    crate = f"""Solid {{ translation 1 0 0.15 rotation 0 0 1 {angle} name "crate"
+      boundingObject Box {{ size 0.4 0.4 0.3 }} }}"""
+    half = 0.2 / max(abs(math.cos(angle)), abs(math.sin(angle)))
+
+    simulation = Simulation.load(world(crate))
+
+    assert distance(simulation) == pytest.approx(0.8 - half, abs=1e-6)
+
+
+def test_frames_inside_frames_are_followed(world):
+    """Group, Pose and Solid around Solid; Pose and Shape inside boundingObject."""
+    nested = """Group { children [ Pose { translation 0 1 0 rotation 0 0 1 -1.5707963 children [
+      Solid { name "post" translation 1 0.9 0 boundingObject Pose { translation 0 0 0.1 children [
+        Shape { geometry Cylinder { radius 0.1 height 0.2 } } ] } } ] } ] }"""
+
+    simulation = Simulation.load(world(nested))
+
+    assert distance(simulation) == pytest.approx(0.6, abs=1e-6)
+
+
+def test_a_use_is_the_last_def_before_it(world):
+    """As VRML says."""
+    posts = """DEF POST Solid { translation 5 0 0.1 name "a"
+        boundingObject DEF SHAPE Cylinder { radius 0.1 height 0.2 } }
+      Solid { translation 1 0 0.1 name "b" boundingObject USE SHAPE }"""
+
+    assert distance(Simulation.load(world(posts))) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("z", "height", "seen"),
+    [
+        (0.1, 0.2, True),  # on the floor
+        (0.5, 0.2, False),  # a lamp, above
+        (-0.1, 0.2, False),  # the floor itself
+        (0.2, 0.2, False),  # above the ray, though the body would touch it
+    ],
+)
+def test_a_ray_sees_what_is_at_its_height(world, z, height, seen):
+    """The ray is 5 cm above the floor."""
+    post = f"""Solid {{ translation 1 0 {z} name "post"
+      boundingObject Cylinder {{ radius 0.1 height {height} }} }}"""
+
+    assert (distance(Simulation.load(world(post))) < 0.9) is seen
+
+
+def test_what_is_drawn_only_is_neither_seen_nor_felt(world):
+    """A Shape without boundingObject, as the target has."""
+    drawn = """Pose { translation 0.5 0 0 children [ Shape { geometry Cylinder { radius 0.2 } } ] }
+      Solid { translation 0.5 0 0 name "ghost" children [ Shape { geometry Box { } } ] }
+      Viewpoint { } Background { } DirectionalLight { }"""
+
+    assert distance(Simulation.load(world(drawn))) == pytest.approx(1.0)
+
+
+def test_two_robots_see_each_other(world, simple_robot):
+    """By their bodies, where they are now."""
+    second = simple_robot.replace("DEF ROBOTINO", "DEF OTHER").replace("robotino", "other")
+    second = second.replace("Robot {", "Robot { translation 1 0 0 ", 1)
+    simulation = Simulation.load(world(second))
+
+    simulation.step(32)
+
+    assert 1.0 - simulation.robots[1].sensors["ir1"].value == pytest.approx(0.6)
+    assert simulation.robots[0].sensors["ir1"].value == pytest.approx(0.0)
+
+
+def test_a_bumper_without_a_boundingobject_never_fires(world, simple_robot):
+    """As in the stock PROTO of the Robotino 3."""
+    bare = simple_robot.replace(
+        '"touch sensor" boundingObject Cylinder { radius 0.2 height 0.2 }', '"touch sensor"'
+    )
+    wall = 'Solid { translation 0.15 0 0.15 name "wall" boundingObject Box { size 0.1 4 0.3 } }'
+    simulation = Simulation.load(world(wall, robot=bare))
+
+    simulation.step(32)
+
+    assert simulation.robots[0].body.touched
+    assert simulation.robots[0].sensors["touch sensor"].value is False
+
+
+BAD = {
+    "a PROTO": ("RectangleArena { }", "the stub simulates no RectangleArena"),
+    "a loose crate": (
+        'Solid { name "crate" physics Physics { } boundingObject Box { } }',
+        "a Solid with physics moves when it is pushed",
+    ),
+    "a sphere": ("Solid { boundingObject Sphere { } }", "no Sphere as a boundingObject"),
+    "a tilted box": (
+        "Solid { rotation 1 0 0 0.5 boundingObject Box { } }",
+        "a Box that does not stand upright",
+    ),
+    "a slope": ("Solid { rotation 1 0 0 0.5 boundingObject Plane { } }", "a Plane that is no floor"),
+    "a dangling USE": ("Solid { boundingObject USE NOTHING }", "USE NOTHING has no DEF before it"),
+    "a malformed translation": ("Pose { translation 1 2 }", "Pose.translation is not 3 numbers"),
+    "a malformed radius": (
+        'Solid { boundingObject Cylinder { radius "1" } }',
+        "Cylinder.radius is not a number",
+    ),
+}
+
+
+@pytest.mark.parametrize(("objects", "fact"), BAD.values(), ids=BAD.keys())
+def test_what_cannot_be_simulated_is_refused(world, objects, fact):
+    """Rather than something else simulated."""
+    with pytest.raises(WorldError, match=fact):
+        scene_of(world(objects))
+
+
+BAD_ROBOTS = {
+    "a camera": (("DEF IR", "Camera { } DEF IR"), "the stub simulates no Camera on a robot"),
+    "a square robot": (
+        ("Cylinder { radius 0.2 height 0.2 } ] }", "Box { } ] }"),
+        "the stub's robots are upright cylinders",
+    ),
+    "an eccentric robot": (
+        ("translation 0 0 0.15 children", "translation 0.1 0 0.15 children"),
+        "centred on the robot's origin",
+    ),
+    "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
+    "a ray that looks down": (("DEF IR DistanceSensor {", "DistanceSensor { rotation 0 1 0 0.5"), "looks up or down"),
+    "many rays": (('name "ir1"', 'name "ir1" numberOfRays 5'), "a distance sensor of several rays"),
+    "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "no distance sensor is of type 'radar'"),
+    "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable is not rows of three numbers"),
+    "an unsorted table": (("[ 0 1 0,", "[ 2 1 0,"), "the distances of lookupTable do not grow"),
+    "a force sensor": (('"touch sensor"', '"touch sensor" type "force"'), "a touch sensor that measures force"),
+    "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
+    "a brake": (("PositionSensor {", "Brake { } PositionSensor {"), "the stub simulates no Brake"),
+}
+
+
+@pytest.mark.parametrize(("change", "fact"), BAD_ROBOTS.values(), ids=BAD_ROBOTS.keys())
+def test_a_robot_that_cannot_be_simulated_is_refused(world, simple_robot, change, fact):
+    """With the part that is the reason."""
+    source = world(robot=simple_robot.replace(*change))
+    assert source != world()
+
+    with pytest.raises(WorldError, match=fact):
+        scene_of(source)
+
+
+def test_a_robot_with_a_body_inside_a_pose_is_refused(world, simple_robot):
+    """Its translation would be in another frame than the floor's."""
+    with pytest.raises(WorldError, match="put it at the top level"):
+        scene_of(world(robot=f"Pose {{ translation 1 0 0 children [ {simple_robot} ] }}"))
+
+
+@pytest.mark.parametrize("step", ["0.5", "32.5", "0", "-32"])
+def test_the_basic_step_is_whole_milliseconds(world, step):
+    """The controller divides by its integer part."""
+    with pytest.raises(WorldError, match="no whole number of milliseconds"):
+        scene_of(world(info=f"basicTimeStep {step}"))
+
+
+def test_errors_point_at_the_node(world):
+    """Line and column, and what to do."""
+    with pytest.raises(WorldError) as caught:
+        scene_of(world("Solid {\n  boundingObject Sphere { }\n}"))
+
+    assert str(caught.value) == (
+        "my.wbt:4:18: the stub simulates no Sphere as a boundingObject;"
+        " remove it, or run this world with driver webots"
+    )

@@ -1,0 +1,274 @@
+"""The simulation without ROS: as an experiment drives it, and what a reset restores."""
+
+import math
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_sim.stub.physics import WHEELS, wheel_speeds
+from palaestra_sim.stub.robot import seed_of
+from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.world import builtin
+
+
+@pytest.fixture
+def simulation():
+    """The shipped arena."""
+    return Simulation.load(builtin("arena"))
+
+
+def drive(simulation, vx, vy, omega):
+    """Command the wheels of the first robot."""
+    motors = simulation.robots[0].motors
+    for name, speed in zip(WHEELS, wheel_speeds(vx, vy, omega), strict=True):
+        motors[name].set_position(math.inf)
+        motors[name].set_velocity(speed)
+
+
+def readings(simulation):
+    """All sensor values and the pose, exactly."""
+    robot = simulation.robots[0]
+    return [sensor.value for sensor in robot.sensors.values()] + [*robot.place.translation]
+
+
+def run(simulation, steps=30):
+    """Drive a fixed way, and return every reading on it."""
+    history = []
+    for step in range(steps):
+        drive(simulation, 0.3, 0.1 * math.sin(step), 0.2)
+        simulation.step(192)
+        history.append(readings(simulation))
+    return history
+
+
+def test_it_can_be_driven_without_ros(simulation):
+    """Load, command, step, read."""
+    robot = simulation.robots[0]
+    robot.motors["wheel0_joint"].set_position(math.inf)
+    robot.motors["wheel0_joint"].set_velocity(2.0)
+
+    simulation.step(192)
+
+    assert simulation.time_ms == 192
+    assert robot.sensors["wheel0_joint_sensor"].value == pytest.approx(2.0 * 0.192)
+    assert robot.sensors["ir1"].value == pytest.approx(0.31, rel=0.05)
+
+
+def test_the_front_sensor_tells_volts_at_a_wall(simulation):
+    """Driven into the wall ahead, the ray is 2 mm long: the table's first row."""
+    drive(simulation, 0.5, 0.0, 0.0)
+    for _ in range(30):
+        simulation.step(192)
+
+    robot = simulation.robots[0]
+
+    assert robot.place.translation[0] == pytest.approx(2.0 - 0.2286)
+    assert robot.sensors["ir1"].value == pytest.approx(3.03, rel=0.03)
+    assert robot.sensors["ir5"].value == pytest.approx(0.31, rel=0.03)
+
+
+def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
+    """A touch in the first of six basic steps is not missed, and is told once."""
+    robot = simulation.robots[0]
+    robot.body.place(1.76, 0.0, 0.0)
+    drive(simulation, 0.5, 0.0, 0.0)
+    simulation.step(64)
+    assert robot.sensors["touch sensor"].value is True
+
+    drive(simulation, -0.5, 0.0, 0.0)
+    simulation.step(32)
+    simulation.step(192)
+
+    assert robot.sensors["touch sensor"].value is False
+
+
+@pytest.mark.parametrize("duration_ms", [0, -32, 33])
+def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms):
+    """Anything else would be another duration than asked for."""
+    with pytest.raises(ValueError, match="no multiple of the basic step"):
+        simulation.step(duration_ms)
+
+
+def test_two_simulations_of_a_world_agree_bit_by_bit():
+    """Same world, same commands, same seed."""
+    assert run(Simulation.load(builtin("arena"))) == run(Simulation.load(builtin("arena")))
+
+
+def test_a_reset_repeats_the_run_bit_by_bit(simulation):
+    """With the seed in customData, episodes can be replayed."""
+    simulation.robots[0].custom_data = "7"
+    simulation.reset()
+    simulation.step(32)
+    first = run(simulation)
+
+    simulation.reset()
+    simulation.step(32)
+
+    assert run(simulation) == first
+
+
+def test_another_seed_is_another_noise(simulation):
+    """And the same way driven, for the noise reaches the sensors only."""
+    histories = []
+    for seed in ("7", '{"seed": 8}'):
+        simulation.robots[0].custom_data = seed
+        simulation.reset()
+        simulation.step(32)
+        histories.append(run(simulation))
+
+    assert histories[0][-1][-3:] == histories[1][-1][-3:]
+    assert histories[0] != histories[1]
+
+
+def test_noise_does_not_depend_on_what_the_rays_meet(simulation):
+    """A draw a sensor a step, seen or not: a robot elsewhere has the same noise in its free rays."""
+    values = []
+    for x in (0.0, 1.7):
+        simulation.reset()
+        simulation.step(32)
+        simulation.robots[0].body.place(x, 0.0, 0.0)
+        simulation.step(192)
+        values.append(simulation.robots[0].sensors["ir5"].value)
+
+    assert values[0] == values[1]
+
+
+def test_every_robot_has_noise_of_its_own():
+    """Seeded by its own customData."""
+    source = builtin("arena")
+    robot = source[source.index(b"DEF ROBOTINO Robot") :]
+    source += robot.replace(b'name "robotino"', b'name "second" translation 0 1 0 customData "5"', 1)
+
+    simulation = Simulation.load(source)
+    simulation.step(32)
+
+    assert [it.seed for it in simulation.robots] == [0, 5]
+    assert simulation.robots[0].sensors["ir1"].value != simulation.robots[1].sensors["ir1"].value
+
+
+@pytest.mark.parametrize(
+    ("custom_data", "seed"),
+    [
+        ("7", 7),
+        (" 12 ", 12),
+        ('{"seed": 9}', 9),
+        ('{"seed": 9, "episode": 3}', 9),
+        ("", 1),
+        ("seven", 1),
+        ("1.5", 1),
+        ("true", 1),
+        ('{"seed": "9"}', 1),
+        ('{"episode": 3}', 1),
+        ("[7]", 1),
+        ("[" * 100_000, 1),
+    ],
+)
+def test_a_seed_is_a_number_or_in_an_object(custom_data, seed):
+    """Anything else leaves the seed as it was."""
+    assert seed_of(custom_data, otherwise=1) == seed
+
+
+@given(text=st.text())
+def test_no_custom_data_is_an_error(text):
+    """It may be somebody else's data."""
+    assert isinstance(seed_of(text, otherwise=1), int)
+
+
+def test_the_first_seed_is_that_of_the_world(world):
+    """WorldInfo.randomSeed, until customData gives another."""
+    assert Simulation.load(world(info="randomSeed 42")).robots[0].seed == 42
+
+
+def test_a_reset_happens_within_the_next_basic_step(simulation):
+    """Asked for, nothing changes; after a step the time is one basic step."""
+    drive(simulation, 0.3, 0.0, 0.0)
+    simulation.step(1920)
+    simulation.reset()
+    assert simulation.time_ms == 1920
+
+    simulation.step(32)
+
+    assert simulation.time_ms == 32
+    assert simulation.robots[0].place.translation == (0.0, 0.0, 0.0)
+
+
+def test_the_steps_after_the_first_go_on_from_the_reset(simulation):
+    """A long step with a reset in it ends five basic steps after it."""
+    simulation.reset()
+
+    simulation.step(192)
+
+    assert simulation.time_ms == 192
+
+
+def test_a_reset_restores_motors_and_rest(simulation):
+    """Position control at 0: a client that forgets set_position(inf) stands still."""
+    drive(simulation, 0.3, 0.0, 0.5)
+    simulation.step(1920)
+    simulation.reset()
+    simulation.step(32)
+
+    simulation.step(1920)
+    robot = simulation.robots[0]
+
+    assert robot.motors["wheel1_joint"].target_rad == 0.0
+    assert robot.motors["wheel1_joint"].velocity_rad_s == pytest.approx(137.46)
+    assert robot.place.translation == (0.0, 0.0, 0.0)
+
+
+def test_a_reset_restores_the_places_of_all_solids(simulation):
+    """The target and the cylinders too, and what rays see of them."""
+    cylinder = next(it.place for it in simulation.scene.solids if it.kind == "cylinder")
+    cylinder.translation = (0.5, 0.0, 0.2)
+    simulation.moved(cylinder)
+    simulation.step(32)
+    assert simulation.robots[0].sensors["ir1"].value > 1.0
+
+    simulation.reset()
+    simulation.step(32)
+
+    assert cylinder.translation == (0.8, 0.8, 0.2)
+    assert simulation.robots[0].sensors["ir1"].value == pytest.approx(0.31, rel=0.05)
+
+
+def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
+    """Only motion goes."""
+    drive(simulation, 2.0, 0.0, 0.0)
+    simulation.step(320)
+    place = simulation.robots[0].place.translation
+
+    simulation.reset_physics()
+
+    assert simulation.robots[0].body.velocity == (0.0, 0.0, 0.0)
+    assert simulation.robots[0].place.translation == place
+    assert simulation.time_ms == 320
+
+
+def test_it_is_small_and_starts_fast():
+    """Many run on one machine: the whole stub below 120 MB, and this part of it far below."""
+    program = (
+        "import resource, sys; from palaestra_sim.stub.simulation import Simulation;"
+        "from palaestra_sim.world import builtin;"
+        "Simulation.load(builtin('arena')).step(192);"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, 'numpy' in sys.modules)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60, env=os.environ
+    )
+    megabytes, has_numpy = answer.stdout.split()
+
+    assert int(megabytes) < 60
+    assert has_numpy == "False"
+
+
+def test_a_thousand_steps_are_no_wait(simulation):
+    """120 us a step is the aim and 35 us usual; this only notices a factor of twenty."""
+    begun_s = time.perf_counter()
+    run(simulation, 1000)
+
+    assert time.perf_counter() - begun_s < 2.0

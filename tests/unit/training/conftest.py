@@ -1,0 +1,157 @@
+"""A corridor to walk in, members that break on demand, and the runs made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from palaestra_trainer.configuration import Configuration, parse
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault
+
+GOAL = 3
+MAX_STEPS = 8
+
+
+class Corridor(gymnasium.Env[np.ndarray, Any]):
+    """Walk right (1) to the goal, three steps away; left (0) leads nowhere, for eight steps.
+
+    The observation is the position and the seed's last digit, both over 10.
+    """
+
+    observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    action_space = spaces.Discrete(2)
+
+    def __init__(self, member: FakeMember) -> None:
+        self._member = member
+        self.seeds: list[int | None] = []
+        self.options: dict[str, Any] | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """Begin to walk."""
+        super().reset(seed=seed)
+        self._member.take_reset()
+        self.seeds.append(seed)
+        self.options = options
+        self._position, self._steps = 0, 0
+        self._digit = (seed or 0) % 10
+        return self._observe(), {"seed": seed}
+
+    def step(self, action: Any):
+        """Walk one step."""
+        self._member.take_step()
+        self._steps += 1
+        self._position += 1 if np.asarray(action).item() > 0.5 else -1
+        reached = self._position >= GOAL
+        reward = 1.0 if reached else -0.1
+        return (
+            self._observe(),
+            reward,
+            reached,
+            self._steps >= MAX_STEPS and not reached,
+            {"is_success": reached, "reward_terms": {"walk": reward}},
+        )
+
+    def _observe(self) -> np.ndarray:
+        return np.array([self._position / 10, self._digit / 10], np.float32)
+
+
+class FakeMember:
+    """A member that breaks at chosen steps, resets and starts, counted from 1 over its life."""
+
+    def __init__(
+        self,
+        name: str = "collect-0",
+        *,
+        steps: Mapping[int, SimulatorFault] | Sequence[int] = (),
+        resets: Sequence[int] = (),
+        starts: Sequence[int] = (),
+    ) -> None:
+        self.name = name
+        self.env: gymnasium.Env[Any, Any] = Corridor(self)
+        self.log: list[str] = []
+        self.resets = 0
+        self._faults = {"step": steps, "reset": resets, "start": starts}
+        self._counts = dict.fromkeys(self._faults, 0)
+
+    def start(self) -> None:
+        """Start, or break."""
+        self.log.append("start")
+        self._take("start")
+        self.resets = 0
+
+    def stop(self) -> None:
+        """Note it."""
+        self.log.append("stop")
+
+    def restart(self) -> None:
+        """Start again, or break."""
+        self.log.append("restart")
+        self._take("start")
+        self.resets = 0
+
+    def pause(self) -> None:
+        """Note it."""
+        self.log.append("pause")
+
+    def run(self) -> None:
+        """Note it."""
+        self.log.append("run")
+
+    def take_step(self) -> None:
+        """Count a step, or break."""
+        self._take("step")
+
+    def take_reset(self) -> None:
+        """Count a reset, or break."""
+        self._take("reset")
+        self.resets += 1
+
+    def _take(self, what: str) -> None:
+        self._counts[what] += 1
+        faults = self._faults[what]
+        if self._counts[what] in faults:
+            raise (
+                faults[self._counts[what]]
+                if isinstance(faults, Mapping)
+                else SimulatorDead(self.name, f"died at {what} {self._counts[what]}")
+            )
+
+
+@pytest.fixture
+def make_member() -> Callable[..., FakeMember]:
+    """Make a member of the corridor."""
+    return FakeMember
+
+
+@pytest.fixture
+def make_configuration(tmp_path: Path) -> Callable[..., Configuration]:
+    """Make a configuration of which the test says what matters, in the file's own words."""
+    del tmp_path
+
+    def make(*, collectors: int = 1, evaluators: int = 1, **changes: Any) -> Configuration:
+        simulators = [
+            {"name": f"{group}-{index}", "group": group, "index": index, "role": role}
+            for group, role, count in (
+                ("collect", "Collect", collectors),
+                ("evaluate", "Evaluate", evaluators),
+            )
+            for index in range(count)
+        ]
+        content: dict[str, Any] = {
+            "job": "corridor",
+            "seed": 1,
+            "environment": {"id": "Corridor-v0"},
+            "algorithm": {"name": "DQN"},
+            "steps": 100,
+            "statusAddress": "127.0.0.1:0",
+            "simulators": simulators,
+        }
+        return parse(content | changes)
+
+    return make

@@ -1,0 +1,257 @@
+"""The algorithms, as the training loop meets them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import stable_baselines3 as sb3
+from gymnasium import spaces
+from stable_baselines3.common.callbacks import BaseCallback
+
+from palaestra_trainer.algorithms import ALGORITHMS, DQN, PPO, REINFORCE, check, make_model
+from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.simulators.member import Keeper
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+
+TINY = {"policy_kwargs": {"net_arch": [8]}}
+HYPERPARAMETERS = {
+    "DQN": TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 200},
+    "SAC": TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 200},
+    "PPO": TINY | {"n_steps": 16, "batch_size": 8, "n_epochs": 2},
+    "A2C": TINY,
+    "REINFORCE": TINY | {"episodes_per_update": 2},
+}
+DISCRETE = ["DQN", "PPO", "A2C", "REINFORCE"]
+
+
+@pytest.fixture
+def make_env(make_member):
+    """Make a VecEnv of corridors; `faults` are the steps at which the first member dies."""
+    made = []
+
+    def make(members=1, faults=()):
+        first = make_member("collect-0", steps=faults)
+        rest = [make_member(f"collect-{index}") for index in range(1, members)]
+        env = SimulatorsVecEnv([Keeper(member) for member in (first, *rest)], run_seed=1)
+        made.append(env)
+        return env
+
+    yield make
+    for env in made:
+        env.close()
+
+
+def model_of(name, env, **hyperparameters):
+    """Return a small model of an algorithm."""
+    merged = HYPERPARAMETERS[name] | hyperparameters
+    return make_model(Algorithm(name=name, hyperparameters=merged), env, seed=1)
+
+
+class Boundaries(BaseCallback):
+    """Notes the steps at which rollouts begin."""
+
+    def __init__(self):
+        super().__init__()
+        self.steps = []
+
+    def _on_rollout_start(self):
+        self.steps.append(self.model.num_timesteps)
+
+    def _on_step(self):
+        return True
+
+
+def test_all_five_are_there():
+    """The TrainingJob's documentation names them."""
+    assert set(ALGORITHMS) == {"DQN", "PPO", "A2C", "SAC", "REINFORCE"}
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_defaults_are_hyperparameters_of_the_class(name):
+    """A default that the class doesn't know would fail every run."""
+    assert check(Algorithm(name=name, hyperparameters=dict(ALGORITHMS[name].defaults))).cls
+
+
+def test_mistyped_hyperparameters_are_told_all_at_once_with_the_nearest_name():
+    """Before a simulator is started for nothing."""
+    wrong = {"learning_rat": 1, "gama": 0.9, "zzz": 0}
+
+    with pytest.raises(ConfigurationError) as caught:
+        check(Algorithm(name="DQN", hyperparameters=wrong))
+
+    lines = str(caught.value).splitlines()
+    assert (
+        "hyperparameters.learning_rat: DQN has no such hyperparameter; did you mean learning_rate?"
+        in lines[0]
+    )
+    assert "did you mean gamma?" in lines[1]
+    assert "use one of batch_size, " in lines[2]
+
+
+@pytest.mark.parametrize("name", ["env", "seed", "replay_buffer_class", "device"])
+def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
+    """Else a file could undo what keeps invalid rows out."""
+    with pytest.raises(ConfigurationError, match="has no such hyperparameter"):
+        check(Algorithm(name="DQN", hyperparameters={name: 1}))
+
+
+def test_an_unknown_algorithm_is_told_with_the_nearest_name():
+    """The operator checks it too, but a person may write the file."""
+    with pytest.raises(ConfigurationError, match="algorithm.name: DQM .* did you mean DQN"):
+        check(Algorithm(name="DQM"))
+
+
+def test_returns_over_several_steps_are_refused_where_rows_are_mixed():
+    """The next row in the buffer may be another simulator's."""
+    with pytest.raises(ConfigurationError, match="n_steps"):
+        check(Algorithm(name="DQN", hyperparameters={"n_steps": 3}))
+
+
+@pytest.mark.parametrize(
+    ("name", "hyperparameters"),
+    [
+        ("SAC", {}),
+        ("PPO", {"batch_size": 1}),
+        ("REINFORCE", {"baseline": "mean"}),
+        ("DQN", {"train_freq": "x"}),
+    ],
+)
+def test_wrong_values_and_spaces_are_configuration_errors(make_env, name, hyperparameters):
+    """Stable-Baselines3 says so by assertions, which look like a bug of ours."""
+    with pytest.raises(ConfigurationError, match=f"algorithm: {name} refuses"):
+        model_of(name, make_env(), **hyperparameters)
+
+
+def test_an_observation_that_is_no_box_is_refused(make_env):
+    """The buffers hold arrays."""
+    env = make_env()
+    env.observation_space = spaces.Dict({"a": env.observation_space})
+
+    with pytest.raises(ConfigurationError, match="observation is a Dict"):
+        model_of("DQN", env)
+
+
+@pytest.mark.parametrize("steps", [100, 101, 103])
+@pytest.mark.parametrize("faults", [(), (5, 42, 90)])
+def test_dqn_ends_at_exactly_its_steps(make_env, steps, faults):
+    """Also when they are no multiple of train_freq, and with faults between."""
+    model = model_of("DQN", make_env(faults=faults)).learn(steps)
+
+    assert model.num_timesteps == steps
+    assert model.replay_buffer.size() == steps
+
+
+def test_ppo_ends_at_its_rollout_boundary(make_env):
+    """It learns from whole rollouts only."""
+    model = model_of("PPO", make_env(members=2)).learn(40)
+
+    assert model.num_timesteps == 64
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_invalid_rows_are_not_counted_as_steps(make_env, name):
+    """A run with faults must learn from as much as one without."""
+    counted = []
+
+    def count(locals_, _):
+        counted.extend(info["valid"] for info in locals_["infos"])
+        return True
+
+    model = model_of(name, make_env(members=2, faults=(3, 4, 20))).learn(60, count)
+
+    assert model.num_timesteps == sum(counted) == len(counted) - 3
+
+
+def test_a_masked_row_is_missing_from_the_count_of_a_rollout(make_env):
+    """PPO's rollouts have a fixed number of rows; the invalid ones don't count."""
+    model = model_of("PPO", make_env(faults=(3, 7)))
+    boundaries = Boundaries()
+
+    model.learn(30, boundaries)
+
+    assert boundaries.steps == [0, 14, 30][: len(boundaries.steps)]
+
+
+def test_a_rollout_without_a_valid_row_is_not_learned_from(make_env):
+    """A mean of nothing is NaN, and NaN spreads."""
+    model = model_of("A2C", make_env(faults=range(1, 6)), n_steps=5)
+
+    model.learn(10)
+
+    assert model.num_timesteps == 10
+    assert all(bool(it.isfinite().all()) for it in model.policy.parameters())
+
+
+def test_dqn_with_nothing_but_faults_waits_for_a_row(make_env):
+    """Sampling from an empty buffer is an error."""
+    model = model_of("DQN", make_env(faults=range(1, 10)), learning_starts=0)
+
+    model.learn(8)
+
+    assert model.num_timesteps == 8
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_saved_model_chooses_the_same_actions(make_env, tmp_path, name):
+    """By Stable-Baselines3's own save and load."""
+    env = make_env()
+    model = model_of(name, env).learn(40)
+    seen = env.observation_space.sample()
+
+    model.save(tmp_path / "model.zip")
+    loaded = type(model).load(tmp_path / "model.zip")
+
+    assert loaded.predict(seen, deterministic=True)[0] == model.predict(seen, deterministic=True)[0]
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [(DQN, sb3.DQN), (PPO, sb3.PPO)])
+def test_plain_stable_baselines_loads_what_ours_saved(make_env, tmp_path, ours, theirs):
+    """A policy is used where this package isn't."""
+    model = model_of(ours.__name__, make_env()).learn(40)
+    model.save(tmp_path / "model.zip")
+
+    loaded = theirs.load(tmp_path / "model.zip")
+
+    assert loaded.num_timesteps == model.num_timesteps
+
+
+def test_several_environments_are_no_reason_to_warn(make_env):
+    """A soft update at each step is one at each vector step."""
+    model = model_of("DQN", make_env(members=3))
+
+    assert model.target_update_interval == 3
+
+
+def test_a_frequency_in_episodes_may_be_a_list(make_env):
+    """YAML has no tuples."""
+    model = model_of("DQN", make_env(), train_freq=[1, "episode"]).learn(20)
+
+    assert model.num_timesteps >= 20
+
+
+def test_sac_learns_a_continuous_action(make_member):
+    """The fifth algorithm needs another space."""
+    member = make_member()
+    member.env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+    env = SimulatorsVecEnv([Keeper(member)], run_seed=1)
+
+    model = model_of("SAC", env).learn(30)
+
+    assert model.num_timesteps == 30
+
+
+def test_reinforce_learns_the_corridor(make_env):
+    """The shortest proof that the gradient has the right sign."""
+    env = make_env(members=2)
+    model = model_of("REINFORCE", env, learning_rate=0.02, episodes_per_update=4)
+
+    model.learn(1500)
+
+    actions = [model.predict(np.array([position / 10, 0.5]), deterministic=True)[0] for position in range(3)]
+    assert actions == [1, 1, 1]
+
+
+def test_reinforce_is_a_stable_baselines_algorithm():
+    """Callbacks, wrappers and tools of others expect that."""
+    assert issubclass(REINFORCE, sb3.common.base_class.BaseAlgorithm)

@@ -1,0 +1,172 @@
+"""Invalid rows reach no loss."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from hypothesis import given
+from hypothesis import strategies as st
+from stable_baselines3.common.buffers import RolloutBuffer
+
+from palaestra_trainer.algorithms.buffers import ValidReplayBuffer, ValidRolloutBuffer, valid_rows
+
+SPACE = spaces.Box(-1.0, 1.0, (1,), np.float32)
+ACTIONS = spaces.Discrete(2)
+
+
+def replay(size=8, members=2):
+    """Return an empty replay buffer."""
+    return ValidReplayBuffer(size, SPACE, ACTIONS, "cpu", members)
+
+
+def add(buffer, marks, valid):
+    """Add one vector step, whose rows are marked by their rewards."""
+    column = np.array(marks, np.float32)
+    buffer.add(
+        column[:, None],
+        column[:, None] + 0.5,
+        np.zeros(len(marks), int),
+        column,
+        np.zeros(len(marks), bool),
+        [{"valid": it} for it in valid],
+    )
+
+
+def rollout(rewards, valid, starts, *, kind=ValidRolloutBuffer, gamma=0.9):
+    """Return a full rollout of one member with values 1, 2, 3, ..."""
+    buffer = kind(len(rewards), SPACE, ACTIONS, "cpu", gae_lambda=0.8, gamma=gamma, n_envs=1)
+    for row, (reward, is_valid, start) in enumerate(zip(rewards, valid, starts, strict=True)):
+        if kind is ValidRolloutBuffer:
+            buffer.mark(np.array([is_valid]))
+        buffer.add(
+            np.array([[row / 10]]),
+            np.zeros((1, 1)),
+            np.array([reward]),
+            np.array([start]),
+            torch.tensor([[float(row + 1)]]),
+            torch.zeros(1),
+        )
+    return buffer
+
+
+def test_a_row_is_valid_unless_it_says_otherwise():
+    """Environments of others say nothing."""
+    assert valid_rows([{}, {"valid": True}, {"valid": False}]).tolist() == [True, True, False]
+
+
+@given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=20))
+def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
+    """Whatever pattern the faults have."""
+    buffer = replay(size=8)
+    expected = []
+    for number, valid in enumerate(steps):
+        marks = [2 * number, 2 * number + 1]
+        add(buffer, marks, valid)
+        expected += [mark for mark, is_valid in zip(marks, valid, strict=True) if is_valid]
+
+    assert buffer.arrays()["rewards"].flatten().tolist() == expected[-8:]
+    assert buffer.size() == min(len(expected), 8)
+
+
+def test_the_row_before_a_fault_ends_as_truncated():
+    """Its value is bootstrapped: the fault was not the policy's."""
+    buffer = replay()
+    add(buffer, [1, 2], [True, True])
+
+    add(buffer, [3, 4], [False, True])
+
+    arrays = buffer.arrays()
+    assert arrays["rewards"].flatten().tolist() == [1, 2, 4]
+    assert arrays["dones"].flatten().tolist() == [1, 0, 0]
+    assert arrays["timeouts"].flatten().tolist() == [1, 0, 0]
+
+
+def test_a_fault_at_once_truncates_nothing():
+    """There is no row before it."""
+    buffer = replay()
+
+    add(buffer, [1, 2], [False, False])
+
+    assert buffer.size() == 0
+
+
+@pytest.mark.parametrize("steps", [0, 1, 3, 4, 7])
+@pytest.mark.parametrize("size", [8, 4])
+def test_a_replay_buffer_is_kept_and_filled_again(steps, size):
+    """Also into a smaller one: then the oldest rows are left out."""
+    before = replay(size=8)
+    for number in range(steps):
+        add(before, [2 * number, 2 * number + 1], [True, True])
+    after = replay(size=size)
+
+    after.fill(before.arrays())
+
+    rewards = before.arrays()["rewards"].flatten().tolist()
+    assert after.arrays()["rewards"].flatten().tolist() == rewards[-size:]
+    add(after, [98, 99], [True, True])
+    assert after.arrays()["rewards"].flatten().tolist() == [*rewards, 98, 99][-size:]
+
+
+def test_without_faults_a_rollout_is_what_stable_baselines_computes():
+    """Nothing else may change."""
+    plan = ([1.0, 0.5, -1.0, 2.0], [True] * 4, [True, False, True, False])
+    ours, theirs = rollout(*plan), rollout(*plan, kind=RolloutBuffer)
+    for buffer in (ours, theirs):
+        buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([False]))
+
+    assert ours.advantages.tolist() == theirs.advantages.tolist()
+    assert ours.returns.tolist() == theirs.returns.tolist()
+
+
+def test_the_row_before_an_invalid_one_is_bootstrapped_with_the_state_they_share():
+    """Its advantage is r + gamma V(s') - V(s), and nothing from beyond the fault."""
+    buffer = rollout([1.0, 123.0, 5.0], [True, False, True], [True, False, True])
+
+    buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([False]))
+
+    assert buffer.advantages[0, 0] == pytest.approx(1.0 + 0.9 * 2.0 - 1.0)
+    assert buffer.advantages[1, 0] == 0.0
+    assert buffer.advantages[2, 0] == pytest.approx(5.0 + 0.9 * 7.0 - 3.0)
+
+
+def test_an_invalid_row_at_the_end_of_a_rollout_is_no_different():
+    """There the next episode's first value is at hand, and must not be taken."""
+    buffer = rollout([1.0, 123.0], [True, False], [True, False])
+
+    buffer.compute_returns_and_advantage(torch.tensor([7.0]), np.array([True]))
+
+    assert buffer.advantages[0, 0] == pytest.approx(1.0 + 0.9 * 2.0 - 1.0)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=20), st.integers(1, 7))
+def test_minibatches_hold_every_valid_row_once_and_no_other(valid, batch_size):
+    """An empty minibatch would make a mean of nothing: NaN."""
+    buffer = rollout([0.0] * len(valid), valid, [False] * len(valid))
+    buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
+
+    batches = list(buffer.get(batch_size))
+
+    seen = sorted(float(it) for batch in batches for it in batch.old_values)
+    assert seen == [row + 1.0 for row, is_valid in enumerate(valid) if is_valid]
+    assert all(0 < len(batch.old_values) <= batch_size for batch in batches)
+
+
+def test_a_rollout_is_read_several_times():
+    """PPO does so, an epoch each."""
+    buffer = rollout([0.0] * 4, [True, False, True, True], [False] * 4)
+    buffer.compute_returns_and_advantage(torch.tensor([0.0]), np.array([False]))
+
+    sizes = [sum(len(batch.old_values) for batch in buffer.get()) for _ in range(3)]
+
+    assert sizes == [3, 3, 3]
+
+
+def test_an_emptied_rollout_has_forgotten_its_faults():
+    """The next rollout has its own."""
+    buffer = rollout([0.0] * 2, [False, False], [False] * 2)
+
+    buffer.reset()
+
+    assert buffer.valid.all()

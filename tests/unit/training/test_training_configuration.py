@@ -1,0 +1,135 @@
+"""What a training.yaml may say, and how its mistakes are told."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.configuration import dump, load, parse
+from palaestra_trainer.errors import ConfigurationError
+
+COMPLETE = """
+job: move-to-target
+namespace: default
+uid: 6f1d
+replica: 1
+seed: 8
+environment: {id: MoveToTargetEnv-v0, reward: Sparse, options: {max_steps: 50}}
+algorithm: {name: PPO, hyperparameters: {learning_rate: 0.001}}
+steps: 50000
+evaluation: {everySteps: 2500, episodes: 20, stopAtSuccessRate: 0.95}
+checkpoint: {everySteps: 5000, keep: 3}
+stallDeadlineSeconds: 600
+command: [python, mine.py]
+statusAddress: 127.0.0.1:9090
+simulators:
+- name: collect-0
+  group: collect
+  index: 0
+  role: Collect
+  control: http://127.0.0.1:7100
+  world: /w/collect-0.wbt
+  namesPrefix: move_to_target_r1_collect_0a
+  recycle: {afterResets: 24}
+  restart: {limit: 10, withinSeconds: 600}
+  startDeadlineSeconds: 60
+"""
+MINIMAL = {
+    "job": "m",
+    "environment": {"id": "Any-v0"},
+    "steps": 10,
+    "simulators": [{"name": "c-0", "group": "c", "index": 0, "role": "Collect"}],
+}
+
+
+def test_every_field_of_the_contract_is_read(tmp_path):
+    """The operator writes this file; the trainer must know each of its words."""
+    path = tmp_path / "training.yaml"
+    path.write_text(COMPLETE)
+
+    configuration = load(path)
+
+    assert configuration.simulators[0].recycle.after_resets == 24
+    assert configuration.evaluation.stop_at_success_rate == 0.95
+    assert configuration.command == ("python", "mine.py")
+
+
+def test_what_is_dumped_is_read_back_as_the_same():
+    """A run directory holds the file, so that the run can be measured later."""
+    configuration = parse(yaml.safe_load(COMPLETE))
+
+    assert parse(yaml.safe_load(dump(configuration))) == configuration
+
+
+def test_all_mistakes_are_told_at_once():
+    """Whoever mends one mistake at a time starts a pod for each."""
+    wrong = MINIMAL | {"steps": 0, "evaluation": {"evrySteps": 3}, "seed": -1}
+
+    with pytest.raises(ConfigurationError) as caught:
+        parse(wrong)
+
+    assert sorted(str(caught.value).splitlines()) == [
+        "training.yaml: evaluation.evrySteps: is not a known field; did you mean everySteps?",
+        "training.yaml: seed: -1 is refused; Input should be greater than or equal to 0",
+        "training.yaml: steps: 0 is refused; Input should be greater than or equal to 1",
+    ]
+
+
+def test_a_mistake_in_a_list_names_its_place():
+    """There may be thirty simulators."""
+    wrong = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"rolle": "Collect"}]}
+
+    with pytest.raises(ConfigurationError, match=r"simulators\[0\].rolle: .* did you mean role\?"):
+        parse(wrong)
+
+
+@pytest.mark.parametrize(
+    ("simulators", "fact"),
+    [
+        ([], "simulators"),
+        ([MINIMAL["simulators"][0]] * 2, "c-0 is used twice"),
+        ([MINIMAL["simulators"][0] | {"role": "Evaluate"}], "none has role Collect"),
+    ],
+)
+def test_simulators_that_do_not_fit_together_are_refused(simulators, fact):
+    """Each is right by itself; only together they are wrong."""
+    with pytest.raises(ConfigurationError, match=fact):
+        parse(MINIMAL | {"simulators": simulators})
+
+
+def test_a_missing_file_is_told_with_the_variable_that_names_it(tmp_path, monkeypatch):
+    """The message is all that somebody sees who started the program by hand."""
+    monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "none.yaml"))
+
+    with pytest.raises(ConfigurationError, match=r"none.yaml: cannot be read .* PALAESTRA_CONFIG"):
+        load()
+
+
+def test_without_the_variable_the_remedy_names_it(monkeypatch):
+    """A laptop has no such variable."""
+    monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
+
+    with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG: is not set"):
+        load()
+
+
+def test_a_file_that_is_not_yaml_is_refused(tmp_path):
+    """The parser's own message says where."""
+    path = tmp_path / "training.yaml"
+    path.write_text("job: [")
+
+    with pytest.raises(ConfigurationError, match="is not YAML"):
+        load(path)
+
+
+@given(
+    st.recursive(
+        st.none() | st.integers() | st.text(), lambda it: st.lists(it) | st.dictionaries(st.text(), it)
+    )
+)
+def test_whatever_the_document_is_only_configuration_errors_come_out(content):
+    """A traceback would tell the author of a file nothing."""
+    with pytest.raises(ConfigurationError):
+        parse(content)

@@ -1,0 +1,145 @@
+"""How a run ends: codes, last words, signals and the watchdog."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+from palaestra_sim.protocol.status import ExitCode, Termination
+
+from palaestra_trainer.errors import (
+    ConfigurationError,
+    FaultBudgetSpent,
+    MasterLost,
+    SimulatorDead,
+    SimulatorHung,
+)
+from palaestra_trainer.interruption import Interrupted, Interruption
+from palaestra_trainer.termination import Diverged, end_of, write_last_word
+from palaestra_trainer.watchdog import Watchdog
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "reason"),
+    [
+        (Interrupted("SIGTERM received"), 75, "Interrupted"),
+        (MasterLost("gone"), 75, "MasterLost"),
+        (ConfigurationError("steps: 0"), 2, "ConfigurationWrong"),
+        (FaultBudgetSpent("x"), 80, "FaultBudgetSpent"),
+        (Diverged("NaN"), 81, "Diverged"),
+        (SimulatorHung("x", "slow"), 82, "Stalled"),
+        (SimulatorDead("x", "gone"), 1, "Unexpected"),
+        (OSError(errno.ENOSPC, "full", "run/x"), 1, "DiskFull"),
+        (RuntimeError("bug"), 1, "Unexpected"),
+    ],
+)
+def test_every_end_has_its_code(error, code, reason):
+    """The operator retries by them."""
+    end = end_of(error)
+
+    assert (end.code, end.reason) == (code, reason)
+
+
+def test_the_last_word_goes_where_it_is_wanted(tmp_path):
+    """On a laptop to a file of the run, in a pod to Kubernetes' own."""
+    path, default = tmp_path / "word", tmp_path / "termination-log"
+    word = Termination(step=5, reason="Completed")
+    default.touch()
+
+    write_last_word(word, {"PALAESTRA_TERMINATION_LOG": str(path)}, default)
+    write_last_word(word, {}, default)
+
+    assert Termination.from_message(path.read_text()) == word
+    assert Termination.from_message(default.read_text()) == word
+
+
+def test_a_last_word_nobody_wants_is_not_written(tmp_path):
+    """A trainer on a laptop leaves no file in /dev."""
+    write_last_word(Termination(step=5, reason="Completed"), {}, tmp_path / "none")
+
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_last_word_that_cannot_be_written_is_no_error(tmp_path):
+    """The run has ended; its exit code must not change."""
+    missing = {"PALAESTRA_TERMINATION_LOG": str(tmp_path / "none" / "word")}
+
+    write_last_word(Termination(step=5, reason="Completed"), missing)
+
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_is_noted_and_raised_at_the_next_check():
+    """A model amid a rollout is not whole."""
+    with Interruption() as interruption:
+        interruption.check()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+        with pytest.raises(Interrupted, match="SIGTERM received"):
+            interruption.check()
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_while_there_is_nothing_to_save_a_signal_is_raised_at_once():
+    """Starting simulators takes up to a minute."""
+    with Interruption() as interruption, pytest.raises(Interrupted), interruption.at_once():
+        os.kill(os.getpid(), signal.SIGINT)
+        threading.Event().wait(10.0)
+
+
+def test_whoever_listened_before_listens_again():
+    """Pytest, for one."""
+    before = signal.getsignal(signal.SIGINT)
+
+    with Interruption():
+        assert signal.getsignal(signal.SIGINT) is not before
+
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_stall_is_told_and_ends_the_process():
+    """After the deadline, not before, and with its own code."""
+    left, words = threading.Event(), []
+    codes = []
+
+    def leave(code):
+        codes.append(code)
+        left.set()
+
+    with Watchdog(lambda: 1.0, 0.2, lambda: words.append("last"), leave):
+        assert left.wait(5.0)
+
+    assert (codes, words) == ([ExitCode.STALLED], ["last"])
+
+
+def test_a_run_that_moves_is_left_alone():
+    """Its idleness is asked again and again."""
+    asked = threading.Semaphore(0)
+
+    def idle_s():
+        asked.release()
+        return 0.0
+
+    with Watchdog(idle_s, 0.05, pytest.fail, pytest.fail):
+        assert all(asked.acquire(timeout=5.0) for _ in range(3))
+
+
+def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
+    """The one thing that helps whoever has to find out why."""
+    program = (
+        "import threading; from palaestra_trainer.watchdog import Watchdog\n"
+        "def hang(): threading.Event().wait(60)\n"
+        "with Watchdog(lambda: 9.0, 0.1, lambda: None): hang()\n"
+    )
+
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
+    )
+
+    assert ended.returncode == 82
+    assert "in hang" in ended.stderr

@@ -1,0 +1,83 @@
+"""Measuring a policy."""
+
+from __future__ import annotations
+
+import pytest
+
+from palaestra_trainer.errors import FaultBudgetSpent
+from palaestra_trainer.evaluation import evaluate, evaluate_on_all
+from palaestra_trainer.simulators.member import Care, Keeper
+
+
+class Walker:
+    """Walks right where the seed's last digit is even, left elsewhere."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        """Choose."""
+        assert deterministic
+        return int(round(float(observation[1]) * 10) % 2 == 0), state
+
+
+def test_every_seed_is_an_episode(make_member):
+    """Two of three seeds are even."""
+    member = make_member()
+
+    evaluation = evaluate(Walker(), member, [10, 21, 32])
+
+    assert [episode.seed for episode in evaluation.episodes] == [10, 21, 32]
+    assert [episode.success for episode in evaluation.episodes] == [True, False, True]
+    assert [episode.length for episode in evaluation.episodes] == [3, 8, 3]
+    assert evaluation.success_rate == pytest.approx(2 / 3)
+    assert evaluation.mean_length == pytest.approx(14 / 3)
+    assert evaluation.mean_return == pytest.approx((0.8 - 0.8 + 0.8) / 3)
+    assert member.env.seeds == [10, 21, 32]
+
+
+def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
+    """All policies are measured on the same episodes, whatever broke."""
+    member = make_member(steps=[5])
+
+    evaluation = evaluate(Walker(), member, [10, 20])
+
+    assert member.env.seeds == [10, 20, 20]
+    assert evaluation.faults == 1
+    assert evaluation.success_rate == 1.0
+
+
+def test_a_spent_budget_ends_an_evaluation(make_member):
+    """As it ends training."""
+    keeper = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=3))
+
+    with pytest.raises(FaultBudgetSpent):
+        evaluate(Walker(), keeper, [10])
+
+
+@pytest.mark.parametrize("evaluators", [1, 2, 3, 5])
+def test_several_simulators_share_the_episodes(make_member, evaluators):
+    """The result does not depend on how many there are, nor does its order."""
+    keepers = [Keeper(make_member(f"evaluate-{index}")) for index in range(evaluators)]
+
+    evaluation = evaluate_on_all(Walker(), keepers, [10, 21, 32, 43])
+
+    assert [episode.seed for episode in evaluation.episodes] == [10, 21, 32, 43]
+    assert evaluation.success_rate == 0.5
+
+
+def test_an_evaluation_can_be_given_up_between_episodes(make_member):
+    """A signal must not wait for a hundred of them."""
+    calls = iter([None, KeyboardInterrupt()])
+
+    def check():
+        if (error := next(calls)) is not None:
+            raise error
+
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(Walker(), make_member(), [10, 20, 30], check)
+
+
+def test_more_success_counts_before_more_return(make_member):
+    """A policy that collects rewards beside the target is not the better one."""
+    good, bad = (evaluate(Walker(), make_member(), [seed]) for seed in (10, 21))
+
+    assert good.score > bad.score
+    assert good.summary()["success_rate"] == 1.0

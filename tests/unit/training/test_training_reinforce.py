@@ -1,0 +1,148 @@
+"""Which episodes REINFORCE learns from, and what it makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.algorithms import REINFORCE
+from palaestra_trainer.algorithms.episodes import EpisodeRecorder, returns_to_go
+from palaestra_trainer.simulators.member import Keeper
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+
+
+@pytest.fixture
+def make_model(make_member):
+    """Make a REINFORCE model on corridors, and a list of the batches it learns from."""
+
+    def make(members=1, faults=(), **options):
+        made = [make_member(f"collect-{index}", steps=() if index else faults) for index in range(members)]
+        env = SimulatorsVecEnv([Keeper(member) for member in made], run_seed=1)
+        options = {"episodes_per_update": 2, "policy_kwargs": {"net_arch": [8]}} | options
+        model = REINFORCE("MlpPolicy", env, seed=1, device="cpu", **options)
+        batches = []
+        learn_from = model.train
+        model.train = lambda batch: (batches.append(batch), learn_from(batch))
+        return model, batches
+
+    return make
+
+
+def play(recorder, rows):
+    """Feed a recorder with rows: for each step, for each environment (done, valid)."""
+    for step, row in enumerate(rows):
+        if recorder.complete:
+            return
+        dones = np.array([done for done, _ in row])
+        valid = np.array([is_valid for _, is_valid in row])
+        recorder.add(np.full(len(row), step), np.zeros(len(row)), np.ones(len(row)), dones, valid)
+
+
+@given(st.lists(st.floats(-10, 10), max_size=30), st.floats(0, 1))
+def test_a_return_is_its_reward_and_the_discounted_next_return(rewards, gamma):
+    """The definition, read backwards."""
+    returns = returns_to_go(rewards, gamma)
+
+    later = [*returns[1:], 0.0][: len(rewards)]
+    expected = [reward + gamma * after for reward, after in zip(rewards, later, strict=True)]
+    assert returns.tolist() == pytest.approx(expected, rel=1e-4, abs=1e-4)
+
+
+def test_each_environment_gives_the_same_number_of_episodes():
+    """Whatever ends first would make short episodes look frequent."""
+    recorder = EpisodeRecorder(environments=2, wanted=1)
+
+    play(recorder, [[(True, True), (False, True)]] * 2 + [[(True, True), (True, True)]])
+
+    batch = recorder.batch(gamma=1.0)
+    assert recorder.complete
+    assert batch.observations.tolist() == [0, 0, 1, 2]
+    assert batch.returns.tolist() == [1, 3, 2, 1]
+
+
+def test_an_episode_that_a_fault_cut_is_dropped():
+    """Its return is not what the policy would have got."""
+    recorder = EpisodeRecorder(environments=1, wanted=1)
+
+    play(recorder, [[(False, True)], [(True, False)], [(True, True)]])
+
+    assert recorder.batch(gamma=1.0).observations.tolist() == [2]
+
+
+def test_an_update_has_whole_episodes_of_the_current_policy(make_model):
+    """Two of each of two environments; who is amid an episode begins anew."""
+    model, batches = make_model(members=2)
+
+    model.learn(20)
+
+    for batch in batches[:-1]:
+        assert len(batch.returns) == len(batch.actions) == len(batch.observations)
+        starts = [row for row in batch.observations if row[0] == 0.0]
+        assert len(starts) >= 4
+
+
+def test_training_ends_at_the_first_episode_end_after_the_last_step(make_model):
+    """What was begun is finished, and no more is begun."""
+    model, batches = make_model(episodes_per_update=1000)
+
+    model.learn(10)
+
+    assert 10 <= model.num_timesteps < 10 + 8
+    assert len(batches[0].returns) == model.num_timesteps
+
+
+def test_a_fault_is_neither_step_nor_episode(make_model):
+    """Steps 1 to 3 are an episode that the fault at 4 leaves whole; 4 to 6 is cut at its first."""
+    model, batches = make_model(faults=(2,))
+
+    model.learn(5)
+
+    assert sum(len(batch.returns) for batch in batches) == model.num_timesteps - 1
+
+
+def test_nothing_to_learn_from_changes_nothing(make_model):
+    """All episodes may have been cut."""
+    model, batches = make_model(faults=(2,))
+    before = [it.clone() for it in model.policy.parameters()]
+    model.learn(5)
+
+    empty = EpisodeRecorder(1, 1).batch(0.9)
+    after_learning = [it.clone() for it in model.policy.parameters()]
+    model.train(empty)
+
+    assert batches
+    assert any(not torch.equal(one, other) for one, other in zip(before, after_learning, strict=True))
+    assert all(
+        torch.equal(one, other) for one, other in zip(after_learning, model.policy.parameters(), strict=True)
+    )
+
+
+@pytest.mark.parametrize("baseline", ["value", "none"])
+def test_the_value_network_learns_only_as_baseline(make_model, baseline):
+    """Without a baseline nobody asks it."""
+    model, _ = make_model(baseline=baseline)
+    before = model.policy.value_net.weight.clone()
+
+    model.learn(20)
+
+    assert torch.equal(before, model.policy.value_net.weight) is (baseline == "none")
+
+
+def test_a_callback_can_end_training(make_model):
+    """As with every other algorithm."""
+    model, batches = make_model()
+
+    model.learn(100, callback=lambda locals_, _: locals_["self"].num_timesteps < 5)
+
+    assert model.num_timesteps == 5
+    assert batches == []
+
+
+@pytest.mark.parametrize(("option", "value"), [("baseline", "mean"), ("episodes_per_update", 0)])
+def test_wrong_hyperparameters_are_told_by_name(make_model, option, value):
+    """They come from a file."""
+    with pytest.raises(ValueError, match=option):
+        make_model(**{option: value})

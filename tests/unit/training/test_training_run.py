@@ -1,0 +1,355 @@
+"""One attempt of a run after the other, on corridors."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+from palaestra_sim.protocol.status import Termination
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from palaestra_trainer import checkpoint, training
+from palaestra_trainer.errors import ConfigurationError, MasterLost
+from palaestra_trainer.measuring import measure
+from palaestra_trainer.run_directory import RunDirectory, read_lines
+from palaestra_trainer.seeds import EVALUATE, episode_seeds
+
+TINY = {"policy_kwargs": {"net_arch": [8]}}
+ALGORITHMS = {
+    "DQN": TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 500},
+    "PPO": TINY | {"n_steps": 16, "batch_size": 8, "n_epochs": 2},
+    "A2C": TINY,
+    "REINFORCE": TINY | {"episodes_per_update": 2},
+}
+
+
+@pytest.fixture
+def directory(tmp_path):
+    """Return a run directory."""
+    return RunDirectory(tmp_path / "run")
+
+
+@pytest.fixture
+def last_word(tmp_path, monkeypatch):
+    """Return a function that reads the termination message."""
+    path = tmp_path / "word"
+    monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(path))
+    return lambda: Termination.from_message(path.read_text())
+
+
+@pytest.fixture
+def job(make_configuration):
+    """Make a configuration of a short run of an algorithm."""
+
+    def make(name="DQN", **changes):
+        defaults = {
+            "algorithm": {"name": name, "hyperparameters": ALGORITHMS[name]},
+            "evaluation": {"everySteps": 40, "episodes": 4},
+            "checkpoint": {"everySteps": 50, "keep": 2},
+        }
+        return make_configuration(**(defaults | changes))
+
+    return make
+
+
+@pytest.fixture
+def play(directory, make_member):
+    """Train; return the exit code and the members by name. Faults are given by a member's name."""
+
+    def run(configuration, faults=(), on_step=None, **options):
+        members = {}
+
+        def make_members(given):
+            for entry in given.simulators:
+                members[entry.name] = make_member(entry.name, **dict(faults).get(entry.name, {}))
+            if on_step:
+                first = members["collect-0"]
+                first.take_step = lambda take=first.take_step: (take(), on_step())
+            return list(members.values())
+
+        return training.run(configuration, directory, make_members, **options), members
+
+    return run
+
+
+def signal_after(steps, number=signal.SIGTERM):
+    """Return a function that sends a signal to this process at its `steps`-th call."""
+    calls = iter(range(1, 10_000))
+
+    def step():
+        if next(calls) == steps:
+            os.kill(os.getpid(), number)
+
+    return step
+
+
+@pytest.mark.parametrize(("name", "collectors", "steps"), [("DQN", 1, 100), ("PPO", 2, 128), ("A2C", 1, 100)])
+def test_a_run_ends_with_its_steps_a_model_and_a_summary(play, job, directory, name, collectors, steps):
+    """DQN and A2C at the target, PPO at the end of the rollout that holds it."""
+    code, _ = play(job(name, collectors=collectors))
+
+    summary = json.loads(directory.summary.read_text())
+    assert code == 0
+    assert summary["steps"] == steps
+    assert summary["faults"] == 0
+    assert directory.model.exists()
+    assert checkpoint.newest(directory.checkpoints).manifest.step == steps
+
+
+def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
+    """Each policy is measured on the same seeds, at every so many steps and at the end."""
+    _, members = play(job())
+
+    lines = list(read_lines(directory.evaluations))
+    seeds = list(episode_seeds(1, EVALUATE, 4))
+    assert [line["step"] for line in lines] == [40, 80, 100]
+    assert set(lines[0]) >= {"episodes", "success_rate", "mean_return", "mean_length"}
+    assert members["evaluate-0"].env.seeds == seeds * 3
+
+
+def test_simulators_rest_while_nobody_needs_them(play, job):
+    """Evaluators but in evaluations, collectors in them."""
+    _, members = play(job())
+
+    assert members["evaluate-0"].log == ["start", "pause", *(["run", "pause"] * 3), "stop"]
+    assert members["collect-0"].log == ["start", *(["pause", "run"] * 3), "stop"]
+
+
+def test_model_zip_is_the_best_by_evaluation(play, job, directory):
+    """Its measure, on the seeds it was chosen on, is the best line's."""
+    configuration = job("REINFORCE", steps=600, evaluation={"everySteps": 50, "episodes": 4})
+    _, members = play(configuration)
+    best = max(read_lines(directory.evaluations), key=lambda it: (it["success_rate"], it["mean_return"]))
+
+    again = measure(
+        configuration, directory.model, lambda _: [members["evaluate-0"]], episodes=4, stream=EVALUATE
+    )
+
+    assert (again["success_rate"], again["mean_return"]) == (best["success_rate"], best["mean_return"])
+
+
+def test_training_ends_early_at_the_wanted_success_rate(play, job, directory):
+    """The corridor is learned long before 5,000 steps."""
+    wanted = {"everySteps": 50, "episodes": 4, "stopAtSuccessRate": 1.0}
+    code, _ = play(job("REINFORCE", steps=5000, evaluation=wanted))
+
+    summary = json.loads(directory.summary.read_text())
+    assert code == 0
+    assert summary["success_rate"] == 1.0
+    assert summary["steps"] < 5000
+
+
+@pytest.mark.parametrize("evaluation", [{"everySteps": 0}, {"everySteps": 10}])
+def test_without_evaluations_the_last_model_is_kept(play, job, directory, evaluation):
+    """There is no best one."""
+    code, _ = play(job(evaluation=evaluation, evaluators=0))
+
+    assert code == 0
+    assert directory.model.exists()
+    assert json.loads(directory.summary.read_text())["success_rate"] is None
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO", "A2C", "REINFORCE"])
+def test_faults_are_survived_and_counted(play, job, directory, name):
+    """Of collectors and evaluators; the steps are as many as without."""
+    faults = {"collect-0": {"steps": [5, 30]}, "evaluate-0": {"steps": [6]}}
+    code, members = play(job(name), faults)
+
+    summary = json.loads(directory.summary.read_text())
+    assert code == 0
+    assert (summary["faults"], summary["restarts"]) == (3, 3)
+    assert summary["steps"] >= 100
+    assert members["collect-0"].log.count("restart") == 2
+
+
+def test_simulators_are_recycled_without_a_fault(play, job, directory, make_configuration):
+    """After so many resets, between episodes."""
+    content = job().model_dump(by_alias=True)
+    for simulator in content["simulators"]:
+        simulator["recycle"] = {"afterResets": 5}
+    code, members = play(make_configuration(**content))
+
+    summary = json.loads(directory.summary.read_text())
+    assert code == 0
+    assert summary["recycled"] == sum(it.log.count("restart") for it in members.values()) > 2
+    assert summary["faults"] == 0
+
+
+def test_a_spent_budget_ends_the_run_with_80_and_a_checkpoint(play, job, directory, last_word):
+    """Not to be tried again, but a person may mend it and go on."""
+    code, _ = play(job(), {"collect-0": {"steps": range(30, 100)}})
+
+    assert code == 80
+    assert last_word().reason.startswith("FaultBudgetSpent: collect-0: 10 restarts")
+    assert checkpoint.newest(directory.checkpoints).manifest.step == last_word().last_checkpoint.step > 0
+
+
+def test_a_simulator_that_does_not_start_is_a_fault_too(play, job):
+    """Until its budget is spent."""
+    code, _ = play(job(), {"collect-0": {"starts": [1, 2]}})
+
+    assert code == 0
+
+
+def test_a_lost_master_ends_the_run_with_75(play, job, directory, last_word):
+    """Nothing registers again; a new pod has a new master."""
+    code, _ = play(job(), {"collect-0": {"steps": {33: MasterLost("no ROS master")}}})
+
+    assert code == 75
+    assert "MasterLost" in last_word().reason
+    assert checkpoint.newest(directory.checkpoints)
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last_word, name, number):
+    """At a rollout boundary: what was amid a rollout is played again."""
+    code, members = play(job(name), on_step=signal_after(42, number))
+
+    saved = checkpoint.newest(directory.checkpoints).manifest
+    assert code == 75
+    assert last_word().reason == f"Interrupted: {number.name} received"
+    assert 0 < saved.step <= 42 + 4
+    assert members["collect-0"].log[-1] == "stop"
+    assert not directory.summary.exists()
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO"])
+def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
+    """It ends at the same total, plays new episodes, and counts what was before."""
+    configuration = job(name)
+    _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
+    saved = checkpoint.newest(directory.checkpoints).manifest
+
+    code, after = play(configuration, must_resume=True)
+
+    summary = json.loads(directory.summary.read_text())
+    seeds_before, seeds_after = (set(it["collect-0"].env.seeds) for it in (before, after))
+    assert code == 0
+    assert summary["steps"] == (100 if name == "DQN" else 111)  # 15 valid rows, then 16 a rollout
+    assert (summary["attempts"], summary["faults"]) == (2, 1)
+    assert len(seeds_before & seeds_after) <= (0 if name == "DQN" else 4)
+    reasons = [line["reason"] for line in read_lines(directory.attempts)]
+    assert reasons == ["new run", f"resumed at step {saved.step}"]
+
+
+def test_a_finished_run_is_reported_and_not_repeated(play, job, directory):
+    """A pod that is started once more must not cost anything."""
+    play(job())
+
+    code, members = play(job())
+
+    assert (code, members) == (0, {})
+    assert len(list(read_lines(directory.attempts))) == 1
+
+
+def test_a_run_is_prolonged_by_more_steps(play, job, directory):
+    """It goes on from its last checkpoint."""
+    play(job())
+
+    code, _ = play(job(steps=150))
+
+    assert code == 0
+    assert json.loads(directory.summary.read_text())["steps"] == 150
+
+
+def test_a_directory_of_another_run_is_refused(play, job, last_word):
+    """Before anything of it is overwritten."""
+    play(job("DQN"))
+
+    code, _ = play(job("PPO", steps=200))
+
+    assert code == 2
+    assert "use another run directory" in last_word().reason
+
+
+def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
+    """A person who types --resume expects something to be there."""
+    code, _ = play(job(), must_resume=True)
+
+    assert code == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "fact"),
+    [
+        ({"algorithm": {"name": "DQN", "hyperparameters": {"gama": 1}}}, "did you mean gamma"),
+        ({"statusAddress": "127.0.0.1:99999"}, "statusAddress"),
+    ],
+)
+def test_what_is_wrong_is_told_before_a_simulator_is_made(play, job, last_word, changes, fact):
+    """With 2: trying again cannot help."""
+    code, members = play(job(**changes))
+
+    assert (code, members) == (2, {})
+    assert fact in last_word().reason
+
+
+def test_members_that_are_missing_are_told(job, directory, last_word):
+    """Whoever makes them forgot one."""
+    code = training.run(job(), directory, lambda _: [])
+
+    assert code == 2
+    assert "collect-0, evaluate-0" in last_word().reason
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO"])
+def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, directory, last_word, name):
+    """NaN would come back with every attempt."""
+    wild = ALGORITHMS[name] | {"learning_rate": 1e39}
+    code, _ = play(job(name, steps=2000, algorithm={"name": name, "hyperparameters": wild}))
+
+    assert code == 81
+    assert "Diverged" in last_word().reason
+    assert checkpoint.newest(directory.checkpoints) is None
+
+
+def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, last_word):
+    """A bug must not leave processes behind."""
+    bug = {"collect-0": {"steps": {20: ZeroDivisionError("a bug")}}}
+    code, members = play(job(), bug)
+
+    assert code == 1
+    assert last_word().reason == "Unexpected: ZeroDivisionError: a bug"
+    assert all(member.log[-1] == "stop" for member in members.values())
+
+
+def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
+    """Those of Stable-Baselines3, and each reward term by its name."""
+    play(job("A2C", steps=600))
+
+    events = EventAccumulator(str(directory.tensorboard))
+    events.Reload()
+    assert set(events.Tags()["scalars"]) >= {
+        "rollout/ep_rew_mean",
+        "rollout/success_rate",
+        "eval/success_rate",
+        "eval/mean_reward",
+        "reward/walk",
+        "time/fps",
+        "simulators/faults",
+    }
+
+
+def test_measuring_needs_a_model_and_somebody_who_evaluates(job, directory):
+    """Each with its own remedy."""
+    with pytest.raises(ConfigurationError, match=r"model.zip: is not there; train first"):
+        measure(job(), directory.model, lambda _: [], episodes=1, stream="B")
+    with pytest.raises(ConfigurationError, match="none has role Evaluate"):
+        measure(job(evaluators=0), directory.model, lambda _: [], episodes=1, stream="B")
+
+
+def test_a_restored_policy_is_the_policy_that_was_saved(play, job, directory, make_member):
+    """The zip is read without unpickling, by the configuration of the run."""
+    play(job())
+
+    result = measure(
+        job(), directory.model, lambda _: [make_member("evaluate-0")], episodes=4, stream=EVALUATE
+    )
+
+    best = max(line["success_rate"] for line in read_lines(directory.evaluations))
+    assert result["success_rate"] == best
+    assert np.isfinite(result["mean_return"])

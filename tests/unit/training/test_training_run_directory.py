@@ -1,0 +1,88 @@
+"""What is in a run directory, and that it is old or new, never half."""
+
+from __future__ import annotations
+
+import errno
+import json
+
+import pytest
+
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
+from palaestra_trainer.summary import finished, summarise, write_summary
+
+
+@pytest.fixture
+def directory(tmp_path):
+    """Return a run directory."""
+    return RunDirectory(tmp_path / "uid" / "0")
+
+
+def test_attempts_are_counted(directory):
+    """The count of lines is the number of the attempt."""
+    numbers = [directory.begin_attempt("pod-1", "new run"), directory.begin_attempt("pod-2", "resumed")]
+
+    assert numbers == [1, 2]
+    assert [line["pod"] for line in read_lines(directory.attempts)] == ["pod-1", "pod-2"]
+
+
+def test_a_line_that_a_crash_tore_is_left_out(tmp_path):
+    """The lines before and after it are whole."""
+    path = tmp_path / "lines.jsonl"
+    append_line(path, {"step": 1})
+    with path.open("a") as file:
+        file.write('{"step": 2, "succ')
+    append_line(path, {"step": 3})
+
+    assert [line["step"] for line in read_lines(path)] == [1, 3]
+
+
+def test_a_file_that_is_not_there_has_no_lines(tmp_path):
+    """Nothing was evaluated yet."""
+    assert list(read_lines(tmp_path / "none")) == []
+
+
+def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
+    """A full disk must not cost the best model."""
+    path = tmp_path / "model.zip"
+    replace_file(path, lambda name: name.write_text("old"))
+
+    def fail(name):
+        name.write_text("ne")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space"):
+        replace_file(path, fail)
+    assert path.read_text() == "old"
+    assert [it.name for it in tmp_path.iterdir()] == ["model.zip"]
+
+
+def test_the_summary_is_of_the_best_evaluation(directory):
+    """Whose policy model.zip is."""
+    for step, rate in ((10, 0.5), (20, 0.9), (30, 0.7)):
+        append_line(directory.evaluations, {"step": step, "success_rate": rate, "mean_return": 1.0})
+    progress = Progress(30, [("collect-0", "Collect")])
+    progress.step, progress.counters.seconds = 30, 2.0
+
+    summary = summarise(directory, progress)
+
+    assert (summary["success_rate"], summary["best_step"]) == (0.9, 20)
+    assert (summary["steps"], summary["steps_per_second"], summary["faults"]) == (30, 15.0, 0)
+
+
+def test_a_summary_makes_a_run_finished(directory, make_configuration):
+    """Until somebody prolongs it."""
+    before = finished(directory, make_configuration(steps=100))
+    write_summary(directory, summarise(directory, Progress(100, [])))
+
+    assert before is None
+    assert finished(directory, make_configuration(steps=100))["target"] == 100
+    assert finished(directory, make_configuration(steps=200)) is None
+
+
+@pytest.mark.parametrize("text", ["", "[]", json.dumps({"steps": 3})])
+def test_a_summary_that_says_nothing_finishes_nothing(directory, make_configuration, text):
+    """It was written by something else."""
+    directory.summary.write_text(text)
+
+    assert finished(directory, make_configuration()) is None

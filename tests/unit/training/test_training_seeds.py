@@ -1,0 +1,47 @@
+"""Every episode's seed is a function of what the episode is."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.seeds import COLLECT, EVALUATE, episode_seed, episode_seeds
+
+NUMBERS = st.integers(0, 2**31)
+
+
+@given(NUMBERS, st.text(), st.integers(0, 1000), NUMBERS)
+def test_a_seed_is_always_the_same_and_fits_in_31_bits(run, stream, simulator, episode):
+    """It goes through ROS and a simulator's string field; neither should have to think."""
+    seed = episode_seed(run, stream, simulator, episode)
+
+    assert seed == episode_seed(run, stream, simulator, episode)
+    assert 0 <= seed < 2**31
+
+
+def test_a_known_seed_stays_what_it_is():
+    """A run that was begun with one release is continued with the next."""
+    assert episode_seed(1, COLLECT, 0, 0) == 2036268347
+
+
+def test_streams_share_no_seed():
+    """A policy must not be measured on what it was chosen on."""
+    many = {
+        stream: {episode_seed(1, stream, 0, episode) for episode in range(2000)}
+        for stream in (COLLECT, EVALUATE, "B")
+    }
+
+    assert not many[COLLECT] & many[EVALUATE]
+    assert not many[EVALUATE] & many["B"]
+
+
+def test_simulators_and_runs_play_different_episodes():
+    """Two collectors with the same episodes would learn half as much."""
+    seeds = {episode_seed(run, COLLECT, simulator, 0) for run in range(50) for simulator in range(8)}
+
+    assert len(seeds) == 400
+
+
+def test_a_shared_stream_counts_its_episodes():
+    """However many simulators play them, an evaluation has the same episodes."""
+    assert list(episode_seeds(3, "B", 2)) == [episode_seed(3, "B", 0, 0), episode_seed(3, "B", 0, 1)]

@@ -1,0 +1,133 @@
+"""Every bad world is refused with its place, the fact and the remedy, and in no other way."""
+
+import pickle
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_sim.world import RunIdentity, WorldError, builtin, generate, parse
+
+IDENTITY = RunIdentity(job="job", replica=0, group="collect", index=0)
+
+
+def refusal(source: bytes) -> str:
+    """Return what is said about a world that can't be read."""
+    with pytest.raises(WorldError) as caught:
+        parse(source, "arena.wbt")
+    return str(caught.value)
+
+
+def problem(attempt: Callable[[], object]) -> WorldError | None:
+    """Return what is wrong with a world; any other exception is a failure of the test."""
+    try:
+        attempt()
+    except WorldError as error:
+        return error
+    return None
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Robot {", '2:7: the "{" of Robot is never closed; add the missing "}"'),
+        ("Group {\n children [", '3:11: the "[" of children is never closed; add the missing "]"'),
+        ("}", "2:1: } where the type of a node should be; remove it or add what is missing"),
+        ("{ }", "2:1: { where the type of a node should be"),
+        ("Group { children [ { } ] }", "2:20: { where a value of children should be; write one"),
+        ("42", "2:1: 42 where the type of a node should be"),
+        ('Robot { } "a"', '2:11: "a" where the type of a node should be'),
+        ("Robot ]", '2:7: ] where the "{" of Robot should be; a node is written Type { … }'),
+        ("Robot", '2:6: the end of the file where the "{" of Robot should be'),
+        ("Robot { name }", "2:14: } where a value of name should be; write one"),
+        ("Robot { name", "2:13: the end of the file where a value of name should be"),
+        ('Robot { "name" }', '2:9: "name" where a field of Robot should be'),
+        ('Robot { name "a" "b" }', '2:18: "b" where a field of Robot should be'),
+        ("Robot { TRUE }", "2:9: TRUE where a field of Robot should be"),
+        ("Robot { a.b 1 }", "2:9: a.b where a field of Robot should be"),
+        ('Robot { name"a" }', '2:9: name"a" where a field of Robot should be'),
+        ("Robot { 'a' 1 }", "2:9: 'a' where a field of Robot should be"),
+        ("DEF Robot { }", "2:11: { where the type of a node should be"),
+        ("DEF { }", "2:5: { where a DEF name after DEF should be"),
+        ("USE { }", "2:5: { where a DEF name after USE should be"),
+        ("Robot { name IS name }", "2:14: IS outside a PROTO file; write the value of name"),
+        ("PROTO Robot [ ] { }", "2:1: PROTO where the type of a node should be"),
+        ("EXTERNPROTO Robot", "2:13: Robot where the address of an EXTERNPROTO should be"),
+        ("EXTERNPROTO", "2:12: the end of the file where the address of an EXTERNPROTO should be"),
+        ("IMPORTABLE Robot { }", "2:12: Robot where EXTERNPROTO should be; only an EXTERNPROTO"),
+        ('Robot { name "a" name "b" }', "2:18: Robot has the field name twice; keep one of them"),
+        ('Robot {\n  name "a\n}', '3:8: this string is not closed on its line; add the missing "'),
+        ("Grüße 1", '2:7: 1 where the "{" of Grüße should be'),
+        ("x" * 99, f'2:100: the end of the file where the "{{" of {"x" * 99} should be'),
+        ("[" + "x" * 99, "2:1: [ where the type of a node should be"),
+        ('"' + "x" * 99 + '"', f'2:1: "{"x" * 39}… where the type of a node should be'),
+    ],
+)
+def test_a_mistake_is_pointed_at(world: Callable[[str], bytes], text: str, message: str) -> None:
+    """Line and column count from 1; the column counts characters, as an editor does."""
+    assert refusal(world(text)).startswith(f"arena.wbt:{message}")
+
+
+@pytest.mark.parametrize(
+    "first_line",
+    [b"", b"Robot { }", b"#VRML V2.0 utf8", b"#VRML_SIM", b"#VRML_SIM utf8", b" #VRML_SIM R2023b"],
+)
+def test_a_file_without_the_header_of_a_world_is_refused(first_line: bytes) -> None:
+    """Webots refuses it too."""
+    assert refusal(first_line + b"\n") == (
+        "arena.wbt:1:1: the first line is not the header of a Webots world; make it #VRML_SIM R2023b utf8"
+    )
+
+
+def test_a_byte_that_is_not_utf_8_is_pointed_at(world: Callable[[str], bytes]) -> None:
+    """The characters before it count as one each."""
+    assert refusal(world("# ü ") + b"\xff\n") == (
+        "arena.wbt:2:5: byte 0xff is not UTF-8; save the world as UTF-8"
+    )
+
+
+def test_nodes_a_hundred_deep_are_read_and_more_are_refused(world: Callable[[str], bytes]) -> None:
+    """The limit is a number of ours: Python's stack is never the one to complain."""
+    deepest = "Group { children " * 99 + "Group { }" + " }" * 99
+
+    assert len(list(parse(world(deepest)).walk())) == 100
+    assert "nodes are nested more than 100 deep" in refusal(world("Group { children " * 100_000))
+
+
+def test_an_error_can_be_taken_apart_and_sent_on() -> None:
+    """A tool that shows errors in an editor needs the numbers; a process pool needs a copy."""
+    error = WorldError("arena.wbt", 12, 5, "this is wrong", "do that")
+
+    copy = pickle.loads(pickle.dumps(error))
+
+    assert (copy.world, copy.line, copy.column) == ("arena.wbt", 12, 5)
+    assert (copy.fact, copy.remedy) == ("this is wrong", "do that")
+    assert str(copy) == "arena.wbt:12:5: this is wrong; do that"
+    assert isinstance(copy, ValueError)
+
+
+@given(st.binary())
+def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
+    """No other exception, whatever the file is."""
+    error = problem(lambda: parse(b"#VRML_SIM R2023b utf8\n" + data))
+
+    assert error is None or (error.line >= 1 and error.column >= 1)
+
+
+@given(
+    at=st.floats(0, 1),
+    cut=st.integers(0, 400),
+    new=st.one_of(
+        st.binary(max_size=4),
+        st.sampled_from([b'"', b"{", b"}", b"[", b"]", b"USE ", b"DEF A ", b" IS ", b"#", b"\r\n"]),
+    ),
+)
+def test_a_damaged_world_is_generated_from_or_refused(at: float, cut: int, new: bytes) -> None:
+    """Half-saved files, lost braces, editors gone wrong."""
+    arena = builtin("two_robots")
+    place = int(at * len(arena))
+
+    error = problem(lambda: generate(arena[:place] + new + arena[place + cut :], IDENTITY, clock=True))
+
+    assert error is None or str(error).startswith(f"world:{error.line}:{error.column}: ")

@@ -1,0 +1,364 @@
+"""What the generator does to each way of writing a robot, and what it refuses.
+
+Each example shows a world before and after; `NAME` stands for the generated name.
+"""
+
+from collections.abc import Callable
+
+import pytest
+
+from palaestra_sim.world import RunIdentity, WorldError, WorldRobot, generate, robots, ros_name
+
+Make = Callable[[str], bytes]
+
+
+@pytest.fixture
+def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
+    """Return what turns the text of a world into that of the generated one, names shortened."""
+
+    def make(text: str, robot: str = "robotino", *, clock: bool = True) -> str:
+        made = generate(world(text), identity, clock=clock)
+        assert generate(made, identity, clock=clock) == made
+        return made.decode().split("\n", 1)[1].replace(ros_name(identity, robot), "NAME")
+
+    return make
+
+
+@pytest.fixture
+def refusal(world: Make, identity: RunIdentity) -> Callable[..., str]:
+    """Return what tells how a world is refused."""
+
+    def tell(text: str, *, relative_addresses: bool = False) -> str:
+        with pytest.raises(WorldError) as caught:
+            generate(
+                world(text),
+                identity,
+                clock=True,
+                name="my.wbt",
+                relative_addresses=relative_addresses,
+            )
+        return str(caught.value)
+
+    return tell
+
+
+def robot(arguments: str, name: str = "robotino") -> str:
+    """Return a robot on one line, with these words in it."""
+    return f'Robot {{ name "{name}" controller "ros" {arguments} }}'
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        pytest.param(
+            'controllerArgs ["--name=a" "--synchronize"]',
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="a name is replaced",
+        ),
+        pytest.param(
+            'controllerArgs ["--name=a"]',
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="synchronize follows the name",
+        ),
+        pytest.param(
+            'controllerArgs ["--auto-publish"]',
+            'controllerArgs ["--name=NAME" "--synchronize" "--auto-publish"]',
+            id="a missing name comes first",
+        ),
+        pytest.param(
+            'controllerArgs [ "--synchronize", "--auto-publish" ]',
+            'controllerArgs [ "--name=NAME" "--synchronize", "--auto-publish" ]',
+            id="commas and blanks stay",
+        ),
+        pytest.param(
+            "controllerArgs []",
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="an empty list is filled",
+        ),
+        pytest.param(
+            'controllerArgs ["--name=a" "--name=b" "--synchronize"]',
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="a second name goes",
+        ),
+        pytest.param(
+            'controllerArgs ["--auto-publish" "--name=a"]',
+            'controllerArgs ["--auto-publish" "--name=NAME" "--synchronize"]',
+            id="nothing is reordered",
+        ),
+        pytest.param(
+            'controllerArgs "--name=a"',
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="a bare string becomes a list",
+        ),
+        pytest.param(
+            'controllerArgs "--name=a --clock --robot-description=x"',
+            'controllerArgs ["--name=NAME" "--synchronize" "--clock" "--robot-description=x"]',
+            id="a bare string of several options becomes one string each",
+        ),
+        pytest.param(
+            'controllerArgs ["--name=a --clock"]',
+            'controllerArgs ["--name=NAME" "--synchronize" "--clock"]',
+            id="so does one in a list, whose name would be 'a --clock'",
+        ),
+        pytest.param(
+            'controllerArgs ["--name=my robot"]',
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="a name with a blank is one name",
+        ),
+        pytest.param(
+            'controllerArgs ""',
+            'controllerArgs ["--name=NAME" "--synchronize"]',
+            id="an empty bare string is no argument",
+        ),
+        pytest.param(
+            r'controllerArgs ["a\b \"c\""]',
+            r'controllerArgs ["--name=NAME" "--synchronize" "a\b \"c\""]',
+            id="what is kept is kept as written",
+        ),
+        pytest.param(
+            'customData "--clock"',
+            'controllerArgs ["--name=NAME" "--synchronize"] customData "--clock"',
+            id="missing arguments go behind the controller",
+        ),
+    ],
+)
+def test_the_arguments_of_a_robot(generated: Callable[..., str], before: str, after: str) -> None:
+    """Only what is between controllerArgs and its end may change."""
+    assert generated(robot(before)) == robot(after)
+
+
+def test_lines_and_comments_stay_where_they_are(generated: Callable[..., str]) -> None:
+    """A generated world is read by people, beside its source."""
+    before = """Robot {
+  name "robotino"  # the one and only
+  controllerArgs [
+    # who
+    "--auto-publish"  # all of them
+
+    "--name=a"  # I
+  ]
+  controller "ros"
+}
+"""
+
+    assert generated(before) == before.replace('--name=a"', '--name=NAME" "--synchronize"')
+
+
+def test_added_strings_are_on_lines_of_their_own_in_a_list_that_is(
+    generated: Callable[..., str],
+) -> None:
+    """As Webots would have saved it, in the line ends of the file."""
+    text = 'Robot {{\r\n  name "robotino"\r\n  controller "ros"\r\n  controllerArgs [{}\r\n  ]\r\n}}\r\n'
+    before = text.format('\r\n    "--name=a"')
+    after = text.format('\r\n    "--name=NAME"\r\n    "--synchronize"')
+
+    assert generated(before) == after
+
+
+def test_an_added_list_is_on_lines_of_its_own_if_the_controller_is(
+    generated: Callable[..., str],
+) -> None:
+    """With the indentation of the robot."""
+    before = (
+        'Group {\n  children [\n    Robot {\n      name "robotino"\n      controller "ros"\n    }\n  ]\n}'
+    )
+    added = '      controllerArgs [\n        "--name=NAME"\n        "--synchronize"\n      ]\n'
+
+    assert generated(before) == before.replace('"ros"\n', '"ros"\n' + added)
+
+
+def test_a_clock_goes_with_the_gap_before_it(generated: Callable[..., str]) -> None:
+    """Unless a comment is in it, which stays."""
+    arguments = 'controllerArgs ["--clock"\n"--name=a" "--synchronize"{}"--clock" ]'
+    kept = 'controllerArgs [\n"--name=NAME" "--synchronize"{} ]'
+
+    assert generated(robot(arguments.format(" ")), clock=False) == robot(kept.format(""))
+    assert generated(robot(arguments.format(" #c\n")), clock=False) == robot(kept.format(" #c\n"))
+
+
+def test_one_clock_of_a_world_may_stay_and_it_is_the_first(
+    generated: Callable[..., str],
+) -> None:
+    """Two on one ROS master would publish two times on one topic."""
+    first = robot('controllerArgs ["--synchronize" "--clock" "--clock"]')
+    second = robot('controllerArgs ["--clock"]', name="b")
+
+    with_clock = generated(first + second, clock=True)
+
+    assert with_clock.count("--clock") == 1
+    assert with_clock.index("--clock") < with_clock.index('name "b"')
+    assert generated(first + second, clock=False).count("--clock") == 0
+
+
+def test_a_clock_is_never_added(generated: Callable[..., str]) -> None:
+    """Whether anyone needs it is for the world to say, `clock` only allows it."""
+    assert "--clock" not in generated(robot('controllerArgs ["--name=a"]'), clock=True)
+
+
+@pytest.mark.parametrize(
+    "around",
+    [
+        "Group {{ children [ {} ] }}",
+        "Pose {{ children {} }}",
+        "Solid {{ children [ HingeJoint {{ endPoint {} }} ] }}",
+        "ConveyorBelt {{ slot [ Lamp {{ }} {} ] }}",
+    ],
+)
+def test_a_robot_is_found_wherever_it_is_nested(generated: Callable[..., str], around: str) -> None:
+    """Webots allows a robot wherever it allows a node."""
+    assert generated(around.format(robot(""))).count("NAME") == 1
+
+
+def test_a_robot_within_a_robot_gets_its_own_name(world: Make, identity: RunIdentity) -> None:
+    """Wherever the arguments of the outer one stand."""
+    inner = robot('controllerArgs ["--name=a"]', name="arm")
+    made = generate(world(robot(f'children [ {inner} ] controllerArgs "--name=b"')), identity, clock=False)
+
+    assert [found.ros_name for found in robots(made)] == [
+        ros_name(identity, "robotino"),
+        ros_name(identity, "arm"),
+    ]
+
+
+def test_a_proto_whose_controller_is_ros_is_a_robot(world: Make, identity: RunIdentity) -> None:
+    """Its default name is in the PROTO file, so its type stands in for it."""
+    made = generate(world('Robotino3 { controller "ros" }'), identity, clock=False)
+
+    assert [found.robot for found in robots(made)] == ["Robotino3"]
+    assert robots(made)[0].ros_name == ros_name(identity, "Robotino3")
+
+
+def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdentity) -> None:
+    """That is the default of Webots."""
+    made = generate(world('Robot { controller "ros" }'), identity, clock=False)
+
+    assert robots(made)[0].ros_name == ros_name(identity, "robot")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        'Robot { name "robotino" controller "braitenberg" controllerArgs ["--name=a"] }',
+        'Robot { name "robotino" controllerArgs ["--name=a" "--clock"] }',
+        'Robot { controller "<extern>" customData "controller \\"ros\\"" }',
+        'Solid { } # Robot { controller "ros" }',
+    ],
+)
+def test_other_controllers_are_left_alone(generated: Callable[..., str], text: str) -> None:
+    """They don't speak ROS, so their arguments are their own affair."""
+    assert generated(text, clock=False) == text
+
+
+def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
+    """Generated or not; the controller takes the last of two names."""
+    text = (
+        'Robot { controller "ros" supervisor TRUE controllerArgs ["--name=a" "--name=b"] }'
+        'Robot { controller "ros" name "arm" controllerArgs "--synchronize" }'
+    )
+
+    assert robots(world(text)) == (
+        WorldRobot(robot="robot", ros_name="b", supervisor=True, synchronize=False),
+        WorldRobot(robot="arm", ros_name=None, supervisor=False, synchronize=True),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        pytest.param(
+            f"DEF A {robot('')}\nUSE A",
+            'my.wbt:3:1: USE A repeats the robot "robotino" and its ROS name; '
+            "write the node out, with its own name",
+            id="a robot used again",
+        ),
+        pytest.param(
+            f"DEF A Group {{ children [ {robot('')} ] }}\n  Group {{ children USE A }}",
+            'my.wbt:3:20: USE A repeats the robot "robotino"',
+            id="a group with a robot used again",
+        ),
+        pytest.param(
+            robot("") + "\n" + robot(""),
+            'my.wbt:3:1: a second robot is called "robotino"; give it a name of its own',
+            id="two robots of one name",
+        ),
+        pytest.param(
+            robot("controllerArgs 5"),
+            'my.wbt:2:57: 5 in controllerArgs is not a string; write a list like ["--clock"]',
+            id="a number as an argument",
+        ),
+        pytest.param(
+            robot('controllerArgs [ "--clock" Group { } ]'),
+            "my.wbt:2:69: Group in controllerArgs is not a string",
+            id="a node among the arguments",
+        ),
+        pytest.param(
+            robot('controllerArgs [ "__name:=other" ]'),
+            'my.wbt:2:59: "__name:=other" overrules the generated ROS name; remove it',
+            id="a remapping of the node's name",
+        ),
+        pytest.param(
+            'EXTERNPROTO "../protos/Lamp.proto"',
+            'my.wbt:2:13: "../protos/Lamp.proto" is relative to the file of the world, '
+            "and this one has none; begin it with webots:// or https://, or give the world as a file",
+            id="a relative PROTO",
+        ),
+        pytest.param(
+            'ImageTexture {\n  url [ "https://a/b.png" "textures/c.png" ] }',
+            'my.wbt:3:27: "textures/c.png" is relative to the file of the world',
+            id="a relative texture",
+        ),
+        pytest.param(
+            'Background { frontUrl "sky.jpg" }',
+            'my.wbt:2:23: "sky.jpg" is relative to the file of the world',
+            id="a relative sky",
+        ),
+        pytest.param(
+            'Floor { texture "tiles.jpg" }',
+            'my.wbt:2:17: "tiles.jpg" is relative to the file of the world',
+            id="a relative texture of a PROTO",
+        ),
+    ],
+)
+def test_a_world_that_no_simulator_can_have_is_refused(
+    refusal: Callable[..., str], text: str, message: str
+) -> None:
+    """With its place, the fact and the remedy."""
+    assert refusal(text).startswith(message)
+
+
+def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> None:
+    """Shapes are used again all the time."""
+    text = "Solid { children DEF BODY Shape { } boundingObject USE BODY }"
+
+    assert generated(text) == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'EXTERNPROTO "webots://projects/Lamp.proto"',
+        'EXTERNPROTO "HTTPS://example.org/Lamp.proto"',
+        'Mesh { url "/opt/meshes/a.obj" }',
+        'Motor { sound "" }',
+        'TexturedBackground { texture "mountains" }',
+        'Robot { controller "../my" window "a.b" }',
+    ],
+)
+def test_addresses_that_lead_somewhere_from_everywhere_are_fine(
+    generated: Callable[..., str], text: str
+) -> None:
+    """And so is what only looks like an address."""
+    assert generated(text) == text
+
+
+def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
+    world: Make, identity: RunIdentity, refusal: Callable[..., str]
+) -> None:
+    """But nothing else is allowed to it."""
+    text = 'EXTERNPROTO "../Lamp.proto" Mesh { url "a.obj" }'
+
+    made = generate(world(text), identity, clock=False, relative_addresses=True)
+
+    assert made == world(text)
+    assert "a second robot" in refusal(text + robot("") * 2, relative_addresses=True)

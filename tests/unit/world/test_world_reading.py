@@ -1,0 +1,132 @@
+"""What a world looks like once it is read."""
+
+from collections.abc import Callable
+
+import pytest
+
+from palaestra_sim.world import Node, World, parse
+
+SCENE = """EXTERNPROTO "https://example.org/Lamp.proto"
+IMPORTABLE EXTERNPROTO "webots://Chair.proto"
+WorldInfo { basicTimeStep 32 title "Arena" }
+DEF BOX Solid {
+  translation 1 -2.5 0   # metres
+  children [ DEF SHAPE Shape { castShadows FALSE } Lamp { colour [ 1 1 0, 0 0 1 ] } ]
+  boundingObject USE SHAPE
+  physics NULL
+  hidden position_0_0 0.25
+}
+Robot { controllerArgs [ "--name=a" "--clock" ] supervisor TRUE }
+"""
+
+
+@pytest.fixture
+def scene(world: Callable[[str], bytes]) -> World:
+    """Return the scene above, as read."""
+    return parse(world(SCENE))
+
+
+@pytest.fixture
+def box(scene: World) -> Node:
+    """Return the solid in it."""
+    return scene.nodes[1]
+
+
+def test_a_world_has_a_header_and_nodes_in_source_order(scene: World) -> None:
+    """The header names the release of Webots that it is for."""
+    assert scene.header == "#VRML_SIM R2023b utf8"
+    assert [node.type_name for node in scene.nodes] == ["WorldInfo", "Solid", "Robot"]
+
+
+def test_protos_from_elsewhere_are_listed_by_address(scene: World) -> None:
+    """They aren't nodes."""
+    assert [token.text for token in scene.externs] == [
+        b'"https://example.org/Lamp.proto"',
+        b'"webots://Chair.proto"',
+    ]
+
+
+def test_numbers_come_as_floats(box: Node) -> None:
+    """A vector is a bare row of numbers."""
+    assert box.numbers("translation") == (1.0, -2.5, 0.0)
+    assert not box.fields["translation"].bracketed
+
+
+def test_a_list_of_vectors_comes_flat(scene: World) -> None:
+    """How many numbers belong together depends on the field, which the reader doesn't know."""
+    lamp = next(node for node in scene.walk() if node.type_name == "Lamp")
+
+    assert lamp.numbers("colour") == (1, 1, 0, 0, 0, 1)
+    assert lamp.fields["colour"].bracketed
+
+
+def test_a_field_that_is_absent_or_of_another_kind_has_no_numbers(scene: World) -> None:
+    """So that a reader can fall back on the default of Webots."""
+    assert scene.nodes[0].numbers("gravity") is None
+    assert scene.nodes[0].numbers("title") is None
+
+
+def test_strings_come_unescaped(scene: World) -> None:
+    """A field of one string and a list of strings are asked for in the same way."""
+    assert scene.nodes[0].text("title") == "Arena"
+    assert scene.nodes[0].text("basicTimeStep") is None
+    assert scene.nodes[2].texts("controllerArgs") == ("--name=a", "--clock")
+    assert scene.nodes[2].texts("customData") == ()
+
+
+def test_a_flag_has_the_default_that_is_asked_for(scene: World) -> None:
+    """The reader doesn't know what Webots takes for an absent field."""
+    assert scene.nodes[2].flag("supervisor", default=False)
+    assert not scene.nodes[2].flag("selfCollision", default=False)
+    assert scene.nodes[2].flag("synchronization", default=True)
+
+
+def test_nodes_in_a_field_come_in_order(box: Node) -> None:
+    """A field of one node and a list of nodes are asked for in the same way."""
+    assert [node.type_name for node in box.nodes("children")] == ["Shape", "Lamp"]
+    assert box.nodes("endPoint") == ()
+
+
+def test_a_use_is_a_node_without_a_type(box: Node) -> None:
+    """Nothing is resolved: what it means is for the reader of the scene to say."""
+    (use,) = box.nodes("boundingObject")
+
+    assert (use.type_name, use.uses, use.fields) == ("", "SHAPE", {})
+
+
+def test_null_is_none(box: Node) -> None:
+    """A field that says NULL is there, and holds nothing."""
+    assert box.fields["physics"].items == (None,)
+
+
+def test_a_saved_state_is_a_field_of_its_own_kind(box: Node) -> None:
+    """It can't be taken for the field whose state it saves."""
+    assert box.numbers("hidden position_0_0") == (0.25,)
+
+
+def test_walk_visits_every_node_parents_first(scene: World) -> None:
+    """In source order, uses included."""
+    assert [node.type_name or node.uses for node in scene.walk()] == [
+        "WorldInfo",
+        "Solid",
+        "Shape",
+        "Lamp",
+        "SHAPE",
+        "Robot",
+    ]
+
+
+def test_spans_tell_which_bytes_were_read(scene: World, box: Node) -> None:
+    """A node spans from DEF to its brace; a value spans its brackets."""
+    start, end = box.span
+    first, last = box.fields["translation"].span
+
+    assert scene.source[start:end].startswith(b"DEF BOX Solid {")
+    assert scene.source[start:end].endswith(b"0.25\n}")
+    assert scene.source[first:last] == b"1 -2.5 0"
+
+
+def test_a_header_may_be_the_whole_file() -> None:
+    """An empty world is a world, and older releases numbered differently."""
+    assert parse(b"#VRML_SIM V8.6.2 utf8").nodes == ()
+    assert parse(b"#VRML_SIM R2021b utf8\r\n").header == "#VRML_SIM R2021b utf8"

@@ -1,0 +1,100 @@
+"""How the bytes of a world are cut into tokens, and how strings are written."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.world.source import Source
+from palaestra_sim.world.tokens import Token, quoted, tokenize, unquoted
+
+
+def tokens(text: str) -> tuple[Token, ...]:
+    """Return the tokens of a text, without the one that ends them."""
+    return tokenize(Source(data=text.encode(), name="world"))[:-1]
+
+
+def words(text: str) -> list[str]:
+    """Return what the tokens of a text look like."""
+    return [token.text.decode() for token in tokens(text)]
+
+
+def test_a_comma_is_as_good_as_a_blank() -> None:
+    """Webots writes vectors with commas between them and reads them as blanks."""
+    assert words("point [ 0 0 1, 1 0 0 ]") == words("point [ 0 0 1 1 0 0 ]")
+
+
+def test_braces_and_brackets_need_no_blanks() -> None:
+    """People write worlds by hand."""
+    assert words("Group{children[Robot{}]}") == words("Group { children [ Robot { } ] }")
+
+
+def test_a_comment_ends_with_its_line_even_glued_to_a_word() -> None:
+    """A number sign begins a comment wherever it stands outside a string."""
+    assert words("name#the robot\n  TRUE") == ["name", "TRUE"]
+
+
+def test_a_number_sign_in_a_string_is_data() -> None:
+    """Addresses and colours have them."""
+    assert words('url "https://host/a#b"') == ["url", '"https://host/a#b"']
+
+
+def test_line_ends_of_windows_are_blanks() -> None:
+    """A world that was edited on Windows is a world."""
+    assert words("Robot {\r\n}\r\n") == ["Robot", "{", "}"]
+
+
+def test_every_token_knows_where_it_stands() -> None:
+    """An editor of worlds works on bytes, so a letter of two bytes counts as two."""
+    (_, string) = tokens('name "ö"')
+
+    assert (string.start, string.end) == (5, 9)
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "+.5", "1.", "1e5", "-1.5E-3"])
+def test_a_number_is_what_begins_like_one(number: str) -> None:
+    """These are the forms that Webots reads."""
+    assert [token.kind for token in tokens(number)] == ["number"]
+
+
+@pytest.mark.parametrize("text", ["1x", "-", ".", "1.2.3", "+-1", "3D", '1"a"'])
+def test_what_begins_like_a_number_and_is_none_is_refused(text: str) -> None:
+    """A name can't begin with a digit, so it's nothing else either."""
+    with pytest.raises(WorldError, match=r"world:1:1: .* is neither a number nor a name"):
+        tokens(text)
+
+
+@pytest.mark.parametrize("text", ['"', '"abc', 'name "abc\n"', '"\\"', '"a\\\n"'])
+def test_a_string_ends_on_its_line(text: str) -> None:
+    """Webots never writes a line end into a string, so a missing quote is found where it is."""
+    with pytest.raises(WorldError, match="this string is not closed on its line"):
+        tokens(text)
+
+
+def test_a_control_character_is_refused() -> None:
+    """It can't be seen, so it must be pointed at."""
+    with pytest.raises(WorldError, match=r"world:2:3: control character 0x00 outside a string"):
+        tokens("\n  \x00")
+
+
+def test_only_quotes_and_backslashes_are_escaped() -> None:
+    """Every other backslash stands for itself, as in a path of Windows."""
+    (token,) = tokens(r'"a \" b \\ c \n"')
+
+    assert unquoted(token) == r'a " b \ c \n'
+
+
+@given(st.text(st.characters(exclude_characters="\n", exclude_categories=["Cs"])))
+def test_a_written_string_reads_as_what_it_was(text: str) -> None:
+    """There is one writer of strings, and this is its contract."""
+    (token,) = tokens(quoted(text).decode())
+
+    assert unquoted(token) == text
+
+
+@given(st.lists(st.sampled_from(["Robot", "{", "}", "[", "]", '"a # b"', "-1.5", "TRUE", "ä"])))
+def test_tokens_survive_whatever_stands_between_them(texts: list[str]) -> None:
+    """Blanks, commas, line ends and comments separate, and mean nothing."""
+    gap = ' ,\t# a "comment" with { and \\ \r\n'
+
+    assert words(gap + gap.join(texts) + gap) == texts

@@ -1,0 +1,7 @@
+"""What learns: Stable-Baselines3's algorithms, made safe against faults, and REINFORCE."""
+
+from palaestra_trainer.algorithms.reinforce import REINFORCE
+from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
+from palaestra_trainer.algorithms.table import ALGORITHMS, check, make_model
+
+__all__ = ["A2C", "ALGORITHMS", "DQN", "PPO", "REINFORCE", "SAC", "check", "make_model"]

@@ -1,0 +1,116 @@
+"""Buffers that no invalid row gets into a loss from.
+
+An invalid row is one whose simulator broke during the step. The episode was
+cut before it: the last valid row counts as truncated, so its value is
+bootstrapped and nobody is punished for a fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
+from stable_baselines3.common.type_aliases import RolloutBufferSamples
+
+
+def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
+    """Return which rows of a vector step are valid; shape (n_envs,), bool."""
+    return np.array([info.get("valid", True) for info in infos], dtype=bool)
+
+
+class ValidReplayBuffer(ReplayBuffer):
+    """A replay buffer of valid rows, one after the other, whatever member they came from.
+
+    Storage is flat (one column), so that a step of n members may append fewer
+    than n rows.
+    """
+
+    def __init__(
+        self,
+        buffer_size: int,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        device: torch.device | str = "auto",
+        n_envs: int = 1,
+        **options: Any,
+    ) -> None:
+        super().__init__(buffer_size, observation_space, action_space, device, 1, **options)
+        self._newest: list[int | None] = [None] * n_envs
+
+    def add(
+        self,
+        obs: np.ndarray,
+        next_obs: np.ndarray,
+        action: np.ndarray,
+        reward: np.ndarray,
+        done: np.ndarray,
+        infos: list[dict[str, Any]],
+    ) -> None:
+        """Append the valid rows; the row before an invalid one ends as truncated."""
+        for row, info in enumerate(infos):
+            if info.get("valid", True):
+                one = slice(row, row + 1)
+                self._newest[row] = self.pos
+                super().add(obs[one], next_obs[one], action[one], reward[one], done[one], [info])
+            else:
+                self._truncate(self._newest[row])
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the rows in use, oldest first, as views or copies of shape (rows, 1, ...)."""
+        order = np.roll(np.arange(self.size()), -self.pos if self.full else 0)
+        return {name: getattr(self, name)[order] for name in _COLUMNS}
+
+    def fill(self, arrays: dict[str, np.ndarray]) -> None:
+        """Replace the contents by what `arrays` returned, the newest rows if not all fit."""
+        rows = min(len(arrays["rewards"]), self.buffer_size)
+        for name in _COLUMNS:
+            getattr(self, name)[:rows] = arrays[name][-rows:] if rows else arrays[name]
+        self.full = rows == self.buffer_size
+        self.pos = rows % self.buffer_size
+        self._newest = [None] * len(self._newest)
+
+    def _truncate(self, position: int | None) -> None:
+        if position is not None and not self.dones[position]:
+            self.dones[position] = 1.0
+            self.timeouts[position] = 1.0
+
+
+_COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+class ValidRolloutBuffer(RolloutBuffer):
+    """A rollout buffer in which invalid rows keep their place and are never sampled."""
+
+    valid: np.ndarray
+
+    def reset(self) -> None:
+        """Empty the buffer; every row is valid until `mark` says otherwise."""
+        self.valid = np.ones((self.buffer_size, self.n_envs), dtype=bool)
+        super().reset()
+
+    def mark(self, valid: np.ndarray) -> None:
+        """Say which rows of the step that is added next are valid; shape (n_envs,)."""
+        if self.pos < self.buffer_size:
+            self.valid[self.pos] = valid
+
+    def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
+        """Compute them as for a rollout that was truncated before each invalid row.
+
+        An invalid row ends its episode. With its own value as reward its error is 0,
+        so that the row before it sees the value of the state they share, and no more.
+        """
+        self.rewards[~self.valid] = self.values[~self.valid]
+        super().compute_returns_and_advantage(last_values, dones)
+
+    def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
+        """Yield minibatches of valid rows in random order; the last one may be smaller."""
+        if not self.generator_ready:
+            next(super().get(1))  # lays the rows of all members in one line
+        rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))  # noqa: NPY002 - SB3's generator, which set_random_seed seeds
+        size = batch_size or max(len(rows), 1)
+        for start in range(0, len(rows), size):
+            yield self._get_samples(rows[start : start + size])

@@ -1,0 +1,88 @@
+"""Whole episodes out of the rows of vector steps, and what they returned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """The steps of some whole episodes, one after the other.
+
+    Attributes:
+        observations: what was seen, shape (steps, *observation).
+        actions: what was done, before it was clipped to its bounds; shape (steps, *action).
+        returns: discounted reward from each step to its episode's end, shape (steps,), float32.
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    returns: np.ndarray
+
+
+@dataclass(slots=True)
+class _Episode:
+    observations: list[Any] = field(default_factory=list)
+    actions: list[Any] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+
+
+class EpisodeRecorder:
+    """Gathers up to `wanted` whole valid episodes of each of `environments` environments.
+
+    Further episodes of an environment that has its number are dropped, and so
+    are episodes with an invalid row.
+    """
+
+    def __init__(self, environments: int, wanted: int) -> None:
+        self._wanted = wanted
+        self._current = [_Episode() for _ in range(environments)]
+        self._whole: list[list[_Episode]] = [[] for _ in range(environments)]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every environment has its number of episodes."""
+        return all(len(episodes) == self._wanted for episodes in self._whole)
+
+    def add(
+        self,
+        observations: Any,
+        actions: np.ndarray,
+        rewards: np.ndarray,
+        dones: np.ndarray,
+        valid: np.ndarray,
+    ) -> None:
+        """Add one vector step; every array has a row for each environment."""
+        for index, (episode, whole) in enumerate(zip(self._current, self._whole, strict=True)):
+            if len(whole) == self._wanted:
+                continue
+            episode.observations.append(observations[index])
+            episode.actions.append(actions[index])
+            episode.rewards.append(float(rewards[index]))
+            if dones[index]:
+                if valid[index]:
+                    whole.append(episode)
+                self._current[index] = _Episode()
+
+    def batch(self, gamma: float) -> Batch:
+        """Return the whole episodes, environment by environment, with returns discounted by gamma."""
+        episodes = [episode for whole in self._whole for episode in whole]
+        steps = [returns_to_go(episode.rewards, gamma) for episode in episodes]
+        return Batch(
+            observations=np.array([seen for episode in episodes for seen in episode.observations]),
+            actions=np.array([done for episode in episodes for done in episode.actions]),
+            returns=np.concatenate(steps) if steps else np.zeros(0, dtype=np.float32),
+        )
+
+
+def returns_to_go(rewards: list[float], gamma: float) -> np.ndarray:
+    """Return for each step the discounted sum of its reward and all later ones, float32."""
+    returns = np.zeros(len(rewards), dtype=np.float32)
+    later = 0.0
+    for step in range(len(rewards) - 1, -1, -1):
+        later = rewards[step] + gamma * later
+        returns[step] = later
+    return returns

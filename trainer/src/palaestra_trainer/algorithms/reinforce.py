@@ -1,0 +1,233 @@
+"""REINFORCE (Williams, 1992), as a Stable-Baselines3 algorithm.
+
+Learns from whole episodes, by the gradient of log pi(a|s) * (G - b): G is the
+discounted return from the step on, b an optional baseline. It has save, load,
+predict, callbacks and logger of `BaseAlgorithm`, and uses its policies.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.policies import ActorCriticPolicy, BasePolicy
+from stable_baselines3.common.type_aliases import GymEnv, MaybeCallback, Schedule
+from stable_baselines3.common.utils import obs_as_tensor, safe_mean
+
+from palaestra_trainer.algorithms.buffers import valid_rows
+from palaestra_trainer.algorithms.episodes import Batch, EpisodeRecorder
+
+
+class REINFORCE(BaseAlgorithm):
+    """Monte-Carlo policy gradient.
+
+    One update learns from `episodes_per_update` whole episodes of each
+    environment: the same number of each, because taking whatever ends first
+    would prefer short episodes. What an environment plays beyond its number
+    while others finish theirs is dropped, and so is an episode that a fault
+    cut. Training ends at the first episode end at or after `total_timesteps`.
+    A truncated episode counts as ended: its return is what was seen.
+
+    Args:
+        policy: "MlpPolicy" or a class; an actor-critic one, whose value
+            network is trained only if it is the baseline.
+        env: environment or VecEnv to learn in.
+        learning_rate: of Adam, or a function of the remaining progress (1 to 0).
+        episodes_per_update: whole episodes of each environment in one update.
+        gamma: discount per step, 0 to 1.
+        baseline: "value" subtracts a learned V(s), "none" nothing.
+        normalize_advantage: give G - b mean 0 and deviation 1 within an update.
+        ent_coef: weight of the policy's entropy, against early certainty.
+        vf_coef: weight of the baseline's squared error.
+        max_grad_norm: longest gradient; longer ones are scaled down.
+        stats_window_size: episodes in the logged means.
+        tensorboard_log: folder of event files, if no logger is set.
+        policy_kwargs: keyword arguments of the policy, e.g. `net_arch`.
+        verbose: 0 quiet, 1 info.
+        seed: of networks and action sampling.
+        device: where the networks live.
+    """
+
+    policy: ActorCriticPolicy
+    policy_aliases: ClassVar[dict[str, type[BasePolicy]]] = {"MlpPolicy": ActorCriticPolicy}
+
+    def __init__(  # noqa: PLR0913, PLR0917 - one argument a hyperparameter, as in Stable-Baselines3
+        self,
+        policy: str | type[ActorCriticPolicy],
+        env: GymEnv | str | None,
+        learning_rate: float | Schedule = 1e-3,
+        episodes_per_update: int = 5,
+        gamma: float = 0.99,
+        baseline: str = "value",
+        normalize_advantage: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
+        ent_coef: float = 0.0,
+        vf_coef: float = 0.5,
+        max_grad_norm: float = 0.5,
+        stats_window_size: int = 100,
+        tensorboard_log: str | None = None,
+        policy_kwargs: dict[str, Any] | None = None,
+        verbose: int = 0,
+        seed: int | None = None,
+        device: torch.device | str = "auto",
+        _init_setup_model: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
+    ) -> None:
+        super().__init__(
+            policy,
+            env,
+            learning_rate,
+            policy_kwargs=policy_kwargs,
+            stats_window_size=stats_window_size,
+            tensorboard_log=tensorboard_log,
+            verbose=verbose,
+            device=device,
+            support_multi_env=True,
+            seed=seed,
+            supported_action_spaces=(spaces.Box, spaces.Discrete),
+        )
+        if baseline not in ("value", "none"):
+            raise ValueError(f'baseline: {baseline!r} is unknown; use "value" or "none"')
+        if episodes_per_update < 1:
+            raise ValueError(f"episodes_per_update: {episodes_per_update} is less than 1")
+        self.episodes_per_update = episodes_per_update
+        self.gamma = gamma
+        self.baseline = baseline
+        self.normalize_advantage = normalize_advantage
+        self.ent_coef = ent_coef
+        self.vf_coef = vf_coef
+        self.max_grad_norm = max_grad_norm
+        if _init_setup_model:
+            self._setup_model()
+
+    def _setup_model(self) -> None:
+        self._setup_lr_schedule()
+        self.set_random_seed(self.seed)
+        policy = self.policy_class(
+            self.observation_space, self.action_space, self.lr_schedule, **self.policy_kwargs
+        )
+        self.policy = policy.to(self.device)  # type: ignore[assignment]  # an actor-critic one: see __init__
+
+    def learn(
+        self,
+        total_timesteps: int,
+        callback: MaybeCallback = None,
+        log_interval: int = 1,
+        tb_log_name: str = "REINFORCE",
+        reset_num_timesteps: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
+        progress_bar: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
+    ) -> Self:
+        """Return this model, trained until the first episode end at `total_timesteps` or later.
+
+        `log_interval` counts updates; the other arguments are Stable-Baselines3's.
+        """
+        total_timesteps, told = self._setup_learn(
+            total_timesteps, callback, reset_num_timesteps, tb_log_name, progress_bar
+        )
+        told.on_training_start(locals(), globals())
+        while self.num_timesteps < total_timesteps:
+            batch = self.collect_episodes(told)
+            if batch is None:
+                break
+            self._update_current_progress_remaining(self.num_timesteps, total_timesteps)
+            self.train(batch)
+            if log_interval and self._n_updates % log_interval == 0:
+                self.dump_logs()
+        told.on_training_end()
+        return self
+
+    def collect_episodes(self, callback: BaseCallback) -> Batch | None:
+        """Return the whole valid episodes of one update; None if the callback ended training.
+
+        Fewer than `episodes_per_update` of each environment only at the end of training.
+        """
+        assert self.env is not None  # set in __init__ or by set_env()
+        self.policy.set_training_mode(False)
+        recorder = EpisodeRecorder(self.env.num_envs, self.episodes_per_update)
+        callback.on_rollout_start()
+        while not recorder.complete:
+            observations, actions = self._last_obs, self._act()
+            new_obs, rewards, dones, infos = self.env.step(self._within_bounds(actions))
+            valid = valid_rows(infos)
+            self.num_timesteps += int(valid.sum())
+            callback.update_locals(locals())
+            if not callback.on_step():
+                return None
+            self._update_info_buffer(infos, dones)
+            self._last_obs = new_obs  # type: ignore[assignment]  # as in Stable-Baselines3
+            recorder.add(observations, actions, rewards, dones, valid)
+            self._episode_num += int(dones.sum())
+            if dones.any() and self.num_timesteps >= self._total_timesteps:
+                break
+        if not dones.all():
+            # Somebody is amid an episode of the policy that is about to change.
+            self._last_obs = self.env.reset()  # type: ignore[assignment]  # as in Stable-Baselines3
+        callback.on_rollout_end()
+        return recorder.batch(self.gamma)
+
+    def train(self, batch: Batch) -> None:
+        """Take one gradient step on the episodes in `batch`; none if it is empty."""
+        if not len(batch.returns):
+            return
+        self.policy.set_training_mode(True)
+        self._update_learning_rate(self.policy.optimizer)
+        loss = self._loss(batch)
+        self.policy.optimizer.zero_grad()
+        torch.autograd.backward(loss)
+        torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
+        self.policy.optimizer.step()
+        self._n_updates += 1
+        self.logger.record("train/loss", loss.item())
+
+    def dump_logs(self) -> None:
+        """Write the means over the last episodes, the speed, and what `train` recorded."""
+        seconds = max((time.time_ns() - self.start_time) / 1e9, sys.float_info.epsilon)
+        fps = int((self.num_timesteps - self._num_timesteps_at_start) / seconds)
+        self.logger.record("time/episodes", self._episode_num, exclude="tensorboard")
+        self.logger.record("time/fps", fps)
+        self.logger.record("time/total_timesteps", self.num_timesteps, exclude="tensorboard")
+        self.logger.record("train/n_updates", self._n_updates, exclude="tensorboard")
+        if self.ep_info_buffer:
+            for tag, key in (("rollout/ep_rew_mean", "r"), ("rollout/ep_len_mean", "l")):
+                self.logger.record(tag, safe_mean([info[key] for info in self.ep_info_buffer]))
+        if self.ep_success_buffer:
+            self.logger.record("rollout/success_rate", safe_mean(self.ep_success_buffer))
+        self.logger.dump(step=self.num_timesteps)
+
+    def _loss(self, batch: Batch) -> torch.Tensor:
+        observations = torch.as_tensor(batch.observations, device=self.device)
+        actions = torch.as_tensor(batch.actions, device=self.device)
+        returns = torch.as_tensor(batch.returns, device=self.device)
+        values, log_prob, entropy = self.policy.evaluate_actions(observations, actions)
+        values = values.flatten()
+        advantages = returns - values.detach() if self.baseline == "value" else returns
+        if self.normalize_advantage and len(advantages) > 1:
+            advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
+        policy_loss = -(advantages * log_prob).mean()
+        entropy_loss = log_prob.mean() if entropy is None else -entropy.mean()
+        self.logger.record("train/policy_gradient_loss", policy_loss.item())
+        self.logger.record("train/entropy_loss", entropy_loss.item())
+        loss = policy_loss + self.ent_coef * entropy_loss
+        if self.baseline == "value":
+            value_loss = torch.nn.functional.mse_loss(values, returns)
+            self.logger.record("train/value_loss", value_loss.item())
+            loss = loss + self.vf_coef * value_loss
+        return loss
+
+    def _act(self) -> np.ndarray:
+        with torch.no_grad():
+            actions, _, _ = self.policy(obs_as_tensor(self._last_obs, self.device))  # type: ignore[arg-type]  # learn() has reset the environment
+        chosen: np.ndarray = actions.cpu().numpy()
+        return chosen
+
+    def _within_bounds(self, actions: np.ndarray) -> np.ndarray:
+        if isinstance(self.action_space, spaces.Box):
+            actions = np.clip(actions, self.action_space.low, self.action_space.high)
+        return actions
+
+    def _get_torch_save_params(self) -> tuple[list[str], list[str]]:
+        return ["policy", "policy.optimizer"], []

@@ -1,0 +1,91 @@
+"""Stable-Baselines3's algorithms, which count and learn from valid rows only.
+
+Two mixins make the difference, each by overriding what Stable-Baselines3 calls
+between a step and its storage; nothing of its code is copied. A saved model
+does not name the buffers, so plain Stable-Baselines3 loads it as well.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import stable_baselines3 as sb3
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+from stable_baselines3.common.type_aliases import RolloutReturn, TrainFreq, TrainFrequencyUnit
+
+from palaestra_trainer.algorithms.buffers import ValidReplayBuffer, ValidRolloutBuffer, valid_rows
+
+_BUFFERS = ("replay_buffer_class", "rollout_buffer_class")
+
+
+class ValidRowsCounted(BaseAlgorithm):
+    """Counts valid rows as steps, and nothing of an invalid row as an episode."""
+
+    def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
+        valid = valid_rows(infos)
+        self.num_timesteps -= int(len(valid) - valid.sum())
+        super()._update_info_buffer(infos, dones)
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), *_BUFFERS]
+
+
+class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
+    """An off-policy algorithm that stores valid rows, and ends when it has its steps."""
+
+    def _setup_model(self) -> None:
+        self.replay_buffer_class = ValidReplayBuffer
+        super()._setup_model()
+
+    def collect_rollouts(
+        self, env: Any, callback: BaseCallback, train_freq: TrainFreq, *args: Any, **kwargs: Any
+    ) -> RolloutReturn:
+        """Collect as many steps as `train_freq` says, but none beyond the target."""
+        if train_freq.unit is TrainFrequencyUnit.STEP:
+            missing = math.ceil((self._total_timesteps - self.num_timesteps) / env.num_envs)
+            train_freq = train_freq._replace(frequency=max(1, min(train_freq.frequency, missing)))
+        return super().collect_rollouts(env, callback, train_freq, *args, **kwargs)
+
+    def train(self, gradient_steps: int, batch_size: int = 100) -> None:
+        """Learn from the buffer, unless faults have left it empty."""
+        if self.replay_buffer is not None and self.replay_buffer.size():
+            super().train(gradient_steps=gradient_steps, batch_size=batch_size)
+
+
+class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
+    """An on-policy algorithm whose rollouts mask invalid rows."""
+
+    def _setup_model(self) -> None:
+        self.rollout_buffer_class = ValidRolloutBuffer
+        super()._setup_model()
+
+    def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
+        super()._update_info_buffer(infos, dones)
+        if isinstance(self.rollout_buffer, ValidRolloutBuffer):
+            self.rollout_buffer.mark(valid_rows(infos))
+
+    def train(self) -> None:
+        """Learn from the rollout, unless none of its rows is valid."""
+        if not isinstance(self.rollout_buffer, ValidRolloutBuffer) or self.rollout_buffer.valid.any():
+            super().train()
+
+
+class DQN(OffPolicyRows, sb3.DQN):
+    """Deep Q-learning, for discrete actions."""
+
+
+class SAC(OffPolicyRows, sb3.SAC):
+    """Soft actor-critic, for continuous actions."""
+
+
+class PPO(OnPolicyRows, sb3.PPO):
+    """Proximal policy optimisation, for discrete and continuous actions."""
+
+
+class A2C(OnPolicyRows, sb3.A2C):
+    """Advantage actor-critic, for discrete and continuous actions."""

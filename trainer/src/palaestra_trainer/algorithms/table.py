@@ -1,0 +1,159 @@
+"""The algorithms by name, their defaults, and what they refuse.
+
+The defaults suit the task that ships, `MoveToTargetEnv-v0`; whatever a
+TrainingJob sets takes their place, one by one. Hyperparameters are keyword
+arguments of the class and are checked against its signature, so a mistyped
+one is found before a simulator is started.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from gymnasium import spaces
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv
+
+from palaestra_trainer.algorithms.reinforce import REINFORCE
+from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
+from palaestra_trainer.configuration import Algorithm, nearest
+from palaestra_trainer.errors import ConfigurationError
+
+# Arguments of the classes that the training loop itself gives, or that valid-row buffers
+# cannot honour: they store rows of several members in one line.
+OURS = frozenset(
+    {
+        "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
+        "replay_buffer_class", "replay_buffer_kwargs", "optimize_memory_usage",
+        "rollout_buffer_class", "rollout_buffer_kwargs", "action_noise",
+    }
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One algorithm: its class and its default hyperparameters."""
+
+    cls: type[BaseAlgorithm]
+    defaults: Mapping[str, Any]
+
+
+def _entry(cls: type[BaseAlgorithm], **defaults: Any) -> Entry:
+    return Entry(cls=cls, defaults=MappingProxyType(defaults))
+
+
+ALGORITHMS: Mapping[str, Entry] = MappingProxyType(
+    {
+        # Soft target updates at every step and as many gradient steps as environment steps:
+        # hard updates ended 10 points lower on the same 50,000 steps.
+        "DQN": _entry(
+            DQN,
+            learning_rate=5e-4,
+            buffer_size=100_000,
+            learning_starts=1_000,
+            batch_size=128,
+            tau=0.005,
+            gamma=0.97,
+            train_freq=4,
+            gradient_steps=4,
+            target_update_interval=1,
+            exploration_fraction=0.3,
+            exploration_final_eps=0.05,
+            policy_kwargs={"net_arch": [256, 256]},
+        ),
+        "SAC": _entry(
+            SAC,
+            learning_rate=5e-4,
+            buffer_size=100_000,
+            learning_starts=1_000,
+            batch_size=128,
+            gamma=0.97,
+            train_freq=4,
+            gradient_steps=4,
+            policy_kwargs={"net_arch": [256, 256]},
+        ),
+        "PPO": _entry(
+            PPO,
+            learning_rate=5e-4,
+            n_steps=512,
+            batch_size=128,
+            gamma=0.97,
+            ent_coef=0.005,
+            policy_kwargs={"net_arch": [128, 128]},
+        ),
+        "A2C": _entry(A2C, gamma=0.97, ent_coef=0.005, policy_kwargs={"net_arch": [128, 128]}),
+        "REINFORCE": _entry(
+            REINFORCE,
+            learning_rate=2e-3,
+            gamma=0.97,
+            ent_coef=0.005,
+            policy_kwargs={"net_arch": [128, 128]},
+        ),
+    }
+)
+
+
+def check(algorithm: Algorithm) -> Entry:
+    """Return the entry of the algorithm if its name and all its hyperparameters are known.
+
+    Raises:
+        ConfigurationError: one line for each unknown name, with the nearest known one.
+    """
+    entry = ALGORITHMS.get(algorithm.name)
+    if entry is None:
+        raise ConfigurationError(
+            f"algorithm.name: {algorithm.name} is not an algorithm; "
+            f"{nearest(algorithm.name, dict(ALGORITHMS))}"
+        )
+    known = _hyperparameters(entry.cls)
+    lines = [
+        f"algorithm.hyperparameters.{name}: {algorithm.name} has no such hyperparameter; "
+        f"{nearest(name, known)}"
+        for name in algorithm.hyperparameters
+        if name not in known
+    ]
+    if algorithm.hyperparameters.get("n_steps", 1) != 1 and "train_freq" in known:
+        lines.append(
+            "algorithm.hyperparameters.n_steps: rows of several simulators lie in one buffer, "
+            "so only 1 works; leave it out"
+        )
+    if lines:
+        raise ConfigurationError("\n".join(lines))
+    return entry
+
+
+def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
+    """Return a new model of the algorithm for `env`, its networks drawn from `seed`.
+
+    Raises:
+        ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
+    """
+    entry = check(algorithm)
+    if not isinstance(env.observation_space, spaces.Box):
+        raise ConfigurationError(
+            f"environment.id: its observation is a {type(env.observation_space).__name__}; "
+            "give it one Box, e.g. by gymnasium's FlattenObservation"
+        )
+    chosen = {**entry.defaults, **algorithm.hyperparameters}
+    if "target_update_interval" in chosen:
+        # A vector step is num_envs steps: the target can't be updated more often than that.
+        chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
+    chosen["policy_kwargs"] = dict(chosen.get("policy_kwargs") or {})
+    if isinstance(chosen.get("train_freq"), list):
+        chosen["train_freq"] = tuple(chosen["train_freq"])  # YAML has no tuples
+    try:
+        return entry.cls("MlpPolicy", env, seed=seed, device="cpu", **chosen)
+    except (AssertionError, TypeError, ValueError) as error:
+        # Stable-Baselines3 checks values and spaces by assertions.
+        raise ConfigurationError(
+            f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
+            f"({error}); change them, or use another algorithm"
+        ) from error
+
+
+def _hyperparameters(cls: type[BaseAlgorithm]) -> list[str]:
+    return [name for name in inspect.signature(cls.__init__).parameters if name not in OURS]

@@ -1,0 +1,136 @@
+"""`palaestra-train` and `palaestra-eval`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import structlog
+
+from palaestra_sim.protocol.status import ExitCode
+from palaestra_trainer.configuration import CONFIG_VARIABLE, load
+from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.logs import configure_logs
+from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
+
+log = structlog.get_logger(__name__)
+
+EXIT_CODES = """\
+exit codes:
+  0   done
+  2   the configuration is wrong; trying again cannot help
+  75  interrupted by a signal and saved; start it again to go on
+  80  a simulator failed more often than its restart limit allows
+  81  diverged: the networks hold NaN or infinity
+  82  stalled: no environment step for stallDeadlineSeconds
+  1   anything else; trying again may help
+"""
+TRAIN = f"""\
+Train a policy as a training.yaml says, in the simulators that it names.
+
+reads:
+  the configuration ({CONFIG_VARIABLE}), the newest checkpoint of the run directory
+writes:
+  the run directory ({RUN_VARIABLE}): attempts.jsonl, checkpoints/, tensorboard/,
+  evaluations.jsonl, model.zip (the best by evaluation), training.yaml and, at the end,
+  summary.json; the termination message (PALAESTRA_TERMINATION_LOG)
+
+A run directory with a checkpoint is resumed; one that is finished is reported.
+"""
+EVAL = f"""\
+Measure the model.zip of a run directory on episodes with seeds of a stream of their own.
+
+reads:
+  RUN_DIR/model.zip, RUN_DIR/training.yaml, and the simulators of {CONFIG_VARIABLE}
+writes:
+  one JSON object to standard output
+"""
+
+
+def train(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-train`; return its exit code."""
+    parser = _parser("palaestra-train", TRAIN)
+    parser.add_argument("--config", type=Path, help=f"training.yaml (default: ${CONFIG_VARIABLE})")
+    parser.add_argument("--run", type=Path, help=f"run directory (default: ${RUN_VARIABLE})")
+    parser.add_argument(
+        "--resume", action="store_true", help="refuse to begin a new run; go on with an old one"
+    )
+    chosen = parser.parse_args(arguments)
+    configure_logs()
+    try:
+        configuration = load(chosen.config)
+        directory = RunDirectory(_run_directory(chosen.run))
+    except (TrainerError, OSError) as error:
+        return _refuse(error)
+    # Imported here, because a wrong configuration should be told at once, not in 3 s.
+    from palaestra_trainer import display, training  # noqa: PLC0415
+    from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
+
+    return training.run(
+        configuration,
+        directory,
+        connect,
+        display.for_stream(sys.stderr),
+        must_resume=chosen.resume,
+    )
+
+
+def evaluate(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-eval`; return its exit code."""
+    parser = _parser("palaestra-eval", EVAL)
+    parser.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
+    parser.add_argument("--episodes", type=int, default=100, help="how many (default: 100)")
+    parser.add_argument(
+        "--seeds",
+        default="B",
+        help="name of the stream of seeds (default: B; the model was chosen on A)",
+    )
+    chosen = parser.parse_args(arguments)
+    configure_logs()
+    try:
+        result = _evaluate(chosen.run, chosen.episodes, chosen.seeds)
+    except (TrainerError, OSError) as error:
+        return _refuse(error)
+    sys.stdout.write(json.dumps(result) + "\n")
+    return ExitCode.DONE
+
+
+def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
+    directory = RunDirectory(folder)
+    here = load()
+    trained = load(directory.configuration) if directory.configuration.exists() else here
+    configuration = trained.model_copy(update={"simulators": here.simulators})
+    from palaestra_trainer.measuring import measure  # noqa: PLC0415 - see train()
+    from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
+
+    return measure(configuration, directory.model, connect, episodes=episodes, stream=stream)
+
+
+def _parser(name: str, description: str) -> argparse.ArgumentParser:
+    return argparse.ArgumentParser(
+        prog=name,
+        description=description,
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _run_directory(chosen: Path | None) -> Path:
+    name = chosen or os.environ.get(RUN_VARIABLE)
+    if not name:
+        raise ConfigurationError(f"{RUN_VARIABLE}: is not set; let it name the run directory")
+    return Path(name)
+
+
+def _refuse(error: Exception) -> int:
+    from palaestra_trainer.termination import end_of  # noqa: PLC0415 - see train()
+
+    end = end_of(error)
+    for line in end.message.splitlines():
+        log.error(line, reason=end.reason)
+    return int(end.code)

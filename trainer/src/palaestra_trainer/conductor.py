@@ -1,0 +1,223 @@
+"""What happens between rollouts: evaluating, saving, resting, ending.
+
+A rollout boundary is the one moment at which the model's state is whole:
+nothing collected is yet to be learned from. Everything that reads or keeps the
+model happens there. What is amid a rollout when the run is interrupted is
+played again after it resumes, with the same seeds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+from typing import Any
+
+import structlog
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.algorithms.buffers import valid_rows
+from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.display import Display
+from palaestra_trainer.errors import TrainerError
+from palaestra_trainer.evaluation import Evaluation, evaluate_on_all
+from palaestra_trainer.interruption import Interruption
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
+from palaestra_trainer.seeds import EVALUATE, episode_seeds
+from palaestra_trainer.simulators.fleet import Fleet, resting, running
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.termination import Diverged
+
+log = structlog.get_logger(__name__)
+
+# Learning phases shorter than this are not worth two service calls a simulator.
+WORTH_RESTING_S = 0.5
+# Steps between two looks at whether the networks still hold numbers; a look takes 0.1 ms.
+FINITE_EVERY_STEPS = 500
+
+
+class Enough(TrainerError):
+    """The wanted success rate is reached; the run is done."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """Everything that belongs to one attempt of a run."""
+
+    configuration: Configuration
+    directory: RunDirectory
+    fleet: Fleet
+    progress: Progress
+    interruption: Interruption
+    display: Display
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """Where the model last was whole: its step, and each collector's next episode."""
+
+    step: int
+    episodes: list[int]
+
+
+class Conductor(BaseCallback):
+    """The callback that conducts one attempt.
+
+    Attributes:
+        best: success rate and mean return of the best evaluation so far, over all attempts.
+    """
+
+    def __init__(self, run: Run, env: SimulatorsVecEnv, step: int) -> None:
+        super().__init__()
+        self._run = run
+        self._env = env
+        self._boundary = Boundary(step, env.episodes)
+        self._evaluated = self._saved = self._looked = step
+        self._step = step
+        self._terms: dict[int, Counter[str]] = defaultdict(Counter)
+        self._learning_s = 0.0
+        self._rollout_ended: float | None = None
+        self._resting = False
+        self.best = best_so_far(run.directory)
+
+    def finish(self) -> None:
+        """Evaluate and save what training ended with."""
+        self._look()
+        self._mark_boundary()
+        if self._evaluated != self._step:
+            self._evaluate_if_wanted()
+        if not self._run.directory.model.exists():
+            replace_file(self._run.directory.model, self.model.save)
+        self.save()
+
+    def save(self) -> None:
+        """Save the state of the last boundary."""
+        run = self._run
+        run.progress.phase = "saving"
+        manifest = checkpoint.describe(
+            run.configuration,
+            self._boundary.step,
+            self._boundary.episodes,
+            run.progress.counters.to_json(),
+        )
+        started = time.monotonic()
+        if checkpoint.save(
+            run.directory.checkpoints, self.model, manifest, run.configuration.checkpoint.keep
+        ):
+            run.progress.saved(manifest.step)
+            seconds = round(time.monotonic() - started, 3)
+            log.info("checkpoint written", step=manifest.step, seconds=seconds)
+        self._saved = manifest.step
+        run.progress.phase = "training"
+
+    def _on_rollout_start(self) -> None:
+        if self._rollout_ended is not None:
+            self._learning_s = time.monotonic() - self._rollout_ended
+        if self._resting:
+            self._env.run()
+            self._resting = False
+        self._mark_boundary()
+        self._run.interruption.check()
+        if _passed(self._looked, self._step, FINITE_EVERY_STEPS):
+            self._look()
+        if _passed(self._evaluated, self._step, self._run.configuration.evaluation.every_steps):
+            self._evaluate_if_wanted()
+        if _passed(self._saved, self._step, self._run.configuration.checkpoint.every_steps):
+            self._look()
+            self.save()
+
+    def _on_step(self) -> bool:
+        infos = self.locals["infos"]
+        self._step += int(valid_rows(infos).sum())
+        self._run.progress.collected(self._step, infos)
+        self._record_rewards(infos, self.locals["dones"])
+        if self._run.display.due:
+            self._run.display.show(self._run.progress.status())
+        if not isinstance(self.model, OffPolicyAlgorithm):
+            # An off-policy rollout is over in no time; any other may take longer than one is
+            # given to end, and is dropped.
+            self._run.interruption.check()
+        return True
+
+    def _on_rollout_end(self) -> None:
+        counters = self._run.progress.counters
+        self.logger.record("simulators/faults", sum(counters.faults.values()))
+        self.logger.record("simulators/restarts", counters.restarts)
+        self._rollout_ended = time.monotonic()
+        if self._learning_s >= WORTH_RESTING_S:
+            self._env.pause()
+            self._resting = True
+
+    def _mark_boundary(self) -> None:
+        self._step = self.model.num_timesteps
+        self._boundary = Boundary(self._step, self._env.episodes)
+
+    def _look(self) -> None:
+        self._looked = self._step
+        if not checkpoint.finite(self.model):
+            raise Diverged(
+                f"step {self._step}: the networks hold NaN or infinity; "
+                "lower algorithm.hyperparameters.learning_rate or clip gradients harder"
+            )
+
+    def _evaluate_if_wanted(self) -> None:
+        wanted = self._run.configuration.evaluation
+        self._evaluated = self._step
+        if not wanted.every_steps or not self._run.fleet.evaluating:
+            return
+        self._look()
+        evaluation = self._evaluate(wanted.episodes)
+        self._keep(evaluation)
+        goal = wanted.stop_at_success_rate
+        if goal is not None and evaluation.success_rate >= goal:
+            raise Enough(f"success rate {evaluation.success_rate:.2f} at step {self._step}")
+
+    def _evaluate(self, episodes: int) -> Evaluation:
+        run = self._run
+        run.progress.phase = "evaluating"
+        seeds = episode_seeds(run.configuration.seed, EVALUATE, episodes)
+        with resting(run.fleet.collecting), running(run.fleet.evaluating):
+            evaluation = evaluate_on_all(self.model, run.fleet.evaluating, seeds, run.interruption.check)
+        run.progress.evaluated(evaluation)
+        run.progress.phase = "training"
+        self.logger.record("eval/success_rate", evaluation.success_rate)
+        self.logger.record("eval/mean_reward", evaluation.mean_return)
+        self.logger.record("eval/mean_ep_length", evaluation.mean_length)
+        self.logger.dump(self._step)
+        log.info("evaluated", step=self._step, **evaluation.summary())
+        return evaluation
+
+    def _keep(self, evaluation: Evaluation) -> None:
+        directory = self._run.directory
+        if self.best is None or evaluation.score > self.best:
+            self.best = evaluation.score
+            replace_file(directory.model, self.model.save)
+        append_line(directory.evaluations, {"step": self._step} | evaluation.summary())
+
+    def _record_rewards(self, infos: list[dict[str, Any]], dones: Any) -> None:
+        for row, info in enumerate(infos):
+            self._terms[row].update(info.get("reward_terms", {}))
+            if dones[row]:
+                terms = self._terms.pop(row)
+                if "episode" in info:
+                    for name, value in terms.items():
+                        self.logger.record_mean(f"reward/{name}", value)
+
+
+def best_so_far(directory: RunDirectory) -> tuple[float, float] | None:
+    """Return success rate and mean return of the evaluation that model.zip is from; None without."""
+    if not directory.model.exists():
+        return None
+    scores = (
+        (float(line["success_rate"]), float(line["mean_return"]))
+        for line in read_lines(directory.evaluations)
+    )
+    return max(scores, default=None)
+
+
+def _passed(before: int, now: int, every: int) -> bool:
+    """Return whether a multiple of `every` lies after `before` and up to `now`; never for 0."""
+    return every > 0 and now // every > before // every

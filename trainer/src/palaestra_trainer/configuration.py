@@ -1,0 +1,250 @@
+"""What one replica is to do: the training.yaml of a run, checked as a whole.
+
+The plan writes the file, everything in this package reads it through here. A
+wrong file is refused before anything is started, with all its mistakes at
+once, each as field, fact and remedy. Which hyperparameters an algorithm takes
+is not known here but in `palaestra_trainer.algorithms`: reading a
+configuration must not cost the import of a learning library.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.alias_generators import to_camel
+from pydantic_core import ErrorDetails
+
+from palaestra_trainer.errors import ConfigurationError
+
+CONFIG_VARIABLE = "PALAESTRA_CONFIG"
+
+Positive = Annotated[int, Field(ge=1)]
+Role = Literal["Collect", "Evaluate"]
+Reward = Literal["Dense", "Sparse"]
+
+
+class _Section(BaseModel):
+    """A part of the file: camelCase in YAML, unknown fields refused, immutable."""
+
+    model_config = ConfigDict(
+        alias_generator=to_camel,
+        populate_by_name=True,
+        extra="forbid",
+        frozen=True,
+    )
+
+
+class Environment(_Section):
+    """Which gymnasium environment is trained in.
+
+    Attributes:
+        id: the name under which it is registered with gymnasium.
+        reward: Dense gives one each step, Sparse at the end of an episode only.
+        options: keyword arguments of the environment.
+    """
+
+    id: str
+    reward: Reward = "Dense"
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
+class Algorithm(_Section):
+    """What learns: a name of the table of algorithms, and what differs from its defaults."""
+
+    name: str = "DQN"
+    hyperparameters: dict[str, Any] = Field(default_factory=dict)
+
+
+class Evaluation(_Section):
+    """How often the policy is measured, on how many episodes, and when that is enough.
+
+    Attributes:
+        every_steps: environment steps between two evaluations; 0: none.
+        episodes: episodes of one evaluation, of all evaluating simulators together.
+        stop_at_success_rate: training ends at once when this share (0 to 1) succeeds.
+    """
+
+    every_steps: Annotated[int, Field(ge=0)] = 2500
+    episodes: Positive = 20
+    stop_at_success_rate: Annotated[float, Field(gt=0, le=1)] | None = None
+
+
+class Checkpoint(_Section):
+    """How often a resumable state is saved, and how many of the newest are kept."""
+
+    every_steps: Positive = 5000
+    keep: Positive = 3
+
+
+class Recycle(_Section):
+    """When a healthy simulator is restarted between episodes."""
+
+    after_resets: Positive
+
+
+class Restart(_Section):
+    """How many faults of one simulator are borne: `limit` restarts within any `within_seconds`."""
+
+    limit: Annotated[int, Field(ge=0)] = 10
+    within_seconds: Annotated[float, Field(gt=0)] = 600
+
+
+class SimulatorConfiguration(_Section):
+    """One simulator of this replica.
+
+    Attributes:
+        name: `<group>-<index>`, unique in the file.
+        role: Collect gathers experience, Evaluate measures the policy.
+        control: address of its sidecar's control port.
+        world: path of its generated world.
+        names_prefix: readable start of the ROS names of its robots.
+        start_deadline_seconds: it must have answered this long after its start.
+    """
+
+    name: str
+    group: str
+    index: Annotated[int, Field(ge=0)]
+    role: Role
+    control: str = ""
+    world: str = ""
+    names_prefix: str = ""
+    recycle: Recycle | None = None
+    restart: Restart = Field(default_factory=Restart)
+    start_deadline_seconds: Annotated[float, Field(gt=0)] = 60
+
+
+class Configuration(_Section):
+    """Everything one replica needs to know; the resolved TrainingJob for it.
+
+    Attributes:
+        seed: the job's seed plus the replica's index; every other seed follows from it.
+        steps: valid environment steps that the run lasts, of all simulators together.
+        stall_deadline_seconds: without an environment step for this long, the run is given up.
+        command: a program of the user's that replaces the built-in loop; not used here.
+        status_address: `host:port` of /metrics, /status and /healthz.
+    """
+
+    job: str
+    namespace: str = "default"
+    uid: str = ""
+    replica: Annotated[int, Field(ge=0)] = 0
+    seed: Annotated[int, Field(ge=0)] = 0
+    environment: Environment
+    algorithm: Algorithm = Field(default_factory=Algorithm)
+    steps: Positive
+    evaluation: Evaluation = Field(default_factory=Evaluation)
+    checkpoint: Checkpoint = Field(default_factory=Checkpoint)
+    stall_deadline_seconds: Annotated[float, Field(gt=0)] = 600
+    command: tuple[str, ...] | None = None
+    status_address: Annotated[str, Field(pattern=r"^[^:\s]+:\d{1,5}$")] = "127.0.0.1:9090"
+    simulators: Annotated[tuple[SimulatorConfiguration, ...], Field(min_length=1)]
+
+    def with_role(self, role: Role) -> tuple[SimulatorConfiguration, ...]:
+        """Return the simulators of one role, in the order of the file."""
+        return tuple(simulator for simulator in self.simulators if simulator.role == role)
+
+    @model_validator(mode="after")
+    def _simulators_fit_together(self) -> Self:
+        names = [simulator.name for simulator in self.simulators]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"simulators: the name {twice[0]} is used twice; make names unique")
+        if not self.with_role("Collect"):
+            raise ValueError("simulators: none has role Collect; give one of them that role")
+        return self
+
+
+def load(path: Path | None = None) -> Configuration:
+    """Return the configuration in `path`, or in the file that PALAESTRA_CONFIG names.
+
+    Raises:
+        ConfigurationError: no such file, not YAML, or wrong; one line for each mistake.
+    """
+    chosen = path or _path_of_environment(os.environ)
+    try:
+        content = yaml.safe_load(chosen.read_bytes())
+    except OSError as error:
+        raise ConfigurationError(
+            f"{chosen}: cannot be read ({error.strerror}); name the file with {CONFIG_VARIABLE}"
+        ) from error
+    except yaml.YAMLError as error:
+        raise ConfigurationError(f"{chosen}: is not YAML: {error}") from error
+    return parse(content, source=chosen.name)
+
+
+def parse(content: object, *, source: str = "training.yaml") -> Configuration:
+    """Return the configuration that `content`, a YAML document as Python data, describes.
+
+    Raises:
+        ConfigurationError: one line for each mistake, each with field, fact and remedy.
+    """
+    try:
+        return Configuration.model_validate(content)
+    except ValidationError as error:
+        lines = (f"{source}: {line}" for line in _mistakes(error))
+        raise ConfigurationError("\n".join(lines)) from error
+
+
+def dump(configuration: Configuration) -> str:
+    """Return the YAML text that `load` reads as an equal configuration."""
+    content = configuration.model_dump(mode="json", by_alias=True, exclude_none=True)
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+
+
+def nearest(word: str, known: Mapping[str, object] | list[str]) -> str:
+    """Return the remedy for a name nobody knows: the nearest known one, or all of them."""
+    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
+    return f"did you mean {close[0]}?" if close else f"use one of {', '.join(sorted(known))}"
+
+
+def _path_of_environment(environment: Mapping[str, str]) -> Path:
+    name = environment.get(CONFIG_VARIABLE)
+    if not name:
+        raise ConfigurationError(f"{CONFIG_VARIABLE}: is not set; let it name the training.yaml of the run")
+    return Path(name)
+
+
+def _mistakes(error: ValidationError) -> Iterator[str]:
+    for mistake in error.errors():
+        field = _field(mistake["loc"])
+        match mistake["type"]:
+            case "missing":
+                yield f"{field}: is missing; add it"
+            case "extra_forbidden":
+                yield f"{field}: is not a known field; {_nearest_field(mistake)}"
+            case "value_error" if not mistake["loc"]:
+                yield str(mistake["ctx"]["error"])
+            case _:
+                yield f"{field}: {mistake['input']!r} is refused; {mistake['msg']}"
+
+
+def _field(location: tuple[int | str, ...]) -> str:
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return "".join(parts).removeprefix(".") or "the document"
+
+
+def _nearest_field(mistake: ErrorDetails) -> str:
+    section: Any = Configuration
+    for part in mistake["loc"][:-1]:
+        if isinstance(part, str):
+            section = _section_of(section, part)
+    return nearest(str(mistake["loc"][-1]), [to_camel(name) for name in section.model_fields])
+
+
+def _section_of(section: type[BaseModel], alias: str) -> type[BaseModel]:
+    by_alias = {to_camel(name): field for name, field in section.model_fields.items()}
+    return next(
+        kind
+        for kind in (*_arguments(by_alias[alias].annotation), by_alias[alias].annotation)
+        if isinstance(kind, type) and issubclass(kind, BaseModel)
+    )
+
+
+def _arguments(annotation: Any) -> tuple[Any, ...]:
+    return getattr(annotation, "__args__", ())

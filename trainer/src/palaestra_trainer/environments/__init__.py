@@ -1,0 +1,16 @@
+"""Gymnasium environments; importing this package registers them.
+
+Both ways work: `import palaestra_trainer.environments`, then
+`gymnasium.make("MoveToTargetEnv-v0", ...)`, or in one line
+`gymnasium.make("palaestra_trainer.environments:MoveToTargetEnv-v0", ...)`.
+"""
+
+import gymnasium
+
+from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
+from palaestra_trainer.environments.options import Options
+
+__all__ = ["MoveToTargetEnv", "Options"]
+
+# No max_episode_steps: the environment counts its steps itself, since Sparse rewards the last.
+gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.environments.move_to_target:make")

@@ -1,0 +1,94 @@
+"""The arena that the shipped world describes, and the tasks that are drawn in it.
+
+A square floor with four cylinders. The environment needs its measures for two
+things only: to draw starts and targets that are free, and to scale what it observes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import RADIUS_M, Pose
+
+HALF_SIDE_M = 2.0  # from the centre to the inner faces of the walls
+CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
+CYLINDER_RADIUS_M = 0.15
+CLEARANCE_M = 0.10  # between the robot's body and anything else, at the start and on the target
+APART_M = 1.0  # least distance from start to target
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One episode's task: from `start` to `target` (x, y in metres)."""
+
+    start: Pose
+    target: Point
+
+
+def gap(x_m: float, y_m: float) -> float:
+    """Return metres from a point to the nearest wall or cylinder; negative inside one."""
+    wall = HALF_SIDE_M - max(abs(x_m), abs(y_m))
+    cylinder = min(math.hypot(x_m - x, y_m - y) for x, y in CYLINDERS) - CYLINDER_RADIUS_M
+    return min(wall, cylinder)
+
+
+def free(x_m: float, y_m: float) -> bool:
+    """Return whether a robot can stand there with `CLEARANCE_M` to spare."""
+    return gap(x_m, y_m) >= RADIUS_M + CLEARANCE_M
+
+
+def apart(one: Point, other: Point) -> bool:
+    """Return whether two points are far enough from each other to make a task."""
+    return math.dist(one, other) >= APART_M
+
+
+def draw_point(random: np.random.Generator) -> Point:
+    """Return x, y in metres of a free place, all of them equally likely."""
+    while True:
+        x_m, y_m = random.uniform(-HALF_SIDE_M, HALF_SIDE_M, size=2).tolist()
+        if free(x_m, y_m):
+            return x_m, y_m
+
+
+def draw_task(random: np.random.Generator, start: Pose | None = None, target: Point | None = None) -> Task:
+    """Return a task of free places `APART_M` apart, with any heading; what is given stays."""
+    heading_rad = float(random.uniform(-math.pi, math.pi))
+    while True:
+        begin = start or Pose(*draw_point(random), heading_rad)
+        end = target or draw_point(random)
+        if (start and target) or apart((begin.x_m, begin.y_m), end):
+            return Task(start=begin, target=end)
+
+
+def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
+    """Return a task whose `start` (x, y, heading) and `target` (x, y) may be chosen.
+
+    Raises:
+        ConfigurationError: another name than these, or a place inside a wall or a cylinder.
+    """
+    if unknown := sorted(set(chosen) - {"start", "target"}):
+        raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
+    start, target = chosen.get("start"), chosen.get("target")
+    if isinstance(start, Sequence):
+        start = Pose(*start)
+    if start is not None:
+        _check_place("start", start.x_m, start.y_m)
+    if target is not None:
+        _check_place("target", *target)
+    return draw_task(random, start, target)
+
+
+def _check_place(name: str, x_m: float, y_m: float) -> None:
+    if not gap(x_m, y_m) > 0.0:  # so that NaN is refused too
+        raise ConfigurationError(
+            f"reset option {name}: ({x_m:g}, {y_m:g}) is in a wall or a cylinder; "
+            f"choose a free place within {HALF_SIDE_M:g} m of the centre on each axis"
+        )

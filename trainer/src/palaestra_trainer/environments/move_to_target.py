@@ -1,0 +1,238 @@
+"""The task: drive to the target and stand there.
+
+The environment is built from a robot and a scene and knows neither ROS nor Webots:
+it decides what an episode is, what is observed, when it ends and what a step is
+worth. A `SimulatorFault` of the robot passes through it untouched; what a fault
+means for learning is decided by whoever steps the environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from palaestra_trainer.environments import observation
+from palaestra_trainer.environments.actions import action_space, twist
+from palaestra_trainer.environments.arena import Point, chosen_task
+from palaestra_trainer.environments.configured import next_simulator
+from palaestra_trainer.environments.observation import Situation
+from palaestra_trainer.environments.options import Options, parse
+from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import RobotinoAbc, Scene, Twist
+
+REACHED_M = 0.20
+STANDING_M_S = 0.05
+
+Observation = NDArray[np.float32]
+Info = dict[str, Any]
+
+
+class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
+    """Drive to the target and stand there: within 0.20 m, slower than 0.05 m/s.
+
+    A Robotino in a walled floor of 4 x 4 m with four cylinders; start, heading and
+    target differ in every episode. A step is one control period of the robot (0.192 s
+    in simulation): at 0.5 m/s it drives 0.1 m, and it stands within two steps of STOP.
+
+    ## Actions
+
+    `actions="discrete"`: `Discrete(n)`, one of the `movements`, in their order; all of them are
+
+    | action | movement   | forward (m/s) | left (m/s) | turning (rad/s) |
+    |--------|------------|---------------|------------|-----------------|
+    | 0      | STOP       | 0             | 0          | 0               |
+    | 1      | FORWARD    | 0.5           | 0          | 0               |
+    | 2      | BACKWARD   | -0.5          | 0          | 0               |
+    | 3      | LEFT       | 0             | 0.5        | 0               |
+    | 4      | RIGHT      | 0             | -0.5       | 0               |
+    | 5      | TURN_LEFT  | 0             | 0          | 1               |
+    | 6      | TURN_RIGHT | 0             | 0          | -1              |
+
+    `actions="continuous"`: `Box(-1, 1, (3,), float32)`
+
+    | index | meaning                      | unit      | min | max |
+    |-------|------------------------------|-----------|-----|-----|
+    | 0     | velocity forward             | 0.5 m/s   | -1  | 1   |
+    | 1     | velocity to the left         | 0.5 m/s   | -1  | 1   |
+    | 2     | turning counter-clockwise    | 1.0 rad/s | -1  | 1   |
+
+    ## Observation
+
+    `Box(float32)`, the parts named by `observe` one after the other, each number cut
+    off at its bounds. The index counts within its part. Of the sensors, 0 looks forward and
+    the others follow counter-clockwise every 40 degrees.
+
+    | part      | index | meaning                                       | unit      | min  | max |
+    |-----------|-------|-----------------------------------------------|-----------|------|-----|
+    | sensors   | 0-8   | nearness to what is 0.40 m away or closer     | 0.37 m    | 0    | 1   |
+    | sensors   | 9     | bumper touches something                      | 0 or 1    | 0    | 1   |
+    | velocity  | 0     | forward, mean over the step                   | 0.5 m/s   | -1.5 | 1.5 |
+    | velocity  | 1     | to the left, mean over the step               | 0.5 m/s   | -1.5 | 1.5 |
+    | velocity  | 2     | turning, mean over the step                   | 1.0 rad/s | -1.5 | 1.5 |
+    | position  | 0-1   | x, y in the world's frame                     | 2 m       | -1   | 1   |
+    | position  | 2-3   | cosine, sine of the heading                   | 1         | -1   | 1   |
+    | target    | 0-1   | forward, left from the robot                  | 2 m       | -3   | 3   |
+    | time_left | 0     | steps left of `max_steps`                     | 1         | 0    | 1   |
+
+    By default everything but `position`: see docs/environments.md for what that costs.
+
+    ## Reward
+
+    A weighted sum of the terms in `palaestra_trainer.environments.rewards`, each also
+    in `info["reward_terms"]`.
+
+    | term      | Dense | Sparse | is                                          |
+    |-----------|-------|--------|---------------------------------------------|
+    | progress  | 1     |        | metres gained toward the target             |
+    | success   | 1     | 1      | 1 when the robot came to stand on it        |
+    | collision | -1    | -1     | 1 when it ran into something                |
+    | time_up   |       | -0.5   | 1 when the last step was taken without that |
+    | duration  | -0.01 |        | 1 for every step                            |
+
+    ## Start
+
+    `reset(seed=s)` alone decides the episode. Start and target are drawn evenly from the
+    places where the robot has 0.1 m to spare, at least 1 m apart, the heading from all
+    directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
+
+    ## End of an episode
+
+    Terminated: the robot stands on the target (`info["is_success"]`), or it bumped into
+    something. Truncated: `max_steps` are taken. That is no state of the task: the world
+    could go on and the robot might be about to arrive, so a learner should go on
+    estimating from there instead of taking the clock for a wall.
+
+    ## Info
+
+    `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name,
+    weighted), `extra_steps` (control periods that a late sensor made necessary).
+
+    Args:
+        robot: what is driven.
+        scene: where episodes are arranged.
+        options: what is observed, done and rewarded.
+    """
+
+    def __init__(self, robot: RobotinoAbc, scene: Scene, options: Options | None = None) -> None:
+        self.options = options or Options()
+        self.observation_space = self._numbers = observation.space(self.options.observe)
+        self.action_space = action_space(self.options)
+        self._robot = robot
+        self._scene = scene
+        self._situation: Situation | None = None
+        self._target: Point = (0.0, 0.0)
+        self._steps = 0
+
+    @property
+    def situation(self) -> Situation:
+        """What is known now, also what is not observed.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+        """
+        if self._situation is None:
+            raise ResetNeeded("no episode has begun; call reset() first")
+        return self._situation
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, Info]:
+        """Begin an episode; return its first observation, and where it starts and leads.
+
+        Args:
+            seed: decides the episode; without one it follows from the last.
+            options: `start` (x, y, heading) and `target` (x, y), in metres and radians.
+
+        Raises:
+            ConfigurationError: an option is unknown, or lies in a wall or a cylinder.
+            SimulatorFault: as the robot raised it.
+        """
+        super().reset(seed=seed)
+        task = chosen_task(self.np_random, options or {})
+        self._scene.reset(int(self.np_random.integers(2**31)), task.start, task.target)
+        self._target = task.target
+        self._steps = 0
+        self._situation = seen = self._look((0.0, 0.0, 0.0))
+        return self._numbers_of(seen), {"start": task.start, "target": task.target}
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
+        """Drive as `action` says for one control period; return what came of it.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+            SimulatorFault: as the robot raised it.
+        """
+        before = self.situation
+        self._robot.drive(*twist(action, self.options))
+        extra_steps = self._robot.advance()
+        self._steps += 1
+        elapsed_s = self._robot.period_s * (1 + extra_steps)
+        after = self._look(observation.velocity(before.pose, self._robot.pose(), elapsed_s))
+        self._situation = after
+        outcome = self._outcome(after)
+        terms = reward_terms(self.options.reward, _transition(before, after, outcome))
+        info = {
+            "is_success": outcome is Outcome.REACHED,
+            "outcome": outcome.value,
+            "reward_terms": terms,
+            "extra_steps": extra_steps,
+        }
+        truncated = outcome is Outcome.TIME_UP
+        return self._numbers_of(after), sum(terms.values()), outcome.terminal, truncated, info
+
+    def _look(self, velocity: Twist) -> Situation:
+        return Situation(
+            distances_m=self._robot.distances(),
+            bumped=self._robot.bumped(),
+            pose=self._robot.pose(),
+            velocity=velocity,
+            target=self._target,
+            time_left=1.0 - self._steps / self.options.max_steps,
+        )
+
+    def _outcome(self, seen: Situation) -> Outcome:
+        if seen.bumped:
+            return Outcome.COLLIDED
+        if seen.target_distance_m < REACHED_M and seen.speed_m_s < STANDING_M_S:
+            return Outcome.REACHED
+        return Outcome.TIME_UP if self._steps >= self.options.max_steps else Outcome.RUNNING
+
+    def _numbers_of(self, seen: Situation) -> Observation:
+        return observation.observe(seen, self.options.observe, self._numbers)
+
+
+def make(
+    robot: RobotinoAbc | None = None,
+    scene: Scene | None = None,
+    simulator: Callable[[], tuple[RobotinoAbc, Scene]] = next_simulator,
+    **options: Any,
+) -> MoveToTargetEnv:
+    """Return the environment that `gymnasium.make("MoveToTargetEnv-v0", ...)` asks for.
+
+    Args:
+        robot: what is driven, together with its `scene`.
+        scene: where episodes are arranged.
+        simulator: called for robot and scene when none are given; by default the next
+            simulator of PALAESTRA_CONFIG, and `palaestra_trainer.testing.fake_arena`
+            needs none. `make_vec` calls it once for each environment.
+        options: see `Options`; names of movements and parts are text.
+
+    Raises:
+        ConfigurationError: an option is wrong, or there is no simulator to be had.
+    """
+    chosen = parse(options)
+    if (robot is None) != (scene is None):
+        raise ConfigurationError("robot, scene: one came without the other; give both or neither")
+    if robot is None or scene is None:
+        robot, scene = simulator()
+    return MoveToTargetEnv(robot, scene, chosen)
+
+
+def _transition(before: Situation, after: Situation, outcome: Outcome) -> Transition:
+    return Transition(before_m=before.target_distance_m, after_m=after.target_distance_m, outcome=outcome)

@@ -1,0 +1,128 @@
+"""What an environment tells its learner, in parts that can be chosen.
+
+A `Situation` is everything that is known after a step. A `Part` turns some of it
+into numbers near [-1, 1] and says between which bounds they lie. Which parts
+there are, and in which order, is a list.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from palaestra_trainer.environments.arena import HALF_SIDE_M, Point
+from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, SPEED_M_S, TURN_RAD_S, Pose, Twist
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """What is known after a step.
+
+    Attributes:
+        distances_m: shape (9,), see `RobotinoAbc.distances`.
+        bumped: whether the bumper touches something.
+        pose: in the world's frame.
+        velocity: forward, left (m/s), counter-clockwise (rad/s): means over the last step.
+        target: x, y in metres, in the world's frame.
+        time_left: of the episode, from 1 to 0.
+    """
+
+    distances_m: NDArray[np.float32]
+    bumped: bool
+    pose: Pose
+    velocity: Twist
+    target: Point
+    time_left: float
+
+    @property
+    def speed_m_s(self) -> float:
+        """How fast the robot moved along the floor, turning apart."""
+        return math.hypot(self.velocity[0], self.velocity[1])
+
+    @property
+    def target_distance_m(self) -> float:
+        """Metres from the robot's centre to the target."""
+        return math.hypot(*self.target_ahead)
+
+    @property
+    def target_ahead(self) -> Point:
+        """The target in the robot's frame: metres forward, metres to the left."""
+        return in_frame(self.pose.heading_rad, self.target[0] - self.pose.x_m, self.target[1] - self.pose.y_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Some numbers of an observation: from what, and between which bounds."""
+
+    measure: Callable[[Situation], Sequence[float]]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+def in_frame(heading_rad: float, x_m: float, y_m: float) -> Point:
+    """Return a vector of the world in the frame of a robot with this heading: forward, left."""
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    return x_m * c + y_m * s, y_m * c - x_m * s
+
+
+def velocity(before: Pose, after: Pose, elapsed_s: float) -> Twist:
+    """Return the mean twist between two poses in the robot's frame: m/s, m/s, rad/s."""
+    turned_rad = math.remainder(after.heading_rad - before.heading_rad, 2.0 * math.pi)
+    forward_m, left_m = in_frame(
+        before.heading_rad + 0.5 * turned_rad, after.x_m - before.x_m, after.y_m - before.y_m
+    )
+    return forward_m / elapsed_s, left_m / elapsed_s, turned_rad / elapsed_s
+
+
+def _sensors(seen: Situation) -> Sequence[float]:
+    # Nearness, not distance: 0 for the usual nothing in reach. A policy learned as much from it
+    # in 10,000 steps as from distances, which are 1 most of the time, in 40,000.
+    least, most = SENSOR_RANGE_M
+    nearness = (most - seen.distances_m) / (most - least)
+    return [*nearness.tolist(), float(seen.bumped)]
+
+
+def _velocity(seen: Situation) -> Sequence[float]:
+    forward, left, turning = seen.velocity
+    return forward / SPEED_M_S, left / SPEED_M_S, turning / TURN_RAD_S
+
+
+def _position(seen: Situation) -> Sequence[float]:
+    x_m, y_m, heading_rad = seen.pose.x_m, seen.pose.y_m, seen.pose.heading_rad
+    return x_m / HALF_SIDE_M, y_m / HALF_SIDE_M, math.cos(heading_rad), math.sin(heading_rad)
+
+
+def _target(seen: Situation) -> Sequence[float]:
+    forward_m, left_m = seen.target_ahead
+    return forward_m / HALF_SIDE_M, left_m / HALF_SIDE_M
+
+
+def _time_left(seen: Situation) -> Sequence[float]:
+    return (seen.time_left,)
+
+
+PARTS: dict[str, Part] = {
+    "sensors": Part(_sensors, (0.0,) * (SENSORS + 1), (1.0,) * (SENSORS + 1)),
+    "velocity": Part(_velocity, (-1.5,) * 3, (1.5,) * 3),
+    "position": Part(_position, (-1.0,) * 4, (1.0,) * 4),
+    "target": Part(_target, (-3.0,) * 2, (3.0,) * 2),
+    "time_left": Part(_time_left, (0.0,), (1.0,)),
+}
+
+
+def space(parts: Sequence[str]) -> spaces.Box:
+    """Return the space of observations that are made of these parts, in their order."""
+    low = [bound for name in parts for bound in PARTS[name].low]
+    high = [bound for name in parts for bound in PARTS[name].high]
+    return spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
+
+
+def observe(seen: Situation, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
+    """Return the numbers of these parts, cut off at the bounds of `within`."""
+    numbers = [number for name in parts for number in PARTS[name].measure(seen)]
+    return np.clip(np.array(numbers, np.float32), within.low, within.high)

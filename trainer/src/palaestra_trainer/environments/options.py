@@ -1,0 +1,81 @@
+"""What can be varied about the task without touching its code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from palaestra_trainer.environments.observation import PARTS
+from palaestra_trainer.environments.rewards import WEIGHTS
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import Movement
+
+ACTIONS = ("discrete", "continuous")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """The options of `MoveToTargetEnv`, checked.
+
+    Args:
+        reward: `Dense` gives one each step, `Sparse` at the end of an episode only.
+        observe: the parts of the observation, in this order.
+        movements: what a discrete action chooses from, in this order.
+        actions: `discrete` (one of `movements`) or `continuous` (a twist).
+        max_steps: steps until time is up.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+
+    reward: str = "Dense"
+    observe: Sequence[str] = ("sensors", "velocity", "target", "time_left")
+    movements: Sequence[Movement] = tuple(Movement)
+    actions: str = "discrete"
+    max_steps: int = 100
+
+    def __post_init__(self) -> None:
+        if mistakes := list(_mistakes(self)):
+            raise ConfigurationError("\n".join(mistakes))
+
+
+def parse(given: Mapping[str, Any]) -> Options:
+    """Return options from what a job file says: movements and parts by name.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+    known = [field.name for field in fields(Options)]
+    if unknown := [name for name in given if name not in known]:
+        raise ConfigurationError(
+            "\n".join(f"{name}: is not an option; use {', '.join(known)}" for name in unknown)
+        )
+    return Options(**{**given, "movements": _movements(given.get("movements", tuple(Movement)))})
+
+
+def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
+    known = Movement.__members__
+    if unknown := [str(it) for it in given if it not in known and it not in known.values()]:
+        raise ConfigurationError(f"movements: {', '.join(unknown)} not known; use {', '.join(known)}")
+    return tuple(known[it] if isinstance(it, str) else Movement(it) for it in given)
+
+
+def _mistakes(options: Options) -> Iterator[str]:
+    if options.reward not in WEIGHTS:
+        yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
+    for name in options.observe:
+        if name not in PARTS:
+            yield f"observe: {name!r} is not a part; use {', '.join(PARTS)}"
+    if not options.observe:
+        yield f"observe: is empty; choose from {', '.join(PARTS)}"
+    if len(set(options.observe)) < len(options.observe):
+        yield "observe: names a part twice; name each once"
+    if options.actions not in ACTIONS:
+        yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
+    if not options.movements:
+        yield f"movements: is empty; choose from {', '.join(Movement.__members__)}"
+    if len(set(options.movements)) < len(options.movements):
+        yield "movements: names a movement twice; name each once"
+    if options.max_steps < 1:
+        yield f"max_steps: {options.max_steps} leaves no time; use at least 1"

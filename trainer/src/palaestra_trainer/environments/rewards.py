@@ -1,0 +1,91 @@
+"""What a step is worth: small named terms, and their weights in one place.
+
+A term is a pure function of one transition, with a range of its own; its weight says
+what it is worth. An environment reports every weighted term by name, so that a curve
+in TensorBoard tells which term a policy lives on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Outcome(Enum):
+    """How an episode ended, or that it goes on."""
+
+    RUNNING = "running"
+    REACHED = "reached"
+    COLLIDED = "collided"
+    TIME_UP = "time_up"
+
+    @property
+    def terminal(self) -> bool:
+        """Whether the task itself is over, not only its time."""
+        return self in (Outcome.REACHED, Outcome.COLLIDED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transition:
+    """One step, as far as rewards look at it.
+
+    Attributes:
+        before_m: metres to the target before the step.
+        after_m: metres to the target after it.
+        outcome: what the step led to.
+    """
+
+    before_m: float
+    after_m: float
+    outcome: Outcome
+
+
+Term = Callable[[Transition], float]
+
+
+def progress(step: Transition) -> float:
+    """Return metres gained toward the target; negative when the robot moved away.
+
+    Bounded by the distance driven, so standing still earns exactly 0.
+    """
+    return step.before_m - step.after_m
+
+
+def success(step: Transition) -> float:
+    """Return 1 when the robot came to stand on the target, else 0."""
+    return float(step.outcome is Outcome.REACHED)
+
+
+def collision(step: Transition) -> float:
+    """Return 1 when the robot ran into something, else 0."""
+    return float(step.outcome is Outcome.COLLIDED)
+
+
+def time_up(step: Transition) -> float:
+    """Return 1 when the last step was taken and the target not reached, else 0."""
+    return float(step.outcome is Outcome.TIME_UP)
+
+
+def duration(step: Transition) -> float:  # noqa: ARG001 - every term has the same form
+    """Return 1 for every step: what waiting costs."""
+    return 1.0
+
+
+TERMS: dict[str, Term] = {
+    "progress": progress,
+    "success": success,
+    "collision": collision,
+    "time_up": time_up,
+    "duration": duration,
+}
+
+WEIGHTS: dict[str, dict[str, float]] = {
+    "Dense": {"progress": 1.0, "success": 1.0, "collision": -1.0, "duration": -0.01},
+    "Sparse": {"success": 1.0, "collision": -1.0, "time_up": -0.5},
+}
+
+
+def reward_terms(reward: str, step: Transition) -> dict[str, float]:
+    """Return every term of a reward (`Dense` or `Sparse`) by name, weighted; their sum is the reward."""
+    return {name: weight * TERMS[name](step) for name, weight in WEIGHTS[reward].items()}

@@ -1,0 +1,73 @@
+"""Being asked to end: SIGTERM and SIGINT.
+
+The first signal is noted, and the run ends at its next boundary with a
+checkpoint; while simulators start there is nothing to save, and it ends where
+it is. A second signal ends the process at once.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType, TracebackType
+from typing import Any, Self
+
+from palaestra_trainer.errors import TrainerError
+
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
+
+
+class Interrupted(TrainerError):
+    """A signal asked the run to end; it can go on later."""
+
+
+class Interruption:
+    """Listens to the signals while it is entered; only from the main thread.
+
+    Attributes:
+        requested: the signal that came; None so far.
+    """
+
+    def __init__(self) -> None:
+        self.requested: signal.Signals | None = None
+        self._at_once = False
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __enter__(self) -> Self:
+        """Begin to listen."""
+        self._before = {number: signal.signal(number, self._note) for number in SIGNALS}
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Put back who listened before."""
+        for number, before in self._before.items():
+            signal.signal(number, before)
+
+    def check(self) -> None:
+        """Raise Interrupted if a signal has come."""
+        if self.requested is not None:
+            raise Interrupted(f"{self.requested.name} received")
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Raise Interrupted out of whatever is done inside as soon as a signal comes."""
+        self.check()
+        self._at_once = True
+        try:
+            yield
+        finally:
+            self._at_once = False
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        del frame
+        self.requested = signal.Signals(number)
+        for later in SIGNALS:
+            signal.signal(later, signal.SIG_DFL)
+        if self._at_once:
+            self.check()

@@ -1,0 +1,56 @@
+"""Measuring a saved model on the evaluating simulators of a configuration."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.evaluation import evaluate_on_all
+from palaestra_trainer.seeds import episode_seeds
+from palaestra_trainer.simulators.fleet import Fleet
+from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.training import MakeMembers, use_threads
+
+
+def measure(
+    configuration: Configuration,
+    model: Path,
+    make_members: MakeMembers,
+    *,
+    episodes: int,
+    stream: str,
+) -> dict[str, Any]:
+    """Return how a saved model does in the first `episodes` episodes of a stream of seeds.
+
+    Of the configuration's simulators only the evaluating ones are made and started.
+
+    Raises:
+        ConfigurationError: there is no such model, it doesn't fit, or nothing evaluates.
+        FaultBudgetSpent: a simulator broke more often than its budget allows.
+    """
+    evaluating = configuration.with_role("Evaluate")
+    if not evaluating:
+        raise ConfigurationError("simulators: none has role Evaluate; give one of them that role")
+    if not model.exists():
+        raise ConfigurationError(f"{model}: is not there; train first, or name another folder")
+    use_threads()
+    only = configuration.model_copy(update={"simulators": evaluating})
+    with ExitStack() as stack:
+        fleet = Fleet(only, make_members(only), Nobody())
+        stack.callback(fleet.stop)
+        fleet.start()
+        env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
+        policy = algorithms.make_model(configuration.algorithm, env, configuration.seed)
+        checkpoint.load_tensors(model, policy)
+        seeds = episode_seeds(configuration.seed, stream, episodes)
+        evaluation = evaluate_on_all(policy, fleet.evaluating, seeds)
+    return evaluation.summary() | {
+        "seeds": stream,
+        "run_seed": configuration.seed,
+        "seconds": round(evaluation.seconds, 2),
+    }

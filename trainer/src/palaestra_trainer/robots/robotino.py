@@ -1,0 +1,145 @@
+"""The simulated Robotino: devices of Webots behind `RobotinoAbc`, and the scene around it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_trainer.ros import call_together
+from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, Pose, RobotinoAbc
+from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, TouchSensor, Webots
+
+PERIOD_MS = 192  # six basic steps of 32 ms
+
+# Source: projects/robots/festo/robotino3 of Webots R2023b.
+_WHEEL_RADIUS_M = 0.063
+_WHEEL_DISTANCE_M = 0.1826
+_SIN_60 = math.sqrt(0.75)
+
+# Metres from volts for the GP2Y0A41, the default sensor of the model: a * V**b + c.
+_RANGE_SCALE, _RANGE_EXPONENT, _RANGE_OFFSET_M = 0.1594, -0.8533, -0.02916
+_LEAST_VOLTS = 0.05  # below the sensor's range; keeps the power finite
+
+
+class Robotino(RobotinoAbc):
+    """A Robotino in Webots, or in any simulator that speaks its interface.
+
+    Args:
+        webots: the simulator; it need not run yet, `connect` must be called once it does.
+        node_name: the ROS name of the robot's controller; by default the robot is its own supervisor.
+        definition: the DEF name of the robot in the world.
+        period_ms: simulated milliseconds in one `advance`.
+    """
+
+    def __init__(
+        self,
+        webots: Webots,
+        node_name: str | None = None,
+        definition: str = "ROBOTINO",
+        period_ms: int = PERIOD_MS,
+    ) -> None:
+        name = node_name or webots.supervisor_node_name
+        self.definition = definition
+        self._observer = webots.observer
+        self._wheels = tuple(Motor(name, f"wheel{number}_joint") for number in range(3))
+        self._infrared = tuple(DistanceSensor(name, f"ir{number + 1}") for number in range(SENSORS))
+        self._bumper = TouchSensor(name, "touch sensor")
+        robots = dict.fromkeys((name, webots.supervisor_node_name))
+        self.simulation = Simulation(tuple(robots), webots.supervisor, period_ms)
+        self.simulation.add((*self._infrared, self._bumper), self._wheels)
+        self._pose: Pose | None = None
+
+    @property
+    def period_s(self) -> float:
+        """Seconds of simulated time in one `advance`."""
+        return self.simulation.period_ms / 1000.0
+
+    def connect(self) -> None:
+        """Enable the sensors and take hold of the wheels; after each start of the simulator.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        self._pose = None
+        self._observer.forget_handles()
+        self.simulation.connect()
+
+    def distances(self) -> NDArray[np.float32]:
+        """Return metres to the nearest obstacle, shape (9,), forward first, counter-clockwise."""
+        volts = np.array([sensor.value for sensor in self._infrared], dtype=np.float32)
+        return metres(volts)
+
+    def bumped(self) -> bool:
+        """Return whether the bumper touches something."""
+        return bool(self._bumper.value)
+
+    def pose(self) -> Pose:
+        """Return the true pose after the last step."""
+        if self._pose is None:
+            self._pose = Pose(*self._observer.pose(self.definition))
+        return self._pose
+
+    def drive(self, vx: float, vy: float, omega: float) -> None:
+        """Set the wanted velocity: forward, left (m/s) and counter-clockwise (rad/s), until changed."""
+        speeds = wheel_speeds(vx, vy, omega)
+        call_together(
+            [
+                (wheel.velocity_service, {"value": speed})
+                for wheel, speed in zip(self._wheels, speeds, strict=True)
+            ]
+        )
+
+    def advance(self) -> int:
+        """Simulate one control period; return how many extra ones it took, normally 0."""
+        self._pose = None
+        return self.simulation.step()
+
+    def close(self) -> None:
+        """Drop all connections."""
+        self.simulation.close()
+
+
+class RobotinoScene:
+    """What is arranged around a simulated Robotino.
+
+    Args:
+        webots: the simulator.
+        robot: the robot that is placed.
+        target: the DEF name of the mark on the floor.
+    """
+
+    def __init__(self, webots: Webots, robot: Robotino, target: str = "TARGET") -> None:
+        self._supervisor = webots.supervisor
+        self._robot = robot
+        self._target = target
+        self.resets = 0
+
+    def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
+        """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings."""
+        self.resets += 1
+        self._robot.simulation.reset(seed)
+        self._supervisor.place(self._robot.definition, start.x_m, start.y_m, start.heading_rad)
+        self._supervisor.place(self._target, *target)
+        self._supervisor.stop_inertia(self._robot.definition)
+        self._robot.advance()
+
+
+def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
+    """Return the speeds in rad/s of rear, front-right and front-left wheel for a twist in m/s and rad/s."""
+    turn = omega * _WHEEL_DISTANCE_M
+    return (
+        (vy - turn) / _WHEEL_RADIUS_M,
+        (-_SIN_60 * vx - 0.5 * vy - turn) / _WHEEL_RADIUS_M,
+        (_SIN_60 * vx - 0.5 * vy - turn) / _WHEEL_RADIUS_M,
+    )
+
+
+def metres(volts: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return distances in metres, within the sensor's range, for readings in volts."""
+    distances = (
+        _RANGE_SCALE * np.maximum(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
+    )
+    return np.clip(distances, *SENSOR_RANGE_M).astype(np.float32)

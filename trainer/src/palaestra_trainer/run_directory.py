@@ -1,0 +1,123 @@
+"""The folder of one run on its volume: what is in it, and how it is written.
+
+It says by itself what was run and can be resumed. Whole files are replaced
+atomically (temporary name, fsync, rename, fsync of the folder); lines are
+appended with fsync. So whatever kills a trainer, each file is old or new.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+RUN_VARIABLE = "PALAESTRA_RUN"
+
+
+class RunDirectory:
+    """One run directory, made if it isn't there.
+
+    Attributes:
+        path: the folder itself.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        path.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def attempts(self) -> Path:
+        """One JSON line an attempt."""
+        return self.path / "attempts.jsonl"
+
+    @property
+    def checkpoints(self) -> Path:
+        """A folder a checkpoint, named by its step."""
+        return self.path / "checkpoints"
+
+    @property
+    def configuration(self) -> Path:
+        """What was run."""
+        return self.path / "training.yaml"
+
+    @property
+    def evaluations(self) -> Path:
+        """One JSON line an evaluation."""
+        return self.path / "evaluations.jsonl"
+
+    @property
+    def model(self) -> Path:
+        """The best model by evaluation, a Stable-Baselines3 zip."""
+        return self.path / "model.zip"
+
+    @property
+    def summary(self) -> Path:
+        """What the run came to; there once it is finished."""
+        return self.path / "summary.json"
+
+    @property
+    def tensorboard(self) -> Path:
+        """Event files of TensorBoard."""
+        return self.path / "tensorboard"
+
+    def begin_attempt(self, pod_uid: str, reason: str) -> int:
+        """Record that an attempt begins; return its number, counted from 1."""
+        started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+        append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason})
+        return sum(1 for _ in read_lines(self.attempts))
+
+
+def append_line(path: Path, content: dict[str, Any]) -> None:
+    """Append `content` as one JSON line that survives a crash of the machine."""
+    torn = path.exists() and path.stat().st_size > 0 and not path.read_bytes().endswith(b"\n")
+    with path.open("a", encoding="utf-8") as file:
+        file.write(("\n" if torn else "") + json.dumps(content) + "\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def read_lines(path: Path) -> Iterator[dict[str, Any]]:
+    """Yield the JSON lines of a file that may be absent; a line torn by a crash is left out."""
+    if not path.exists():
+        return
+    for line in path.read_text(encoding="utf-8").splitlines():
+        with suppress(json.JSONDecodeError):
+            content = json.loads(line)
+            if isinstance(content, dict):
+                yield content
+
+
+def replace_file(path: Path, write: Callable[[Path], None]) -> None:
+    """Replace `path` by what `write` writes to the temporary name it is given.
+
+    Raises:
+        OSError: it could not be written; what was there before is untouched.
+    """
+    with temporary(path) as name:
+        write(name)
+        sync(name)
+        name.rename(path)
+    sync(path.parent)
+
+
+@contextmanager
+def temporary(path: Path) -> Iterator[Path]:
+    """Lend a name beside `path`, with its suffix; remove what is left under it at the end."""
+    name = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield name
+    finally:
+        name.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file's or a folder's contents are on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,37 @@
+"""The seed of every episode: a pure function of what the episode is.
+
+A process that died and came back plays the same episodes as one that lived,
+because no seed depends on a process's life. Each stream (collecting,
+evaluating, and any name a person gives to `palaestra-eval --seeds`) draws from
+its own sequence, so that a policy is never chosen on episodes it is measured on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+
+import numpy as np
+
+COLLECT = "collect"
+EVALUATE = "A"
+
+
+def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> int:
+    """Return the seed of one episode, in [0, 2**31).
+
+    Args:
+        run_seed: the replica's seed, not negative.
+        stream: what the episode is for.
+        simulator: index of the simulator among those of its role; 0 when
+            several share one stream, as evaluators do.
+        episode: its number, counted from 0 over the whole run.
+    """
+    name = int.from_bytes(hashlib.sha256(stream.encode()).digest()[:8])
+    sequence = np.random.SeedSequence((run_seed, name, simulator, episode))
+    return int(sequence.generate_state(1)[0]) >> 1
+
+
+def episode_seeds(run_seed: int, stream: str, episodes: int) -> Iterator[int]:
+    """Yield the seeds of the first `episodes` episodes of a stream that simulators share."""
+    return (episode_seed(run_seed, stream, 0, episode) for episode in range(episodes))

@@ -1,0 +1,55 @@
+"""Child processes that live no longer than this program: each reads our end of its standard input.
+
+The kernel closes that end however this program ends, also when it is killed, and the child takes the end of
+file as its order to stop.
+"""
+
+from __future__ import annotations
+
+import atexit
+import selectors
+import subprocess
+
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead
+
+_ANSWER_S = 20.0
+
+
+def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
+    """Return a process of its own session, ended at this program's exit.
+
+    Raises:
+        ConfigurationError: the program cannot be started.
+    """
+    try:
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, start_new_session=True
+        )
+    except OSError as error:
+        fact = f"{command[0]} cannot be started ({error.strerror}); is it installed?"
+        raise ConfigurationError(fact) from error
+    atexit.register(end_child, process)
+    return process
+
+
+def end_child(process: subprocess.Popen[bytes]) -> None:
+    """Close what the process lives on, and wait for its end; safe to repeat."""
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        if pipe is not None:
+            pipe.close()
+    process.wait(_ANSWER_S)
+
+
+def first_line(process: subprocess.Popen[bytes]) -> str:
+    """Return the first line of the process's output, empty if it ended without one.
+
+    Raises:
+        SimulatorDead: it said nothing in time.
+    """
+    if process.stdout is None:
+        raise ValueError("the process was started without a pipe for its output")
+    with selectors.DefaultSelector() as selector:
+        selector.register(process.stdout, selectors.EVENT_READ)
+        if not selector.select(_ANSWER_S):
+            raise SimulatorDead(str(process.args), f"said nothing within {_ANSWER_S:g} s")
+    return process.stdout.readline().decode(errors="replace")

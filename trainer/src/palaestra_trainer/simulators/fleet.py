@@ -1,0 +1,91 @@
+"""All simulators of a run, by role: started and stopped together, resting in turns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+
+from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.simulators.member import Care, Keeper, Member, Watcher
+
+
+class Fleet:
+    """The keepers of all members of a configuration.
+
+    Args:
+        configuration: says how each member is looked after; found by its name.
+        members: one for each simulator of the configuration.
+        watcher: is told of every fault and restart.
+
+    Attributes:
+        collecting: keepers of the members that gather experience, in the configuration's order.
+        evaluating: keepers of those that measure the policy; none if nothing is evaluated.
+    """
+
+    def __init__(self, configuration: Configuration, members: Sequence[Member], watcher: Watcher) -> None:
+        by_name = {member.name: member for member in members}
+        missing = [wanted.name for wanted in configuration.simulators if wanted.name not in by_name]
+        if missing:
+            raise ConfigurationError(f"simulators: {', '.join(missing)} cannot be made; list it")
+        keepers = {
+            wanted.name: Keeper(by_name[wanted.name], care_of(wanted), watcher)
+            for wanted in configuration.simulators
+        }
+        self.collecting = [keepers[wanted.name] for wanted in configuration.with_role("Collect")]
+        self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role("Evaluate")]
+
+    def start(self) -> None:
+        """Start all members at once.
+
+        Raises:
+            FaultBudgetSpent: one of them does not come up, however often it is tried.
+        """
+        self._each(Keeper.start)
+
+    def stop(self) -> None:
+        """Stop all members at once, however they are."""
+        self._each(Keeper.stop)
+
+    def _each(self, work: Callable[[Keeper], None]) -> None:
+        keepers = [*self.collecting, *self.evaluating]
+        with ThreadPoolExecutor(len(keepers), "fleet") as pool:
+            list(pool.map(work, keepers))
+
+
+@contextmanager
+def running(keepers: Sequence[Keeper]) -> Iterator[None]:
+    """Run the members while inside, let them rest outside."""
+    for keeper in keepers:
+        keeper.run()
+    try:
+        yield
+    finally:
+        rest(keepers)
+
+
+@contextmanager
+def resting(keepers: Sequence[Keeper]) -> Iterator[None]:
+    """Let the members rest while inside, run them outside."""
+    rest(keepers)
+    try:
+        yield
+    finally:
+        for keeper in keepers:
+            keeper.run()
+
+
+def rest(keepers: Sequence[Keeper]) -> None:
+    """Let the members rest."""
+    for keeper in keepers:
+        keeper.pause()
+
+
+def care_of(simulator: SimulatorConfiguration) -> Care:
+    """Return how the configuration wants one member to be looked after."""
+    return Care(
+        recycle_after_resets=simulator.recycle.after_resets if simulator.recycle else None,
+        restart_limit=simulator.restart.limit,
+        restart_within_s=simulator.restart.within_seconds,
+    )

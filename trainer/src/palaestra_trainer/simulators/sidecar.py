@@ -1,0 +1,87 @@
+"""A simulator behind its sidecar: what the control port can do, as a launcher of the Webots facade."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import time
+from typing import Any
+from urllib.parse import urlsplit
+
+from palaestra_sim.protocol.control import ProtocolError, SidecarState, SimulatorState, StopRequest, decoded
+from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
+
+_TIMEOUT_S = 5.0
+_POLL_S = 0.02
+_MOST_BYTES = 65536
+_CONFLICT = 409
+
+
+class Sidecar:
+    """The control port of one sidecar.
+
+    Every method raises SimulatorDead when the sidecar is gone and SimulatorHung when it does not answer.
+
+    Args:
+        address: e.g. http://127.0.0.1:7100
+        name: the simulator's name, for messages.
+    """
+
+    def __init__(self, address: str, name: str) -> None:
+        parts = urlsplit(address)
+        self._host, self._port = str(parts.hostname), parts.port
+        self._name = name
+
+    def state(self) -> SimulatorState:
+        """Return what the sidecar says of its simulator."""
+        return self._ask("GET", "/state")
+
+    def start(self) -> None:
+        """Begin to start the simulator; one that is on its way already is left alone."""
+        self._ask("POST", "/start", {})
+
+    def confirm_ready(self) -> None:
+        """Tell that the simulator has answered a real round trip."""
+        self._ask("POST", "/ready", {})
+
+    def expect_stop(self, deadline_s: float) -> None:
+        """Announce that the simulator will end; it is killed after `deadline_s` seconds."""
+        self._ask("POST", "/stop", StopRequest(deadline_s=deadline_s).to_json())
+
+    def failure(self) -> str | None:
+        """Return why the simulator is not running, None while it runs or starts."""
+        state = self.state()
+        if state.state in {SidecarState.STARTING, SidecarState.READY}:
+            return None
+        return state.detail or f"its state is {state.state.value}"
+
+    def wait_stopped(self, deadline_s: float) -> None:
+        """Return when the simulator has ended.
+
+        Raises:
+            SimulatorHung: it has not within `deadline_s` seconds.
+        """
+        give_up = time.monotonic() + deadline_s
+        while self.state().state not in {SidecarState.IDLE, SidecarState.FAILED}:
+            if time.monotonic() > give_up:
+                raise SimulatorHung(self._name, f"did not end within {deadline_s:g} s")
+            time.sleep(_POLL_S)  # between two questions to another process, which has no call that waits
+
+    def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> SimulatorState:
+        connection = http.client.HTTPConnection(self._host, self._port, timeout=_TIMEOUT_S)
+        try:
+            connection.request(method, path, None if body is None else json.dumps(body))
+            answer = connection.getresponse()
+            text = answer.read(_MOST_BYTES)
+        except TimeoutError as error:
+            raise SimulatorHung(self._name, "its sidecar does not answer") from error
+        except (OSError, http.client.HTTPException) as error:
+            raise SimulatorDead(self._name, f"its sidecar is gone ({error})") from error
+        finally:
+            connection.close()
+        if answer.status not in {http.client.OK, _CONFLICT}:
+            raise WrongData(self._name, f"its sidecar answered {path} with {answer.status}")
+        try:
+            return SimulatorState.from_json(decoded(text))
+        except ProtocolError as error:
+            raise WrongData(self._name, f"its sidecar answered {path} with {error}") from error

@@ -1,0 +1,189 @@
+"""The arena and a Robotino in it, computed in this process.
+
+`fake_arena()` gives a robot and a scene for `MoveToTargetEnv` at some twenty
+thousand steps a second: for notebooks, tests and trying out rewards. Its physics
+are those that matter to the task: speeding up takes time, walls and cylinders stop
+the robot and let it slide, infrared reaches 40 cm. It can be told to die at a given
+step, as simulators do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_trainer.environments.arena import (
+    CYLINDER_RADIUS_M,
+    CYLINDERS,
+    HALF_SIDE_M,
+    Point,
+)
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.robots.base import (
+    RADIUS_M,
+    SENSOR_RANGE_M,
+    SENSORS,
+    Pose,
+    RobotinoAbc,
+    Twist,
+)
+
+BASIC_STEP_S = 0.032
+BASIC_STEPS = 6  # in one control period
+ACCELERATIONS = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2. Source: Webots, robotino3/base.c
+NOISE = 0.005  # of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
+BEARINGS_RAD = tuple(2.0 * math.pi * sensor / SENSORS for sensor in range(SENSORS))
+
+
+class FakeRobotino(RobotinoAbc):
+    """A Robotino on the arena's floor, computed here.
+
+    Args:
+        deaths: numbers of the `advance` calls, counted from 1 over its whole life, at
+            which it dies; every call raises `SimulatorDead` from then until `restart`.
+        name: what its faults are called by.
+    """
+
+    def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
+        self._deaths = frozenset(deaths)
+        self._name = name
+        self._steps = 0
+        self._dead = False
+        self._wanted: Twist
+        self._velocity: Twist
+        self.place(Pose(0.0, 0.0, 0.0), seed=0)
+
+    @property
+    def period_s(self) -> float:
+        """Six basic steps of 32 ms, as in the shipped example."""
+        return BASIC_STEP_S * BASIC_STEPS
+
+    def distances(self) -> NDArray[np.float32]:
+        """Return the nine readings of the last step."""
+        self._live()
+        return self._distances.copy()
+
+    def bumped(self) -> bool:
+        """Return whether the robot touched something in the last step."""
+        self._live()
+        return self._bumped
+
+    def pose(self) -> Pose:
+        """Return the pose after the last step."""
+        self._live()
+        return Pose(self._x_m, self._y_m, self._heading_rad)
+
+    def drive(self, vx: float, vy: float, omega: float) -> None:
+        """Set the wanted velocity."""
+        self._live()
+        self._wanted = (vx, vy, omega)
+
+    def advance(self) -> int:
+        """Compute one control period; there are never extra ones."""
+        self._live()
+        self._steps += 1
+        self._dead = self._steps in self._deaths
+        self._live()
+        self._bumped = False
+        for _ in range(BASIC_STEPS):
+            self._speed_up()
+            self._roll()
+            self._slide()
+        self._sense()
+        return 0
+
+    def place(self, pose: Pose, seed: int) -> None:
+        """Put it down at rest, with fresh readings; noise follows from `seed`."""
+        self._live()
+        self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
+        self._wanted = self._velocity = (0.0, 0.0, 0.0)
+        self._bumped = False
+        self._random = np.random.default_rng(seed)
+        self._sense()
+
+    def restart(self) -> None:
+        """Bring it back to life."""
+        self._dead = False
+
+    def _live(self) -> None:
+        if self._dead:
+            raise SimulatorDead(self._name, f"died at step {self._steps}; restart it")
+
+    def _speed_up(self) -> None:
+        vx, vy, omega = (
+            was + max(-limit * BASIC_STEP_S, min(limit * BASIC_STEP_S, wanted - was))
+            for was, wanted, limit in zip(self._velocity, self._wanted, ACCELERATIONS, strict=True)
+        )
+        self._velocity = (vx, vy, omega)
+
+    def _roll(self) -> None:
+        vx, vy, omega = self._velocity
+        middle = self._heading_rad + 0.5 * omega * BASIC_STEP_S
+        self._x_m += (vx * math.cos(middle) - vy * math.sin(middle)) * BASIC_STEP_S
+        self._y_m += (vx * math.sin(middle) + vy * math.cos(middle)) * BASIC_STEP_S
+        self._heading_rad = wrapped(self._heading_rad + omega * BASIC_STEP_S)
+
+    def _slide(self) -> None:
+        """Push the robot out of what it ran into; what is left of its motion is sliding."""
+        for x, y in CYLINDERS:
+            reach = CYLINDER_RADIUS_M + RADIUS_M
+            distance = math.hypot(self._x_m - x, self._y_m - y)
+            if distance < reach:
+                self._x_m = x + (self._x_m - x) * reach / distance
+                self._y_m = y + (self._y_m - y) * reach / distance
+                self._bumped = True
+        limit = HALF_SIDE_M - RADIUS_M
+        if max(abs(self._x_m), abs(self._y_m)) > limit:
+            self._x_m = max(-limit, min(limit, self._x_m))
+            self._y_m = max(-limit, min(limit, self._y_m))
+            self._bumped = True
+
+    def _sense(self) -> None:
+        seen = [self._ray(self._heading_rad + bearing) for bearing in BEARINGS_RAD]
+        noise = 1.0 + NOISE * self._random.standard_normal(SENSORS)
+        self._distances = np.clip(seen * noise, *SENSOR_RANGE_M).astype(np.float32)
+
+    def _ray(self, bearing_rad: float) -> float:
+        """Return metres from the robot's body to what stands in this direction of the world."""
+        ux, uy = math.cos(bearing_rad), math.sin(bearing_rad)
+        nearest = min(_to_wall(self._x_m, ux), _to_wall(self._y_m, uy))
+        for x, y in CYLINDERS:
+            along = (x - self._x_m) * ux + (y - self._y_m) * uy
+            aside = (x - self._x_m) * uy - (y - self._y_m) * ux
+            if along > 0.0 and abs(aside) < CYLINDER_RADIUS_M:
+                nearest = min(nearest, along - math.sqrt(CYLINDER_RADIUS_M**2 - aside**2))
+        return nearest - RADIUS_M
+
+
+class FakeScene:
+    """The scene of a `FakeRobotino`."""
+
+    def __init__(self, robot: FakeRobotino) -> None:
+        self._robot = robot
+        self.target: Point = (0.0, 0.0)
+
+    def reset(self, seed: int, start: Pose, target: Point) -> None:
+        """Put the robot at rest at `start`."""
+        self._robot.place(start, seed)
+        self.target = target
+
+
+def fake_arena(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
+    """Return a robot and its scene; see `FakeRobotino` for `deaths`."""
+    robot = FakeRobotino(deaths)
+    return robot, FakeScene(robot)
+
+
+def wrapped(angle_rad: float) -> float:
+    """Return the same direction in (-pi, pi]."""
+    angle_rad = math.remainder(angle_rad, 2.0 * math.pi)
+    return math.pi if angle_rad == -math.pi else angle_rad
+
+
+def _to_wall(position_m: float, direction: float) -> float:
+    if direction == 0.0:
+        return math.inf
+    return (math.copysign(HALF_SIDE_M, direction) - position_m) / direction

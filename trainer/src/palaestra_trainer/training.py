@@ -1,0 +1,254 @@
+"""One attempt of a run, from a configuration to an exit code.
+
+Brings the parts together in the order in which they can fail: what needs no
+simulator is checked before one is started.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+import structlog
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.logger import configure
+
+from palaestra_sim.protocol.status import ExitCode, Termination
+from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer.conductor import Conductor, Enough, Run
+from palaestra_trainer.configuration import Configuration, dump
+from palaestra_trainer.display import Display, Lines
+from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.interruption import Interruption
+from palaestra_trainer.progress import Counters, Progress
+from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.simulators.fleet import Fleet, rest
+from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.status_server import StatusServer
+from palaestra_trainer.summary import finished, summarise, write_summary
+from palaestra_trainer.termination import Diverged, End, end_of, write_last_word
+from palaestra_trainer.watchdog import Watchdog
+
+log = structlog.get_logger(__name__)
+
+MakeMembers = Callable[[Configuration], Sequence[Member]]
+DONE = End(ExitCode.DONE, "Completed", "all steps are done")
+STALLED = End(ExitCode.STALLED, "Stalled", "no environment step for stallDeadlineSeconds")
+LOG_INTERVAL = {"DQN": 10, "SAC": 10, "A2C": 50}  # episodes, or rollouts on policy; others: 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Surroundings:
+    """What an attempt finds around it.
+
+    Attributes:
+        make_members: makes the simulators of a configuration, not started yet.
+        display: shows where the run stands.
+        must_resume: refuse to begin a new run.
+        environment: the process's environment variables.
+    """
+
+    make_members: MakeMembers
+    display: Display
+    must_resume: bool = False
+    environment: Mapping[str, str]
+
+
+def run(
+    configuration: Configuration,
+    directory: RunDirectory,
+    make_members: MakeMembers,
+    display: Display | None = None,
+    *,
+    must_resume: bool = False,
+) -> int:
+    """Train until done, resuming if the directory has a checkpoint; return the exit code.
+
+    A run that is finished is reported, not repeated. Must be called in the main
+    thread, where signals arrive. `must_resume` refuses to begin a new run.
+    """
+    around = Surroundings(
+        make_members=make_members,
+        display=display or Lines(),
+        must_resume=must_resume,
+        environment=os.environ,
+    )
+    before = finished(directory, configuration)
+    if before is not None:
+        log.info("already finished", **before)
+        return ExitCode.DONE
+    progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
+    attempt = Attempt(configuration, directory, progress, around)
+    end = attempt.play()
+    for line in end.message.splitlines():
+        log.log(logging.INFO if end.code == ExitCode.DONE else logging.ERROR, line, reason=end.reason)
+    write_last_word(attempt.last_word(end))
+    return int(end.code)
+
+
+class Attempt:
+    """One attempt, which plays once."""
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        directory: RunDirectory,
+        progress: Progress,
+        around: Surroundings,
+    ) -> None:
+        self._configuration = configuration
+        self._directory = directory
+        self._progress = progress
+        self._around = around
+        self._started = time.monotonic()
+
+    def play(self) -> End:
+        """Train; return how it ended. Nothing is left running, whatever happens."""
+        try:
+            with ExitStack() as stack:
+                run = self._prepare(stack)
+                self._train(run, stack)
+        except Exception as error:  # the process's edge: every end has an exit code
+            end = end_of(error)
+            if end.reason == "Unexpected":
+                log.exception("unexpected error")
+            return end
+        return DONE
+
+    def last_word(self, end: End) -> Termination:
+        """Return the termination message of an attempt that ends now."""
+        return Termination(
+            step=self._progress.step,
+            success_rate=self._progress.success_rate,
+            reason=f"{end.reason}: {end.message}",
+            last_checkpoint=self._progress.checkpoint,
+        )
+
+    def _prepare(self, stack: ExitStack) -> Run:
+        """Return a run whose simulators are up; what it opened is closed by `stack`."""
+        configuration, progress = self._configuration, self._progress
+        algorithms.check(configuration.algorithm)
+        interruption = stack.enter_context(Interruption())
+        stack.enter_context(StatusServer(configuration.status_address, progress))
+        self._watch(stack)
+        stack.enter_context(self._around.display)
+        with interruption.at_once():
+            fleet = Fleet(configuration, self._around.make_members(configuration), progress)
+            stack.callback(fleet.stop)
+            fleet.start()
+        rest(fleet.evaluating)
+        progress.ready()
+        return Run(
+            configuration=configuration,
+            directory=self._directory,
+            fleet=fleet,
+            progress=progress,
+            interruption=interruption,
+            display=self._around.display,
+        )
+
+    def _train(self, run: Run, stack: ExitStack) -> None:
+        use_threads(self._around.environment)
+        found = checkpoint.newest(self._directory.checkpoints)
+        if found is None and self._around.must_resume:
+            raise ConfigurationError(
+                f"{self._directory.path}: has no checkpoint to resume from; leave --resume out"
+            )
+        env = SimulatorsVecEnv(
+            run.fleet.collecting,
+            self._configuration.seed,
+            episodes=found.manifest.episodes if found else None,
+            deadline_s=self._configuration.stall_deadline_seconds,
+        )
+        stack.callback(env.close)
+        model = self._make_model(env, found)
+        self._begin(found)
+        self._learn(model, Conductor(run, env, model.num_timesteps))
+        stop_clock(self._progress, self._started)
+        write_summary(self._directory, summarise(self._directory, self._progress))
+
+    def _make_model(self, env: SimulatorsVecEnv, found: checkpoint.Checkpoint | None) -> BaseAlgorithm:
+        configuration = self._configuration
+        # A resumed attempt must not repeat the exploration of the one before.
+        step = found.manifest.step if found else 0
+        model = algorithms.make_model(configuration.algorithm, env, configuration.seed)
+        if found:
+            checkpoint.restore(found, model, configuration)
+            model.set_random_seed(configuration.seed + step)
+            env.seed(configuration.seed)
+            self._progress.counters = Counters.from_json(found.manifest.counters)
+            self._progress.step = step
+            self._progress.saved(step)
+        model.set_logger(configure(str(self._directory.tensorboard), ["tensorboard"]))
+        return model
+
+    def _begin(self, found: checkpoint.Checkpoint | None) -> None:
+        reason = f"resumed at step {found.manifest.step}" if found else "new run"
+        text = dump(self._configuration)
+        replace_file(self._directory.configuration, lambda path: _write_text(path, text))
+        attempt = self._directory.begin_attempt(self._around.environment.get("PALAESTRA_POD_UID", ""), reason)
+        log.info("training", attempt=attempt, reason=reason, target=self._configuration.steps)
+        self._progress.phase = "training"
+
+    def _learn(self, model: BaseAlgorithm, conductor: Conductor) -> None:
+        missing = self._configuration.steps - model.num_timesteps
+        try:
+            if missing > 0:
+                model.learn(
+                    missing,
+                    conductor,
+                    log_interval=LOG_INTERVAL.get(self._configuration.algorithm.name, 1),
+                    reset_num_timesteps=False,
+                )
+            else:
+                conductor.init_callback(model)
+            self._progress.step = model.num_timesteps
+            conductor.finish()
+        except Enough as enough:
+            log.info("done early", fact=str(enough))
+            conductor.save()
+        except Diverged:
+            raise
+        except TrainerError:
+            stop_clock(self._progress, self._started)
+            conductor.save()
+            raise
+        except ValueError as error:
+            # torch's distributions refuse NaN before anybody else sees it.
+            if checkpoint.finite(model):
+                raise
+            raise Diverged(f"the networks hold NaN or infinity ({error})") from error
+
+    def _watch(self, stack: ExitStack) -> None:
+        stack.enter_context(
+            Watchdog(
+                self._progress.idle_s,
+                self._configuration.stall_deadline_seconds,
+                lambda: write_last_word(self.last_word(STALLED)),
+            )
+        )
+
+
+def use_threads(environment: Mapping[str, str] = os.environ) -> None:
+    """Let torch use as many threads as OMP_NUM_THREADS says, one by default.
+
+    Networks of this size are slower on two threads than on one.
+    """
+    threads = environment.get("OMP_NUM_THREADS", "1")
+    torch.set_num_threads(int(threads) if threads.isdigit() and int(threads) else 1)
+
+
+def stop_clock(progress: Progress, started: float) -> None:
+    """Add the time since `started` to the seconds of the run."""
+    progress.counters.seconds += time.monotonic() - started
+
+
+def _write_text(path: os.PathLike[str], text: str) -> None:
+    with open(path, "w", encoding="utf-8") as file:  # noqa: PTH123 - any path-like
+        file.write(text)

@@ -1,0 +1,67 @@
+"""The end of a run that no longer moves.
+
+A thread of its own, because what it watches for is that the others hang.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import sys
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+import structlog
+from palaestra_sim.protocol.status import ExitCode
+
+log = structlog.get_logger(__name__)
+
+
+class Watchdog:
+    """Gives the process up when `idle_s()` reaches `deadline_s` while it is entered.
+
+    Args:
+        idle_s: seconds since anything moved.
+        deadline_s: how long that may be.
+        last_word: called before the process ends, to say so.
+        leave: ends the process; takes the exit code.
+    """
+
+    def __init__(
+        self,
+        idle_s: Callable[[], float],
+        deadline_s: float,
+        last_word: Callable[[], None],
+        leave: Callable[[int], object] = os._exit,
+    ) -> None:
+        self._idle_s = idle_s
+        self._deadline_s = deadline_s
+        self._last_word = last_word
+        self._leave = leave
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="watchdog", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Begin to watch."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop watching."""
+        self._over.set()
+
+    def _watch(self) -> None:
+        while not self._over.wait(min(self._deadline_s / 4, 5.0)):
+            if self._idle_s() >= self._deadline_s:
+                log.error("stalled: no environment step", seconds=round(self._idle_s(), 1))
+                faulthandler.dump_traceback(sys.__stderr__ or 2, all_threads=True)
+                self._last_word()
+                self._leave(ExitCode.STALLED)
+                return
