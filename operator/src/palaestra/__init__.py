@@ -1,0 +1,1 @@
+"""The control plane: the TrainingJob, its plan, and the local runner."""

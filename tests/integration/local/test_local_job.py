@@ -59,9 +59,7 @@ class Play:
         job = {"spec": {"backoffLimit": limit, "podFailurePolicy": POLICY, "template": template}}
         file = self.folder / "job.json"
         file.write_text(json.dumps(job))
-        return subprocess.Popen(
-            [sys.executable, PLAY, file, self.folder], stdout=subprocess.PIPE, text=True
-        )
+        return subprocess.Popen([sys.executable, PLAY, file, self.folder], stdout=subprocess.PIPE, text=True)
 
     def run(self, trainer: str, **options) -> dict:
         """Run a Job to its end and return its outcome and the number of pods that were seen."""

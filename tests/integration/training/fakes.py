@@ -39,9 +39,9 @@ class FakeSimulator:
     def __init__(self, name: str, configuration: Configuration, deaths: Collection[int]) -> None:
         self.name = name
         self.log: list[str] = []
-        self.robot, scene = fake_arena(deaths)
+        self.robot, self.scene = fake_arena(deaths)
         task = configuration.environment
-        made = gymnasium.make(task.id, robot=self.robot, scene=scene, reward=task.reward, **task.options)
+        made = gymnasium.make(task.id, robot=self.robot, scene=self.scene, reward=task.reward, **task.options)
         self.env = CountedResets(made)
 
     @property

@@ -95,9 +95,10 @@ def test_a_lost_wake_up_costs_an_extra_step_and_no_fault(start):
     """The real controller can sleep through a step that comes too early."""
     arena = start("--lost-wakeup", "--publish-delay-ms=3")
 
-    extra = [arena.robot.advance() for _ in range(20)]
+    extra = [arena.robot.advance() for _ in range(4)]
 
-    assert set(extra) <= {0, 1}
+    assert set(extra) <= {0, 1, 2}
+    assert sum(extra) > 0
 
 
 def test_a_period_that_is_no_multiple_of_the_step_is_refused(arena):

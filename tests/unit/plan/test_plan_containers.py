@@ -1,6 +1,5 @@
 """The containers of a pod: their order, ports, commands, environment and resources."""
 
-
 import pytest
 import yaml
 from hypothesis import given
@@ -61,17 +60,14 @@ def test_one_simulator_of_a_replica_keeps_the_clock(in_cluster):
     """Two times on one topic are none."""
     planned = containers(in_cluster(simulators=TWO_GROUPS))
 
-    assert [name for name, each in planned.items() if "--clock" in each.get("args", ())] == [
-        "sim-collect-0"
-    ]
+    assert [name for name, each in planned.items() if "--clock" in each.get("args", ())] == ["sim-collect-0"]
 
 
 def test_control_ports_are_on_loopback_only(in_cluster):
     """ROS and the sidecars' control know no authentication."""
     for container in containers(in_cluster()).values():
         assert not any(
-            arg.startswith("--control=") and "127.0.0.1" not in arg
-            for arg in container.get("args", ())
+            arg.startswith("--control=") and "127.0.0.1" not in arg for arg in container.get("args", ())
         )
 
 
@@ -197,5 +193,3 @@ def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
 
     assert threads >= 1
     assert 0 <= threads * 1000 - millis < 1000
-
-

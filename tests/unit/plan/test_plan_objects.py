@@ -31,9 +31,7 @@ def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_clust
 
 def test_the_name_of_a_config_map_follows_from_its_content(in_cluster):
     """It never changes, so another content needs another name."""
-    names = {
-        in_cluster(seed=seed).replicas[0].config_map["metadata"]["name"] for seed in (1, 2)
-    }
+    names = {in_cluster(seed=seed).replicas[0].config_map["metadata"]["name"] for seed in (1, 2)}
 
     assert len(names) == 2
 
@@ -56,9 +54,7 @@ def test_a_claim_that_is_not_retained_goes_with_the_job(in_cluster):
 
 def test_a_job_that_is_made_again_gets_a_new_claim(make_job):
     """Its uid is in the name: the run of its predecessor is not continued by accident."""
-    claims = {
-        plan(make_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"
-    }
+    claims = {plan(make_job(uid=uid), LAYOUT).replicas[0].claim["metadata"]["name"] for uid in "ab"}
 
     assert len(claims) == 2
 

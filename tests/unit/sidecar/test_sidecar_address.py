@@ -16,5 +16,5 @@ def test_an_address_is_written_as_it_is_read(text) -> None:
 )
 def test_what_is_no_address_with_a_port_is_refused(text) -> None:
     """A name could be anybody's address tomorrow, so there are none."""
-    with pytest.raises(ValueError, match=""):
+    with pytest.raises(ValueError, match=r"is no address such as 127\.0\.0\.1:7100$"):
         Address.parse(text)

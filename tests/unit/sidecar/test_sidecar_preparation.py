@@ -8,6 +8,7 @@ from palaestra_sim.sidecar import preparation
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.world import RunIdentity, builtin, ros_name
 
+ARENA = builtin("arena")
 IDENTITY = RunIdentity(job="move-to-target", replica=0, group="collect", index=1)
 NEIGHBOURS = b"""#VRML_SIM R2023b utf8
 EXTERNPROTO "../protos/Box.proto"
@@ -20,7 +21,7 @@ Shape { appearance Appearance { texture ImageTexture { url [ "textures/a.png" ] 
 def source(tmp_path):
     """Return how to put a source world into a project folder."""
 
-    def make(content=builtin("arena")):
+    def make(content=ARENA):
         world = tmp_path / "project" / "worlds" / "arena.wbt"
         world.parent.mkdir(parents=True)
         world.write_bytes(content)
@@ -37,7 +38,7 @@ def test_a_world_gets_its_own_names_and_its_own_place(source, tmp_path) -> None:
 
     assert named == tmp_path / "new" / "work" / "collect-1.wbt"
     assert ros_name(IDENTITY, "robotino").encode() in named.read_bytes()
-    assert world.read_bytes() == builtin("arena")
+    assert world.read_bytes() == ARENA
 
 
 def test_a_world_that_has_its_names_is_written_as_it_is(source, tmp_path) -> None:

@@ -1,14 +1,13 @@
-"""A ROS without sockets: nodes whose services are called by path, as a client would, and topics that keep what was sent.
+"""A ROS without sockets: services called by path, as a client would, and topics that keep what was sent.
 
-Requests and responses go through the real message types, so a field that the type does not have is an error here too.
+Requests and responses go through the real message types, so a field that the type does not have is an
+error here too.
 """
 
 import heapq
 import itertools
 import math
 from collections import deque
-from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -33,12 +32,15 @@ class FakePublisher:
 
     @property
     def subscribers(self):
+        """How many inboxes there are."""
         return len(self.topic.inboxes)
 
     def send(self, fields):
+        """Keep the template with these fields."""
         self.topic.deliver({**self.template, **fields})
 
     def send_value(self, value):
+        """Keep the value alone."""
         self.topic.deliver(value)
 
 
@@ -50,6 +52,7 @@ class FakeTopic:
         self.inboxes = []
 
     def deliver(self, message):
+        """Put a message into every inbox."""
         for inbox in self.inboxes:
             inbox.append(message)
 
@@ -69,27 +72,33 @@ class FakeNode:
         self._calls = itertools.count()
 
     def serve(self, path, type_name, handler):
+        """Take a service, once."""
         assert path not in self.services, f"{path} served twice"
         self.services[path] = (service_type(type_name), handler)
 
     def advertise(self, path, type_name, *, latched=False, template=None):
+        """Return a publisher that keeps what it sends."""
         topic = self._ros.topic(path if path.startswith("/") else f"/{self.name}/{path}")
         publisher = FakePublisher(topic, type_name, dict(template or {}), latched)
         topic.publishers.append(publisher)
         return publisher
 
     def withdraw(self, publisher):
+        """Forget a publisher."""
         publisher.topic.publishers.remove(publisher)
 
     def answer(self, call, fields):
+        """Answer a call that was put off, then what waited behind it."""
         number, type_ = call
         self.answers[number] = _travelled(type_.response, fields)
         self.later(0, self._take_waiting)
 
     def later(self, delay_s, callback):
+        """Call back when `advance` has come that far."""
         self._ros.later(delay_s, callback)
 
     def close(self):
+        """Serve no more."""
         self.closed = True
         self.services.clear()
 
@@ -103,7 +112,7 @@ class FakeNode:
         return number
 
     def call(self, path, **fields):
-        """Call a service as a client does, with what happens right after the answer; PENDING if none comes."""
+        """Call a service, and let happen what does right after the answer; PENDING if none comes."""
         number = self.ask(path, **fields)
         self._ros.advance(0)
         answer = self.answers.get(number, PENDING)
@@ -124,6 +133,7 @@ class FakeNode:
         return messages
 
     def publishers(self, path):
+        """Return who publishes a topic below this node's name."""
         return self._ros.topic(f"/{self.name}/{path}").publishers
 
     def _handle(self, number, path, fields):
@@ -153,6 +163,7 @@ class FakeRos:
         self._order = itertools.count()
 
     def make_node(self, name):
+        """Return a new node."""
         node = FakeNode(self, name)
         self.nodes.append(node)
         return node
@@ -162,12 +173,15 @@ class FakeRos:
         return [it for it in self.nodes if it.name == name][-1]
 
     def topic(self, name):
+        """Return a topic by its global name."""
         return self._topics.setdefault(name, FakeTopic())
 
     def clock(self):
+        """Return the time in seconds."""
         return self.now_s
 
     def later(self, delay_s, callback):
+        """Call back when `advance` has come that far."""
         heapq.heappush(self._timers, (self.now_s + delay_s, next(self._order), callback))
 
     def advance(self, duration_s):
@@ -203,9 +217,7 @@ def start(ros, tmp_path):
         path = tmp_path / "worlds" / "arena.wbt"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(builtin("arena") if world is None else world)
-        simulator = Simulator(
-            path, ros.make_node, options=StubOptions(**options), mode=mode, clock=ros.clock
-        )
+        simulator = Simulator(path, ros.make_node, options=StubOptions(**options), mode=mode, clock=ros.clock)
         simulator.start()
         return simulator
 
@@ -290,9 +302,3 @@ ROBOT = f"""DEF ROBOTINO Robot {{
 def simple_robot():
     """The text of a robot of radius 0.2 m with one noiseless ray that tells 1 - distance."""
     return ROBOT
-
-
-@pytest.fixture
-def namespace():
-    """`namespace(**fields)`: an object with attributes."""
-    return SimpleNamespace

@@ -25,6 +25,7 @@ poses = st.builds(Pose, vectors, matrices)
 
 
 def close(values, tolerance=1e-9):
+    """Equal but for rounding."""
     return pytest.approx(values, abs=tolerance)
 
 

@@ -1,5 +1,6 @@
 """Motors: how commands are taken, over ROS and directly."""
 
+import itertools
 import math
 
 import pytest
@@ -118,7 +119,7 @@ def test_in_position_control_the_shaft_turns_to_its_target_and_stays(robot):
     for _ in range(100):
         robot.call("robot/time_step", value=32)
 
-    assert max(b - a for a, b in zip(sensor, sensor[1:], strict=False)) <= 2.0 * 0.032 + 1e-9
+    assert max(b - a for a, b in itertools.pairwise(sensor)) <= 2.0 * 0.032 + 1e-9
     assert sensor[-1] == pytest.approx(1.0, abs=1e-3)
 
 

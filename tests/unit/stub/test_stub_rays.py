@@ -14,6 +14,7 @@ ROWS = [(0.1, 3.0, 0.0), (0.2, 2.0, 0.0), (0.4, 1.0, 0.0)]
 
 
 def silent(_mean, _deviation):
+    """A source of noise that must not be asked."""
     raise AssertionError("a sensor without noise drew some")
 
 

@@ -280,7 +280,8 @@ def test_the_clock_tells_simulated_time(robot):
     assert inbox[-1] == {"clock": {"secs": 1, "nsecs": 280_000_000}}
 
 
-def test_only_a_robot_with_the_argument_publishes_the_clock(ros, two_robots):
+@pytest.mark.usefixtures("two_robots")
+def test_only_a_robot_with_the_argument_publishes_the_clock(ros):
     """At most one on a master."""
     assert len(ros.topic("/clock").publishers) == 1
 
@@ -290,7 +291,9 @@ def test_auto_publish_enables_every_sensor(ros, start, world, simple_robot):
     start(world(robot=simple_robot.replace('"--synchronize"', '"--synchronize" "--auto-publish"')))
     robot = ros.node("robotino")
 
-    periods = [robot.get(f"{name}/get_sampling_period") for name in ("ir1", "touch_sensor", "wheel2_joint_sensor")]
+    periods = [
+        robot.get(f"{name}/get_sampling_period") for name in ("ir1", "touch_sensor", "wheel2_joint_sensor")
+    ]
 
     assert periods == [32, 32, 32]
 

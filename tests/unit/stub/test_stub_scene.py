@@ -11,6 +11,7 @@ from palaestra_sim.world import builtin, parse
 
 
 def scene_of(source):
+    """The scene of a world file."""
     return read_scene(parse(source), "my.wbt")
 
 
@@ -38,9 +39,7 @@ def test_rays_sit_on_the_rim_and_count_counter_clockwise():
     """ir1 is the front, ir2 at 40 degrees."""
     (robot,) = scene_of(builtin("arena")).robots
 
-    azimuths = [
-        math.degrees(math.atan2(it.ray[3], it.ray[2])) for it in robot.devices.of_distance()
-    ]
+    azimuths = [math.degrees(math.atan2(it.ray[3], it.ray[2])) for it in robot.devices.of_distance()]
 
     assert azimuths == pytest.approx([0, 40, 80, 120, 160, -160, -120, -80, -40], abs=0.1)
 
@@ -186,12 +185,18 @@ BAD_ROBOTS = {
         "centred on the robot's origin",
     ),
     "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
-    "a ray that looks down": (("DEF IR DistanceSensor {", "DistanceSensor { rotation 0 1 0 0.5"), "looks up or down"),
+    "a ray that looks down": (
+        ("DEF IR DistanceSensor {", "DistanceSensor { rotation 0 1 0 0.5"),
+        "looks up or down",
+    ),
     "many rays": (('name "ir1"', 'name "ir1" numberOfRays 5'), "a distance sensor of several rays"),
     "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "no distance sensor is of type 'radar'"),
     "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable is not rows of three numbers"),
     "an unsorted table": (("[ 0 1 0,", "[ 2 1 0,"), "the distances of lookupTable do not grow"),
-    "a force sensor": (('"touch sensor"', '"touch sensor" type "force"'), "a touch sensor that measures force"),
+    "a force sensor": (
+        ('"touch sensor"', '"touch sensor" type "force"'),
+        "a touch sensor that measures force",
+    ),
     "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
     "a brake": (("PositionSensor {", "Brake { } PositionSensor {"), "the stub simulates no Brake"),
 }
@@ -211,6 +216,60 @@ def test_a_robot_with_a_body_inside_a_pose_is_refused(world, simple_robot):
     """Its translation would be in another frame than the floor's."""
     with pytest.raises(WorldError, match="put it at the top level"):
         scene_of(world(robot=f"Pose {{ translation 1 0 0 children [ {simple_robot} ] }}"))
+
+
+def test_a_robot_may_have_its_parts_in_groups_and_its_table_from_the_default(world, simple_robot):
+    """What a world leaves out is as Webots has it: 0 to 1000 over 10 cm."""
+    part = 'Group { children [ DistanceSensor { translation 0.2 0 0.05 name "near" } ] }'
+    wall = 'Solid { translation 0.3 0 0.15 name "wall" boundingObject Box { size 0.1 4 0.3 } }'
+    simulation = Simulation.load(world(wall, robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
+    simulation.robots[0].body.place(0.0, 0.0, 0.0)
+
+    simulation.step(32)
+
+    assert simulation.robots[0].sensors["near"].value == pytest.approx(500.0)
+
+
+def test_a_robot_without_a_body_may_have_rays(world):
+    """A light barrier: it stands where the file has it, turned as the file has it."""
+    barrier = """Robot { name "barrier" translation 0 1 0 rotation 0 0 1 -1.5707963 children [
+      DistanceSensor { translation 0 0 0.1 name "beam" lookupTable [ 0 0 0, 5 5 0 ] } ] }"""
+    simulation = Simulation.load(world(robot=barrier))
+    simulation.step(32)
+    assert simulation.robots[0].sensors["beam"].value == pytest.approx(5.0)
+
+    post = "Solid { translation 0 0 0.1 boundingObject Cylinder { radius 0.2 height 0.2 } }"
+    simulation = Simulation.load(world(post, robot=barrier))
+    simulation.step(32)
+
+    assert simulation.robots[0].sensors["beam"].value == pytest.approx(0.8)
+
+
+def test_a_joint_without_a_motor_stays_where_it_is(world, simple_robot):
+    """Its sensor tells 0."""
+    joint = 'HingeJoint { device [ PositionSensor { name "hinge" } ] }'
+    simulation = Simulation.load(world(robot=simple_robot.replace("DEF IR", f"{joint} DEF IR")))
+
+    simulation.step(32)
+
+    assert simulation.robots[0].sensors["hinge"].value == 0.0
+
+
+def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
+    """Steps of `resolution`, after noise in rad has been added."""
+    coarse = simple_robot.replace(
+        'PositionSensor { name "wheel0_joint_sensor" }',
+        'PositionSensor { name "wheel0_joint_sensor" resolution 0.25 noise 0.5 }',
+    )
+    simulation = Simulation.load(world(robot=coarse))
+    values = set()
+
+    for _ in range(50):
+        simulation.step(32)
+        values.add(simulation.robots[0].sensors["wheel0_joint_sensor"].value)
+
+    assert len(values) > 3
+    assert all(value % 0.25 == 0.0 for value in values)
 
 
 @pytest.mark.parametrize("step", ["0.5", "32.5", "0", "-32"])

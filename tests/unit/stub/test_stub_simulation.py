@@ -1,10 +1,8 @@
 """The simulation without ROS: as an experiment drives it, and what a reset restores."""
 
 import math
-import os
 import subprocess
 import sys
-import time
 
 import pytest
 from hypothesis import given
@@ -249,26 +247,18 @@ def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
     assert simulation.time_ms == 320
 
 
-def test_it_is_small_and_starts_fast():
+def test_it_is_small():
     """Many run on one machine: the whole stub below 120 MB, and this part of it far below."""
     program = (
-        "import resource, sys; from palaestra_sim.stub.simulation import Simulation;"
+        "import pathlib, sys; from palaestra_sim.stub.simulation import Simulation;"
         "from palaestra_sim.world import builtin;"
         "Simulation.load(builtin('arena')).step(192);"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, 'numpy' in sys.modules)"
+        "status = pathlib.Path('/proc/self/status').read_text();"
+        "print(status.split('VmHWM:')[1].split()[0], 'numpy' in sys.modules)"
     )
-    answer = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60, env=os.environ
-    )
-    megabytes, has_numpy = answer.stdout.split()
+    command = [sys.executable, "-c", program]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    kilobytes, has_numpy = answer.stdout.split()
 
-    assert int(megabytes) < 60
+    assert int(kilobytes) < 40_000
     assert has_numpy == "False"
-
-
-def test_a_thousand_steps_are_no_wait(simulation):
-    """120 us a step is the aim and 35 us usual; this only notices a factor of twenty."""
-    begun_s = time.perf_counter()
-    run(simulation, 1000)
-
-    assert time.perf_counter() - begun_s < 2.0

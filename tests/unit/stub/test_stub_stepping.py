@@ -95,7 +95,7 @@ def test_the_world_waits_until_all_synchronised_robots_asked(two_robots, ros):
     assert supervisor.get("robot/get_time") == pytest.approx(0.192)
 
 
-def test_steps_of_different_length_are_served_piece_by_piece(two_robots, ros):
+def test_steps_of_different_length_are_served_piece_by_piece(two_robots):
     """Six short steps of one robot make one long step of the other."""
     supervisor, robotino = two_robots
     long = supervisor.ask("robot/time_step", value=192)
@@ -176,9 +176,7 @@ def test_modes_are_those_since_r2021a(robot, mode, known):
 
 
 @given(
-    orders=st.lists(
-        st.tuples(st.integers(0, 1), st.sampled_from([32, 64, 96, 192])), min_size=1, max_size=30
-    )
+    orders=st.lists(st.tuples(st.integers(0, 1), st.sampled_from([32, 64, 96, 192])), min_size=1, max_size=30)
 )
 def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
     """The world's time is the smallest of what the robots have asked for in total."""

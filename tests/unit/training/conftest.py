@@ -26,6 +26,7 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
     action_space = spaces.Discrete(2)
+    step_reward = -0.1
 
     def __init__(self, member: FakeMember) -> None:
         self._member = member
@@ -48,7 +49,7 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
         self._steps += 1
         self._position += 1 if np.asarray(action).item() > 0.5 else -1
         reached = self._position >= GOAL
-        reward = 1.0 if reached else -0.1
+        reward = 1.0 if reached else self.step_reward
         return (
             self._observe(),
             reward,

@@ -98,7 +98,7 @@ def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
 
 def test_an_unknown_algorithm_is_told_with_the_nearest_name():
     """The operator checks it too, but a person may write the file."""
-    with pytest.raises(ConfigurationError, match="algorithm.name: DQM .* did you mean DQN"):
+    with pytest.raises(ConfigurationError, match=r"algorithm.name: DQM .* did you mean DQN"):
         check(Algorithm(name="DQM"))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import io
 
 import pytest
-from palaestra_sim.protocol.status import SimulatorStatus, TrainerStatus
 from structlog.testing import capture_logs
 
+from palaestra_sim.protocol.status import SimulatorStatus, TrainerStatus
 from palaestra_trainer.display import Bar, Lines, for_stream
 
 STATUS = TrainerStatus(

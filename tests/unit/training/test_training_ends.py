@@ -10,8 +10,8 @@ import sys
 import threading
 
 import pytest
-from palaestra_sim.protocol.status import ExitCode, Termination
 
+from palaestra_sim.protocol.status import ExitCode, Termination
 from palaestra_trainer.errors import (
     ConfigurationError,
     FaultBudgetSpent,
@@ -87,9 +87,12 @@ def test_a_signal_is_noted_and_raised_at_the_next_check():
 
 def test_while_there_is_nothing_to_save_a_signal_is_raised_at_once():
     """Starting simulators takes up to a minute."""
-    with Interruption() as interruption, pytest.raises(Interrupted), interruption.at_once():
-        os.kill(os.getpid(), signal.SIGINT)
-        threading.Event().wait(10.0)
+    never = threading.Event()
+
+    with Interruption() as interruption, interruption.at_once():
+        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(Interrupted):
+            never.wait(10.0)
 
 
 def test_whoever_listened_before_listens_again():

@@ -12,9 +12,10 @@ from palaestra_trainer.simulators.member import Care, Keeper
 class Walker:
     """Walks right where the seed's last digit is even, left elsewhere."""
 
-    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+    def predict(self, observation, state=None, episode_start=None, *, deterministic=False):
         """Choose."""
         assert deterministic
+        assert episode_start is None
         return int(round(float(observation[1]) * 10) % 2 == 0), state
 
 

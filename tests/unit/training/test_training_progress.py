@@ -7,8 +7,8 @@ import urllib.error
 import urllib.request
 
 import pytest
-from palaestra_sim.protocol.status import TrainerStatus
 
+from palaestra_sim.protocol.status import TrainerStatus
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.evaluation import Episode, Evaluation
 from palaestra_trainer.progress import Counters, Progress

@@ -1,0 +1,1 @@
+"""What runs in the trainer's container, and in a notebook."""

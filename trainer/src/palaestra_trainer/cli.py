@@ -46,7 +46,8 @@ EVAL = f"""\
 Measure the model.zip of a run directory on episodes with seeds of a stream of their own.
 
 reads:
-  RUN_DIR/model.zip, RUN_DIR/training.yaml, and the simulators of {CONFIG_VARIABLE}
+  RUN_DIR/model.zip, RUN_DIR/training.yaml; the simulators of {CONFIG_VARIABLE}, or without it
+  processes that load the worlds in RUN_DIR
 writes:
   one JSON object to standard output
 """
@@ -102,13 +103,15 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
 
 def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     directory = RunDirectory(folder)
-    here = load()
-    trained = load(directory.configuration) if directory.configuration.exists() else here
-    configuration = trained.model_copy(update={"simulators": here.simulators})
+    configuration = load(directory.configuration)
+    in_pod = CONFIG_VARIABLE in os.environ
+    if in_pod:
+        configuration = configuration.model_copy(update={"simulators": load().simulators})
     from palaestra_trainer.measuring import measure  # noqa: PLC0415 - see train()
-    from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
+    from palaestra_trainer.simulators.connect import connect, connect_here  # noqa: PLC0415
 
-    return measure(configuration, directory.model, connect, episodes=episodes, stream=stream)
+    members = connect if in_pod else connect_here
+    return measure(configuration, directory.model, members, episodes=episodes, stream=stream)
 
 
 def _parser(name: str, description: str) -> argparse.ArgumentParser:

@@ -219,7 +219,7 @@ def _mistakes(error: ValidationError) -> Iterator[str]:
             case "extra_forbidden":
                 yield f"{field}: is not a known field; {_nearest_field(mistake)}"
             case "value_error" if not mistake["loc"]:
-                yield str(mistake["ctx"]["error"])
+                yield mistake["msg"].removeprefix("Value error, ")
             case _:
                 yield f"{field}: {mistake['input']!r} is refused; {mistake['msg']}"
 

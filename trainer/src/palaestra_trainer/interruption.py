@@ -7,6 +7,7 @@ it is. A second signal ends the process at once.
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from typing import Any, Self
 from palaestra_trainer.errors import TrainerError
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
+HURRY = "a second signal ends at once"
 
 
 class Interrupted(TrainerError):
@@ -69,5 +71,7 @@ class Interruption:
         self.requested = signal.Signals(number)
         for later in SIGNALS:
             signal.signal(later, signal.SIG_DFL)
+        # Not by a logger: this may run amid another line of it.
+        os.write(2, f"{self.requested.name}: ending with a checkpoint; {HURRY}\n".encode())
         if self._at_once:
             self.check()

@@ -16,7 +16,6 @@ from statistics import fmean
 from typing import Any
 
 from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
-
 from palaestra_trainer.configuration import Role
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.evaluation import Evaluation
@@ -60,8 +59,9 @@ class Counters:
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Counters:
         """Return the counters that `to_json` wrote."""
-        known = {name: content[name] for name in cls.__slots__ if name in content}
-        return cls(**known | {"faults": Counter(known.get("faults", {}))})
+        known: dict[str, Any] = {name: content[name] for name in cls.__slots__ if name in content}
+        known["faults"] = Counter(known.get("faults", {}))
+        return cls(**known)
 
 
 class Progress:

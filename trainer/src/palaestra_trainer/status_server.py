@@ -8,7 +8,7 @@ import threading
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from types import TracebackType
-from typing import Self
+from typing import Self, cast
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
@@ -76,15 +76,15 @@ class _Server(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: _Server
     timeout = READ_DEADLINE_S
 
     def do_GET(self) -> None:
+        server = cast("_Server", self.server)
         match self.path:
             case "/status":
-                self._answer("application/json", json.dumps(self.server.progress.status().to_json()))
+                self._answer("application/json", json.dumps(server.progress.status().to_json()))
             case "/metrics":
-                text = generate_latest(self.server.registry).decode()
+                text = generate_latest(server.registry).decode()
                 self._answer(CONTENT_TYPE_PLAIN_0_0_4, text)
             case "/healthz":
                 self._answer("text/plain", "ok\n")

@@ -50,11 +50,11 @@ def structural(schema: Schema, definitions: dict[str, Schema]) -> Schema:
 
 
 def _whole(schema: Schema, definitions: dict[str, Schema]) -> Schema:
-    """Return `schema` without `$ref` and without `or null`; and all that is said of it."""
+    """Return `schema` without `$ref` and without `or null`, with all that is said of it."""
     here = {key: value for key, value in schema.items() if key not in {"$ref", "anyOf"}}
-    for choice in schema.get("anyOf", ()):
-        if choice != {"type": "null"}:
-            return _whole(choice | here, definitions)
+    if "anyOf" in schema:
+        (choice,) = (choice for choice in schema["anyOf"] if choice != {"type": "null"})
+        return _whole(choice | here, definitions)
     if "$ref" not in schema:
         return here
     there = definitions[schema["$ref"].removeprefix("#/$defs/")]
@@ -93,7 +93,7 @@ def freeze(schema: Schema) -> None:
         if inner.get(MAY_CHANGE):
             continue
         if _has_what_may_change(inner):
-            _freeze_below(inner)
+            _freeze_items(inner)
         elif "default" in inner or name in schema.get("required", ()):
             _add(inner, {"rule": "self == oldSelf", "message": FROZEN})
         else:
@@ -104,10 +104,7 @@ def freeze(schema: Schema) -> None:
             _add(schema, {"rule": rule, "message": FROZEN, "fieldPath": f".{name}"})
 
 
-def _freeze_below(inner: Schema) -> None:
-    if inner["type"] == "object":
-        freeze(inner)
-        return
+def _freeze_items(inner: Schema) -> None:
     freeze(inner["items"])  # the API server finds an item's old self by its name
     same_names = "size(self) == size(oldSelf) && self.all(item, oldSelf.exists(old, old.name == item.name))"
     _add(inner, {"rule": same_names, "message": FROZEN})

@@ -47,8 +47,11 @@ class Outcome:
             return None
 
 
-def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
-    """Return the lines that a person reads at the end."""
+def summary(outcome: Outcome, run_directory: Path, evaluate: str) -> tuple[str, ...]:
+    """Return the lines that a person reads at the end; `evaluate` is a command to type.
+
+    What nobody measured is left out: a program of the user's own need not measure anything.
+    """
     facts = {
         "success rate": _shown(outcome.success_rate, "{:.0%}"),
         "steps": _shown(outcome.steps, "{:,}"),
@@ -56,10 +59,10 @@ def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
         "faults": _shown(outcome.faults, "{}"),
         "run directory": str(run_directory),
         "look at it": f"tensorboard --logdir {run_directory / 'tensorboard'}",
-        "try the policy": f"palaestra-eval {run_directory}",
+        "try the policy": evaluate if (run_directory / "model.zip").exists() else "",
     }
-    return tuple(f"  {name:<18}{value}" for name, value in facts.items())
+    return tuple(f"  {name:<18}{value}" for name, value in facts.items() if value)
 
 
 def _shown(value: float | None, form: str) -> str:
-    return "not measured" if value is None else form.format(value)
+    return "" if value is None else form.format(value)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from palaestra.local.errors import StorageFailed
-from palaestra.local.terminal import as_seen, open_like, resize
+from palaestra.local.terminal import RESTORED, as_seen, open_like, resize
 
 Show = Callable[[str], None]
 KEPT_LINES = 20  # what a person needs to see why a program ended, without opening a file
@@ -81,7 +81,7 @@ class Log:
             data = b""
         if terminal is not None:
             resize(reader, terminal)  # the person may have changed the window since
-            os.write(terminal, data)
+            os.write(terminal, data or RESTORED)
         *lines, rest = (self._rest + data).split(b"\n")
         if not data and rest:
             lines, rest = [rest], b""

@@ -10,8 +10,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from palaestra_sim.protocol.status import ExitCode
-
 from palaestra.api import TrainingJob
 from palaestra.api.loading import as_data
 from palaestra.local import preflight, rundir
@@ -21,14 +19,16 @@ from palaestra.local.output import say
 from palaestra.local.ports import HeldPorts
 from palaestra.local.replica import KILLED, Setting, meaning, run_replica
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
+from palaestra_sim.protocol.status import ExitCode
 
 SHOWN_LINES = 5  # of the trainer's log, when it failed without a last word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What a person chose on the command line."""
+    """What a person chose on the command line; `file` is the job's, to be named in advice."""
 
+    file: Path
     runs: Path
     version: str
     replica: int | None = None
@@ -48,14 +48,40 @@ def run(job: TrainingJob, options: Options) -> int:
     directory = rundir.job_directory(options.runs, job.metadata.name)
     job = identified(job, rundir.uid_of(directory))
     chosen = _chosen(job, options.replica)
-    plan(job, LocalLayout(images=Images.of_release(options.version), job_directory=str(directory)))
-    preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
+    check(job, directory, options)
     codes = []
     for replica in chosen:
         codes.append(_run_one(job, directory / str(replica), replica, options))
         if codes[-1] in (ExitCode.INTERRUPTED, KILLED):
             break
     return next((code for code in codes if code), 0)
+
+
+def check(job: TrainingJob, directory: Path, options: Options) -> None:
+    """Find what can be known to be wrong before anything is started; raises as `run` does."""
+    plan(job, layout(directory, options, Ports()))
+    preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
+
+
+def layout(directory: Path, options: Options, ports: Ports) -> LocalLayout:
+    """Return the layout of a job whose runs lie in `directory`."""
+    images = Images.of_release(options.version)
+    return LocalLayout(images=images, job_directory=str(directory), ports=ports)
+
+
+def chosen_ports(held: HeldPorts, job: TrainingJob, options: Options) -> Ports:
+    """Return free ports for one replica, all chosen before the first is used.
+
+    Raises:
+        Refused: the port that the person chose is in use.
+    """
+    simulators = sum(group.count for group in job.spec.simulators)
+    return Ports(
+        ros_master=held.any() if options.ros_port is None else held.this(options.ros_port),
+        status=held.any(),
+        control=tuple(held.any() for _ in range(simulators)),
+        health=tuple(held.any() for _ in range(simulators)),
+    )
 
 
 def _chosen(job: TrainingJob, replica: int | None) -> range:
@@ -72,30 +98,18 @@ def _chosen(job: TrainingJob, replica: int | None) -> range:
 def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> int:
     record = {field: value for field, value in as_data(job).items() if field != "status"}
     with rundir.locked(path), HeldPorts() as held:
-        ports = _ports(held, job, options)
+        ports = chosen_ports(held, job, options)
         if options.fresh and (aside := rundir.set_aside(path)):
             say(f"{path}: the run that was there is now {aside}")
         rundir.refuse_another_job(path, record)
         before = Outcome.of(path)
         if before is not None and before.finished:
-            say(f"{job.metadata.name}, replica {replica}: finished already; --fresh begins anew")
-            _tell(before, path)
+            say(f"{job.metadata.name}-{replica}: finished already; --fresh begins anew")
+            _tell(before, path, options)
             return 0
-        layout = LocalLayout(
-            images=Images.of_release(options.version), job_directory=str(path.parent), ports=ports
-        )
         rundir.prepare(path, record)
-        return _trained(plan(job, layout).replicas[replica], path, ports, options)
-
-
-def _ports(held: HeldPorts, job: TrainingJob, options: Options) -> Ports:
-    simulators = sum(group.count for group in job.spec.simulators)
-    return Ports(
-        ros_master=held.any() if options.ros_port is None else held.this(options.ros_port),
-        status=held.any(),
-        control=tuple(held.any() for _ in range(simulators)),
-        health=tuple(held.any() for _ in range(simulators)),
-    )
+        planned = plan(job, layout(path.parent, options, ports)).replicas[replica]
+        return _trained(planned, path, ports, options)
 
 
 def _trained(planned: ReplicaPlan, path: Path, ports: Ports, options: Options) -> int:
@@ -109,18 +123,20 @@ def _trained(planned: ReplicaPlan, path: Path, ports: Ports, options: Options) -
     )
     outcome = asyncio.run(run_replica(planned, setting))
     outcome.keep(path)
-    _tell(outcome, path)
+    _tell(outcome, path, options)
     return outcome.exit_code
 
 
-def _tell(outcome: Outcome, path: Path) -> None:
+def _tell(outcome: Outcome, path: Path, options: Options) -> None:
     if outcome.exit_code == ExitCode.INTERRUPTED:
         say(f"interrupted at step {outcome.steps or 0}; the same command goes on from there")
     elif outcome.exit_code == KILLED:
         say("killed; the same command goes on from the newest checkpoint")
     elif not outcome.finished:
         log = path / "logs" / "trainer.log"
-        said = outcome.reason or "\n".join(log.read_text(errors="replace").splitlines()[-SHOWN_LINES:])
+        last = log.read_text(errors="replace").splitlines()[-SHOWN_LINES:]
+        said = outcome.reason or "\n".join(last)
         say(f"failed: the trainer ended with {meaning(outcome.exit_code)}: {said}; more in {log}")
-    for line in summary(outcome, path):
+    place = "" if options.runs == Path("runs") else f" --dir {options.runs}"
+    for line in summary(outcome, path, f"palaestra eval {options.file}{place}"):
         say(line)

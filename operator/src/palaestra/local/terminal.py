@@ -13,6 +13,7 @@ import termios
 import tty
 
 _CONTROL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|[@-_])")
+RESTORED = b"\x1b[0m\x1b[?25h"  # no colour, and a cursor: a killed program leaves neither behind
 _NO_SIZE = struct.pack("HHHH", 24, 80, 0, 0)
 
 

@@ -9,10 +9,11 @@ Messages of fixed-size numbers alone (every motor command and step) skip genpy f
 
 from __future__ import annotations
 
+import collections
 import io
 import keyword
 import struct
-from collections import namedtuple
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib import resources
 from types import SimpleNamespace
@@ -157,8 +158,7 @@ class _StructCodec:
         self._struct = struct.Struct("<" + "".join(_STRUCT_CODES[type_] for type_ in spec.types))
         # As in genpy: a field called `from` is an attribute called `from_`.
         self._names = tuple(name + "_" * keyword.iskeyword(name) for name in spec.names)
-        made: Any = namedtuple(spec.short_name, self._names)  # noqa: PYI024 - made at run time
-        self._make = made._make
+        self._make = _record(spec.short_name, self._names)
 
     def encode(self, fields: dict[str, Any]) -> bytes:
         return self._struct.pack(*[fields.get(name, 0) for name in self._names])
@@ -168,6 +168,12 @@ class _StructCodec:
             return self._make(self._struct.unpack(payload))
         except struct.error as error:
             raise ValueError(f"{len(payload)} bytes for {self._struct.size}") from error
+
+
+def _record(name: str, fields: tuple[str, ...]) -> Callable[[Iterable[Any]], Any]:
+    """Return what makes a tuple with these attributes."""
+    record: Any = collections.namedtuple(name, fields)  # type: ignore[misc]  # noqa: PYI024 - a run-time name
+    return record._make
 
 
 class _GenpyCodec:

@@ -6,6 +6,7 @@ import logging
 import os
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
@@ -65,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     reap_always()
     control.serve(control_routes(simulator))
     health.serve(health_routes(simulator, metrics.registry(simulator)))
+    if given.until_stdin_closes:
+        threading.Thread(target=end_with_stdin, daemon=True).start()
     log.info("control=%s health=%s", control.address, health.address)
     simulator.run()
     return 0
@@ -81,7 +84,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     simulator = parser.add_argument_group("the simulator")
     simulator.add_argument("--driver", choices=[driver.value for driver in Driver], required=True)
-    simulator.add_argument("--world", type=Path, required=True, metavar="FILE")
+    simulator.add_argument(
+        "--world", type=preparation.located, required=True, metavar="WORLD", help="a file, or one that ships"
+    )
     simulator.add_argument(
         "--option", action="append", default=[], metavar="X", help="for the simulator; repeatable"
     )
@@ -89,8 +94,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "program", nargs="*", help="for driver command, behind --; {world} stands for the world's path"
     )
     listeners = parser.add_argument_group("listeners (port 0: any that is free)")
-    listeners.add_argument("--control", type=Address.parse, default="127.0.0.1:7100", metavar="HOST:PORT")
-    listeners.add_argument("--health", type=Address.parse, default="0.0.0.0:7200", metavar="HOST:PORT")
+    listeners.add_argument("--control", type=_address, default="127.0.0.1:7100", metavar="HOST:PORT")
+    listeners.add_argument("--health", type=_address, default="0.0.0.0:7200", metavar="HOST:PORT")
+    listeners.add_argument(
+        "--until-stdin-closes", action="store_true", help="end too when standard input does"
+    )
     identity = parser.add_argument_group("ROS names (without --job the world runs as it is)")
     identity.add_argument("--job", metavar="NAME")
     identity.add_argument("--namespace", default="default", metavar="NAME")
@@ -143,6 +151,13 @@ def reap_always() -> None:
     signal.signal(signal.SIGCHLD, lambda *_: reap())
 
 
+def end_with_stdin() -> None:
+    """End, as by SIGTERM, when standard input does: whoever held its other end is gone."""
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
 def log_to_stdout() -> None:
     """Send the log where the simulator's output goes."""
     logging.basicConfig(level=logging.INFO, handlers=[LineHandler()])
@@ -151,8 +166,8 @@ def log_to_stdout() -> None:
 def _address(text: str) -> Address:
     try:
         return Address.parse(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no address such as 127.0.0.1:7100") from None
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error  # argparse drops other messages
 
 
 def _world(given: argparse.Namespace) -> Path:

@@ -10,9 +10,16 @@ from pathlib import Path
 from palaestra_sim.errors import WorldError
 from palaestra_sim.protocol.control import RobotName
 from palaestra_sim.sidecar.errors import SidecarError
-from palaestra_sim.world import RunIdentity, generate, robots
+from palaestra_sim.world import RunIdentity, builtin_path, generate, robots
 
 _PROJECT = "project"
+
+
+def located(world: str) -> Path:
+    """Return the path of a world: a file, or else the one that ships under that name."""
+    path = Path(world)
+    shipped = builtin_path(world) if path.name == world and not path.exists() else None
+    return shipped or path
 
 
 def read(world: Path) -> bytes:

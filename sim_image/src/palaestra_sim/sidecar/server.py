@@ -45,10 +45,13 @@ class Address:
         """
         host, _, port = text.rpartition(":")
         bare = host.removeprefix("[").removesuffix("]")
-        ipaddress.ip_address(bare)
-        if not port.isascii() or not port.isdecimal() or int(port) > _MOST_PORT:
-            raise ValueError(port)
-        return cls(host=bare, port=int(port))
+        try:
+            ipaddress.ip_address(bare)
+            if 0 <= int(port) <= _MOST_PORT:
+                return cls(host=bare, port=int(port))
+        except ValueError:
+            pass
+        raise ValueError(f"{text!r} is no address such as 127.0.0.1:7100")
 
     def __str__(self) -> str:
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"

@@ -147,7 +147,7 @@ class SceneTree:
         """Return the first node with a DEF name; dots lead inside, as in "ROBOT.ARM"."""
         found: SceneNode | None = self.root
         for name in path.split("."):
-            if found is None:
+            if found is None or not name:
                 return None
             found = next((it for it in found.descendants() if it.def_name == name), None)
         return found

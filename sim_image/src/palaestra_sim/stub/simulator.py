@@ -140,8 +140,9 @@ class Simulator:
         self.start()
 
     def _restart(self, robot: Robot) -> None:
-        name = self._arguments[robot].name
-        self.controllers.pop(name).close()
+        controller = self.controllers.pop(self._arguments[robot].name, None)
+        if controller is not None:
+            controller.close()
         self._start_controller(robot)
 
     def _end(self) -> None:

@@ -10,7 +10,7 @@ Pure: bytes in, bytes out. No clock, no network, no file but the worlds that shi
 """
 
 from palaestra_sim.errors import UnknownWorldError, WorldError
-from palaestra_sim.world.builtin import builtin
+from palaestra_sim.world.builtin import builtin, builtin_path
 from palaestra_sim.world.generate import generate
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.reader import parse
@@ -27,6 +27,7 @@ __all__ = [
     "WorldError",
     "WorldRobot",
     "builtin",
+    "builtin_path",
     "generate",
     "name_prefix",
     "parse",

@@ -1,8 +1,10 @@
 """The worlds that ship, by name."""
 
-from importlib.resources import files
+from pathlib import Path
 
 from palaestra_sim.errors import UnknownWorldError
+
+_WORLDS = Path(__file__).parent.parent / "worlds"
 
 
 def builtin(name: str) -> bytes:
@@ -11,12 +13,17 @@ def builtin(name: str) -> bytes:
     Raises:
         UnknownWorldError: there is none of that name; the message names those there are.
     """
-    worlds = {
-        entry.name.removesuffix(".wbt"): entry
-        for entry in files("palaestra_sim").joinpath("worlds").iterdir()
-        if entry.name.endswith(".wbt")
-    }
-    if name not in worlds:
-        known = ", ".join(sorted(worlds))
+    path = builtin_path(name)
+    if path is None:
+        known = ", ".join(sorted(_shipped()))
         raise UnknownWorldError(f'no world "{name}" ships; choose one of {known}')
-    return worlds[name].read_bytes()
+    return path.read_bytes()
+
+
+def builtin_path(name: str) -> Path | None:
+    """Return the file of the world that ships as `name`; None when there is none."""
+    return _shipped().get(name)
+
+
+def _shipped() -> dict[str, Path]:
+    return {path.stem: path for path in _WORLDS.glob("*.wbt")}

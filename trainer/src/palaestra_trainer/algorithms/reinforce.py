@@ -148,6 +148,7 @@ class REINFORCE(BaseAlgorithm):
         assert self.env is not None  # set in __init__ or by set_env()
         self.policy.set_training_mode(False)
         recorder = EpisodeRecorder(self.env.num_envs, self.episodes_per_update)
+        dones = np.zeros(self.env.num_envs, dtype=bool)
         callback.on_rollout_start()
         while not recorder.complete:
             observations, actions = self._last_obs, self._act()

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.ros import call_together
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, Pose, RobotinoAbc
+from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, TouchSensor, Webots
 
 PERIOD_MS = 192  # six basic steps of 32 ms
@@ -63,6 +63,7 @@ class Robotino(RobotinoAbc):
         Raises:
             SimulatorDead, SimulatorHung, WrongData
         """
+        self.close()  # what is left of connections to a simulator before this one
         self._pose = None
         self._observer.forget_handles()
         self.simulation.connect()

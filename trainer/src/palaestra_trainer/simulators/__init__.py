@@ -1,1 +1,1 @@
-"""Which simulators there are: started behind a sidecar or as a process here, and kept going through faults."""
+"""Which simulators there are, started behind a sidecar, and kept going through faults."""

@@ -67,7 +67,7 @@ class Sensor:
     def forget_old(self) -> None:
         """Throw away what came too late for the step it belonged to."""
         if self._late:
-            self._value = self._values.newest(self._value)
+            self.read_arrived()
 
     def read(self) -> bool:
         """Take the next message; False when it did not come in time, the value stays then.
@@ -80,10 +80,19 @@ class Sensor:
         except SimulatorHung:
             self._late = True
             return False
-        if self._late:
-            self._value = self._values.newest(self._value)
-            self._late = False
         return True
+
+    def read_arrived(self) -> bool:
+        """Take the last message that has arrived already; False when there is none.
+
+        Raises:
+            SimulatorDead, WrongData: as `RosSubscriber`.
+        """
+        value = self._values.newest(None)
+        self._late = value is None
+        if value is not None:
+            self._value = value
+        return not self._late
 
     def disable(self) -> None:
         """Stop the sensor and unsubscribe."""

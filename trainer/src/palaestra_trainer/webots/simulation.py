@@ -59,14 +59,14 @@ class Simulation:
         for sensor in self._sensors:
             sensor.forget_old()
         self._advance()
-        silent = [sensor for sensor in self._sensors if not sensor.read()]
+        silent = self._read_sensors()
         extra_steps = 0
-        while silent:
+        while silent is not None:
             if extra_steps == _MOST_EXTRA_STEPS:
-                raise SimulatorHung(self._supervisor.node_name, f"{silent[0].device} stays silent")
+                raise SimulatorHung(self._supervisor.node_name, f"{silent.device} stays silent")
             extra_steps += 1
             self._advance()
-            silent = [sensor for sensor in self._sensors if not sensor.read() and sensor in silent]
+            silent = self._read_sensors()
         return extra_steps
 
     def reset(self, seed: int) -> None:
@@ -85,6 +85,16 @@ class Simulation:
         parts: tuple[RosService | Sensor | Motor, ...] = (*self._steps, *self._sensors, *self._motors)
         for part in parts:
             part.close()
+
+    def _read_sensors(self) -> Sensor | None:
+        """Read every sensor once; return the first that stays silent, None when all have spoken."""
+        silent = None
+        for sensor in self._sensors:
+            # What is lost is lost for all, so only the first is waited for.
+            spoke = sensor.read() if silent is None else sensor.read_arrived()
+            if not spoke:
+                silent = silent or sensor
+        return silent
 
     def _advance(self) -> None:
         answers = call_together([(step, {"value": self.period_ms}) for step in self._steps])

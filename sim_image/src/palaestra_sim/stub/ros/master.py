@@ -29,13 +29,18 @@ class MasterUnreachable(ConnectionError):
 class _Transport(xmlrpc.client.Transport):
     """Keeps one connection and gives up on a master that does not answer."""
 
+    _kept: http.client.HTTPConnection | None = None
+
     def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        if self._connection is None or host != self._connection[0]:  # type: ignore[has-type]
-            self._connection = host, http.client.HTTPConnection(host, timeout=_TIMEOUT_S)
-        connection = self._connection[1]
-        if connection is None:
-            raise MasterUnreachable(str(host))
-        return connection
+        if self._kept is None:
+            self._kept = http.client.HTTPConnection(host, timeout=_TIMEOUT_S)
+            self._connection = host, self._kept  # where the base class looks for what to close
+        return self._kept
+
+    def close(self) -> None:
+        """Close the connection; the next call opens another."""
+        super().close()
+        self._kept = None
 
 
 class Master:

@@ -51,6 +51,7 @@ class RosNode:
         self.blocked: Callable[[], bool] = lambda: False
         self.current_call: object | None = None
         self._loop = loop
+        self._ended: Callable[[], None] = self.abandon
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, _Topic] = {}
@@ -163,9 +164,6 @@ class RosNode:
 
     def _asked_to_end(self, _reason: str) -> None:
         self._loop.post(self._ended)
-
-    def _ended(self) -> None:
-        self.abandon()
 
     def _accept(self) -> None:
         try:

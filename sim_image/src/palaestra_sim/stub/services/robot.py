@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from palaestra_sim.stub.ros.node import ServiceFailed
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from palaestra_sim.stub.controller import Controller
 
 Fields = dict[str, Any]
+Row = tuple[str, str, Handler]
 
 
 class RobotServices:
@@ -23,43 +25,39 @@ class RobotServices:
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
-        devices = self._robot.parts.devices
+        return tuple(
+            Service(f"robot/{name}", f"webots_ros/{type_name}", handler)
+            for name, type_name, handler in (*self._constants(), *self._actions())
+        )
+
+    def _constants(self) -> Iterator[Row]:
         node = self._robot.parts.node
         world_path = self._controller.host.world_path
-        rows: tuple[tuple[str, str, Handler], ...] = (
-            (
-                "wait_for_user_input_event",
-                "robot_wait_for_user_input_event",
-                lambda _: {"event": 0},
-            ),
+        for name, type_name, value in (
+            ("get_model", "get_string", node.text("model") or ""),
+            ("get_mode", "get_int", 0),
+            ("get_supervisor", "get_bool", node.flag("supervisor", False)),
+            ("get_synchronization", "get_bool", node.flag("synchronization", True)),
+            ("get_project_path", "get_string", str(world_path.parent.parent)),
+            ("get_world_path", "get_string", str(world_path)),
+            ("get_basic_time_step", "get_float", float(self._simulation.basic_step_ms)),
+            ("get_number_of_devices", "get_int", len(self._robot.parts.devices.order)),
+            ("wwi_receive_text", "get_string", ""),
+        ):
+            yield name, type_name, _always({"value": value})
+
+    def _actions(self) -> tuple[Row, ...]:
+        wait = "wait_for_user_input_event"
+        return (
+            (wait, f"robot_{wait}", _always({"event": 0})),
             ("get_time", "get_float", lambda _: {"value": self._simulation.time_ms / 1000.0}),
-            ("get_model", "get_string", lambda _: {"value": node.text("model") or ""}),
             ("get_urdf", "get_urdf", _no_urdf),
             ("get_custom_data", "get_string", self._get_custom_data),
             ("set_custom_data", "set_string", self._set_custom_data),
             ("get_data", "get_string", self._get_custom_data),
             ("set_data", "set_string", self._set_custom_data),
-            ("get_mode", "get_int", lambda _: {"value": 0}),
             ("set_mode", "robot_set_mode", lambda request: {"success": int(request.mode == 0)}),
-            ("get_supervisor", "get_bool", lambda _: {"value": node.flag("supervisor", False)}),
-            (
-                "get_synchronization",
-                "get_bool",
-                lambda _: {"value": node.flag("synchronization", True)},
-            ),
-            ("get_project_path", "get_string", lambda _: {"value": str(world_path.parent.parent)}),
-            ("get_world_path", "get_string", lambda _: {"value": str(world_path)}),
-            (
-                "get_basic_time_step",
-                "get_float",
-                lambda _: {"value": float(self._simulation.basic_step_ms)},
-            ),
-            ("get_number_of_devices", "get_int", lambda _: {"value": len(devices.order)}),
-            ("wwi_receive_text", "get_string", lambda _: {"value": ""}),
-            ("wwi_send_text", "set_string", lambda _: {"success": True}),
-        )
-        return tuple(
-            Service(f"robot/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
+            ("wwi_send_text", "set_string", _always({"success": True})),
         )
 
     def device_list(self) -> Service:
@@ -73,6 +71,10 @@ class RobotServices:
     def _set_custom_data(self, request: Any) -> Fields:
         self._robot.custom_data = request.value
         return {"success": True}
+
+
+def _always(fields: Fields) -> Handler:
+    return lambda _request: fields
 
 
 def _no_urdf(_request: Any) -> Fields:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from palaestra_sim.stub.controller import Controller
 
 Fields = dict[str, Any]
+Row = tuple[str, str, Handler]
 
 
 class NodeServices:
@@ -28,7 +29,13 @@ class NodeServices:
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
-        rows: tuple[tuple[str, str, Handler], ...] = (
+        return tuple(
+            Service(f"supervisor/node/{name}", f"webots_ros/{type_name}", handler)
+            for name, type_name, handler in (*self._what(), *self._where(), *self._changes())
+        )
+
+    def _what(self) -> tuple[Row, ...]:
+        return (
             ("get_id", "node_get_id", self._get_id),
             ("get_type", "node_get_type", self._get_type),
             ("get_type_name", "node_get_name", self._get_type_name),
@@ -36,45 +43,42 @@ class NodeServices:
             ("get_base_type_name", "node_get_name", self._get_type_name),
             ("get_parent_node", "node_get_parent_node", self._get_parent),
             ("is_proto", "node_is_proto", self._is_proto),
+            ("get_field", "node_get_field", self._get_field),
+            ("get_field_by_index", "node_get_field_by_index", self._get_field_by_index),
+            ("get_number_of_fields", "node_get_number_of_fields", self._get_number_of_fields),
+            ("export_string", "node_get_string", self._export_string),
+        )
+
+    def _where(self) -> tuple[Row, ...]:
+        tracking = "contact_points_tracking"
+        return (
             ("get_position", "node_get_position", self._get_position),
             ("get_orientation", "node_get_orientation", self._get_orientation),
             ("get_pose", "node_get_pose", self._get_pose),
             ("enable_pose_tracking", "node_enable_pose_tracking", self._accept),
             ("disable_pose_tracking", "node_disable_pose_tracking", self._accept),
-            ("get_center_of_mass", "node_get_center_of_mass", self._get_center_of_mass),
-            ("get_contact_points", "node_get_contact_points", _unable("contact points")),
-            (
-                "enable_contact_points_tracking",
-                "node_enable_contact_points_tracking",
-                self._accept,
-            ),
-            (
-                "disable_contact_points_tracking",
-                "node_disable_contact_points_tracking",
-                self._accept,
-            ),
-            ("get_static_balance", "node_get_static_balance", self._get_static_balance),
             ("get_velocity", "node_get_velocity", self._get_velocity),
+            ("get_center_of_mass", "node_get_center_of_mass", self._get_center_of_mass),
+            ("get_static_balance", "node_get_static_balance", self._get_static_balance),
+            ("get_contact_points", "node_get_contact_points", _unable("contact points")),
+            (f"enable_{tracking}", f"node_enable_{tracking}", self._accept),
+            (f"disable_{tracking}", f"node_disable_{tracking}", self._accept),
+        )
+
+    def _changes(self) -> tuple[Row, ...]:
+        return (
             ("set_velocity", "node_set_velocity", self._set_velocity),
             ("add_force", "node_add_force_or_torque", _unable("forces")),
             ("add_force_with_offset", "node_add_force_with_offset", _unable("forces")),
             ("add_torque", "node_add_force_or_torque", _unable("torques")),
-            ("get_field", "node_get_field", self._get_field),
-            ("get_field_by_index", "node_get_field_by_index", self._get_field_by_index),
-            ("get_number_of_fields", "node_get_number_of_fields", self._get_number_of_fields),
             ("move_viewpoint", "node_move_viewpoint", self._accept),
             ("set_visibility", "node_set_visibility", self._accept),
-            ("remove", "node_remove", _unable("the removal of nodes")),
-            ("export_string", "node_get_string", self._export_string),
+            ("remove", "node_remove", _unable("removal of nodes")),
             ("reset_physics", "node_reset_functions", self._reset_physics),
             ("restart_controller", "node_reset_functions", self._restart_controller),
             ("save_state", "node_set_string", _unable("saved states")),
             ("load_state", "node_set_string", _unable("saved states")),
-            ("set_joint_position", "node_set_joint_position", _unable("set_joint_position")),
-        )
-        return tuple(
-            Service(f"supervisor/node/{name}", f"webots_ros/{type_name}", handler)
-            for name, type_name, handler in rows
+            ("set_joint_position", "node_set_joint_position", _unable("joints set by hand")),
         )
 
     def _node(self, request: Any) -> SceneNode:

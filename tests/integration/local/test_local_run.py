@@ -1,0 +1,258 @@
+"""`palaestra run` with the real ROS master and the real sidecars, and small programs as trainers."""
+
+import fcntl
+import os
+import pty
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+PALAESTRA = Path(sys.executable).with_name("palaestra")
+PATIENCE_S = 60
+ASK = """\
+import os, pathlib, xmlrpc.client, yaml
+run = pathlib.Path(os.environ["PALAESTRA_RUN"])
+xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"]).getPid("/test")
+config = yaml.safe_load(pathlib.Path(os.environ["PALAESTRA_CONFIG"]).read_text())
+for simulator in config["simulators"]:
+    assert pathlib.Path(simulator["world"]).is_file(), simulator
+(run / "summary.json").write_text('{"steps": 7, "success_rate": 0.5, "faults": 2}')
+"""
+WAIT = """\
+import os, pathlib, signal, sys
+run = pathlib.Path(os.environ["PALAESTRA_RUN"])
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(75))
+(run / "begun").touch()
+print("waiting", file=sys.stderr)
+while True:
+    signal.pause()
+"""
+
+
+class Desk:
+    """A folder with a job file, at which a person types `palaestra run`."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.job = folder / "job.yaml"
+        self.run_directory = folder / "runs" / "desk" / "0"
+
+    def write(self, program: str, **spec) -> None:
+        """Write a job whose trainer is a Python program."""
+        file = self.folder / "program.py"
+        file.write_text(program)
+        job = {
+            "apiVersion": "palaestra.dev/v1alpha1",
+            "kind": "TrainingJob",
+            "metadata": {"name": "desk"},
+            "spec": {"backoffLimit": 0, "trainer": {"command": ["python", str(file)]}, **spec},
+        }
+        self.job.write_text(yaml.safe_dump(job))
+
+    def start(self, *options: str, **how) -> subprocess.Popen:
+        """Start `palaestra run`."""
+        how = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **how}
+        return subprocess.Popen([PALAESTRA, "run", self.job, *options], cwd=self.folder, **how)
+
+    def run(self, *options: str) -> tuple[int, str]:
+        """Return exit code and output of `palaestra run`."""
+        process = self.start(*options)
+        out, _ = process.communicate(timeout=PATIENCE_S)
+        return process.returncode, out
+
+
+@pytest.fixture
+def desk(tmp_path):
+    """A person's desk."""
+    return Desk(tmp_path)
+
+
+def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
+    """The trainer found a master, its configuration and its worlds."""
+    desk.write(ASK)
+
+    code, out = desk.run()
+    again, report = desk.run()
+
+    assert (code, again) == (0, 0), out
+    for line in ("success rate      50%", "steps             7", "faults            2"):
+        assert line in out
+        assert line in report
+    assert "finished already" in report
+
+
+def test_the_run_directory_holds_what_was_run(desk):
+    """The generated worlds, the configuration, the job, and a log for each container."""
+    desk.write(ASK)
+
+    desk.run()
+
+    names = {str(each.relative_to(desk.run_directory)) for each in desk.run_directory.rglob("*.*")}
+    assert {"worlds/collect-0.wbt", "worlds/evaluate-0.wbt", "training.yaml", "job.yaml"} <= names
+    assert {"logs/ros-master.log", "logs/sim-collect-0.log", "logs/trainer.log"} <= names
+
+
+def test_fresh_begins_anew_and_keeps_the_old_run(desk):
+    """A second training beside the first."""
+    desk.write(ASK)
+    desk.run()
+
+    code, out = desk.run("--fresh")
+
+    assert code == 0
+    assert "finished already" not in out
+    assert (desk.run_directory.parent / "0.old-1" / "summary.json").exists()
+
+
+def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
+    """And the first one does not notice."""
+    desk.write(WAIT)
+    first = desk.start()
+    eventually((desk.run_directory / "begun").exists)
+
+    code, out = desk.run()
+    first.send_signal(signal.SIGINT)
+    _, _ = first.communicate(timeout=PATIENCE_S)
+
+    assert code == 2
+    assert "is at work there (process" in out
+    assert first.returncode == 75
+
+
+def test_ctrl_c_ends_with_75_and_says_how_to_go_on(desk, eventually):
+    """The same command resumes."""
+    desk.write(WAIT)
+    process = desk.start()
+    eventually((desk.run_directory / "begun").exists)
+
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=PATIENCE_S)
+
+    assert process.returncode == 75
+    assert "the same command goes on" in out
+
+
+def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
+    """The master, the sidecars and their simulators die with the runner, and the run can go on."""
+    desk.write(WAIT)
+    process = desk.start()
+    eventually((desk.run_directory / "begun").exists)
+
+    process.kill()
+    process.communicate()
+
+    eventually(lambda: not _processes_that_name(desk.folder))
+    with (desk.run_directory.parent / "0.lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _processes_that_name(folder: Path) -> list[str]:
+    """Return the processes whose environment names the folder."""
+    found = []
+    for entry in os.scandir("/proc"):
+        try:
+            environment = Path(f"/proc/{entry.name}/environ").read_bytes()
+        except OSError:
+            continue
+        if f"PALAESTRA_RUN={folder}".encode() in environment:
+            found.append(entry.name)
+    return found
+
+
+def test_verbose_shows_every_log_with_the_name_of_its_container(desk):
+    """And without it the screen is the trainer's."""
+    desk.write("print('hello from the trainer')")
+
+    _, out = desk.run("-v")
+
+    assert "[trainer] hello from the trainer" in out
+
+
+def test_a_failure_is_told_with_its_last_lines_and_its_log(desk):
+    """Nobody has to know where logs are to see why a run failed."""
+    desk.write("raise SystemExit('no such reward')")
+
+    code, out = desk.run()
+
+    assert code == 1
+    assert "failed: the trainer ended with exit code 1" in out
+    assert "no such reward" in out
+    assert "logs/trainer.log" in out
+
+
+def test_a_changed_job_is_refused_and_nothing_is_touched(desk):
+    """Its checkpoints belong to another training."""
+    desk.write("raise SystemExit(1)", seed=1)
+    desk.run()
+    before = (desk.run_directory / "job.yaml").read_text()
+
+    desk.write("raise SystemExit(1)", seed=2)
+    code, out = desk.run()
+
+    assert code == 2
+    assert "spec.seed: was 1, is 2" in out
+    assert (desk.run_directory / "job.yaml").read_text() == before
+
+
+def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
+    """The person chose it, so the person chooses another."""
+    desk.write(ASK)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+
+        code, out = desk.run("--ros-port", str(port))
+
+    assert code == 2
+    assert out.startswith(f"port {port}: ")
+    assert len(out.splitlines()) == 1
+    assert not desk.run_directory.exists()
+
+
+def test_replicas_run_one_after_another(desk):
+    """Each with its own seed and its own directory."""
+    desk.write(ASK, replicas=2)
+
+    code, out = desk.run()
+
+    assert code == 0
+    seeds = [
+        yaml.safe_load((desk.run_directory.parent / name / "training.yaml").read_text())["seed"]
+        for name in ("0", "1")
+    ]
+    assert seeds == [1, 2]
+    assert out.index("desk-0") < out.index("desk-1")
+
+
+def test_on_a_terminal_the_trainer_draws_and_the_log_stays_readable(desk):
+    """A progress bar that is redrawn is one line of the log."""
+    bar = (
+        "import sys; assert sys.stderr.isatty(); "
+        "sys.stderr.write('\\r10%\\r\\x1b[2K20%\\x1b[0m\\n'); sys.stderr.flush()"
+    )
+    desk.write(bar)
+    ours, theirs = pty.openpty()
+
+    process = desk.start(stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    drawn = _read_to_the_end(ours)
+    process.wait(timeout=PATIENCE_S)
+
+    assert process.returncode == 0
+    assert b"\r10%\r\x1b[2K20%" in drawn
+    assert "20%" in (desk.run_directory / "logs" / "trainer.log").read_text().splitlines()
+
+
+def _read_to_the_end(terminal: int) -> bytes:
+    """Return what is written to a terminal until nobody writes any more."""
+    drawn = b""
+    while True:
+        try:
+            drawn += os.read(terminal, 4096)
+        except OSError:  # EIO: the other end is closed
+            os.close(terminal)
+            return drawn

@@ -1,0 +1,250 @@
+"""Real sidecars with small programs as simulators. Every wait has a deadline."""
+
+import contextlib
+import http.client
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.protocol.control import SidecarState, SimulatorState
+from palaestra_sim.world import builtin
+
+PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
+ADDRESSES = re.compile(r"^palaestra-sidecar: control=(\S+) health=(\S+)$")
+DEADLINE_S = 20.0  # of whatever ought to take milliseconds, on a busy machine
+PACE_S = 0.005  # between two looks at what has no event to wait for
+
+
+def eventually(seen, deadline_s=DEADLINE_S):
+    """Return what `seen()` returns as soon as that is true; fail at the deadline."""
+    give_up = time.monotonic() + deadline_s
+    while not (result := seen()):
+        if time.monotonic() > give_up:
+            pytest.fail(f"not seen within {deadline_s:g} s")
+        time.sleep(PACE_S)
+    return result
+
+
+def processes_with(mark):
+    """Return the processes that have `mark` in their command line and are no zombies."""
+    found = set()
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if mark.encode() in (folder / "cmdline").read_bytes():
+                found.add(int(folder.name))
+    return found
+
+
+class Sidecar:
+    """A running sidecar, asked over its ports and read line by line."""
+
+    def __init__(self, command) -> None:
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL
+        )
+        self.lines = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        addresses = ADDRESSES.match(eventually(lambda: self.lines)[0])
+        assert addresses, self.lines
+        self.control, self.health = addresses.groups()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line.decode().rstrip("\n"))
+
+    def ask(self, method, path, body=None, address=None):
+        """Return status and text of the answer; from the control port, unless told otherwise."""
+        connection = http.client.HTTPConnection(address or self.control, timeout=DEADLINE_S)
+        try:
+            connection.request(method, path, None if body is None else json.dumps(body))
+            answer = connection.getresponse()
+            return answer.status, answer.read().decode()
+        finally:
+            connection.close()
+
+    def request(self, path, body=None):
+        """Return the state after a request that is allowed."""
+        status, text = self.ask("POST", path, body or {})
+        assert status == 200, text
+        return SimulatorState.from_json(json.loads(text))
+
+    @property
+    def state(self):
+        """What it tells of its simulator."""
+        status, text = self.ask("GET", "/state")
+        assert status == 200, text
+        return SimulatorState.from_json(json.loads(text))
+
+    def until(self, wanted, deadline_s=DEADLINE_S):
+        """Return the state as soon as it is `wanted`."""
+
+        def seen():
+            state = self.state
+            return state if state.state is wanted else None
+
+        return eventually(seen, deadline_s)
+
+    def until_said(self, text, times=1):
+        """Return when it, or its simulator, has printed a line that contains `text`."""
+        eventually(lambda: sum(text in line for line in list(self.lines)) >= times)
+
+    def start(self):
+        """Start the simulator; return the state when it has printed its first `up`."""
+        ups = self.lines.count("up") + 1
+        self.request("/start")
+        eventually(lambda: self.lines.count("up") >= ups)
+        return self.state
+
+    def end(self, number=signal.SIGTERM):
+        """Send a signal; return the seconds until it has ended, and its code."""
+        begin = time.monotonic()
+        self.process.send_signal(number)
+        code = self.process.wait(DEADLINE_S)
+        return time.monotonic() - begin, code
+
+
+@pytest.fixture
+def world(tmp_path):
+    """Return the path of a world that ships; it marks all processes of the test."""
+    path = tmp_path / "arena.wbt"
+    path.write_bytes(builtin("arena"))
+    return path
+
+
+@pytest.fixture
+def arguments(tmp_path, world):
+    """Return the command line of a sidecar; its simulator is Python as text, or a command line."""
+
+    def make(program, *options):
+        if isinstance(program, str):
+            (tmp_path / "simulator.py").write_text(program)
+            program = [sys.executable, "-I", "-S", "-u", str(tmp_path / "simulator.py")]
+        return [
+            *(PROGRAM, "--driver", "command", "--world", str(world)),
+            *("--control", "127.0.0.1:0", "--health", "127.0.0.1:0", *options),
+            *("--", *program, str(tmp_path)),
+        ]
+
+    return make
+
+
+@pytest.fixture
+def sidecar(arguments, tmp_path):
+    """Return how to run a sidecar; at the end of the test nothing of it may be left."""
+    running = []
+
+    def run(program, *options, before=()):
+        running.append(Sidecar([*before, *arguments(program, *options)]))
+        return running[-1]
+
+    yield run
+    for each in running:
+        if each.process.poll() is None:
+            each.process.kill()
+        each.process.wait(DEADLINE_S)
+        each._reader.join(DEADLINE_S)
+        each.process.stdout.close()
+    eventually(lambda: not processes_with(str(tmp_path)))
+
+
+@pytest.fixture
+def left(tmp_path):
+    """Return how to ask which processes of this test are running."""
+    return lambda: processes_with(str(tmp_path))
+
+
+@pytest.fixture
+def eventually_true():
+    """Return how to wait for something, with a deadline."""
+    return eventually
+
+
+WAITS = """
+import signal
+print("up")
+signal.pause()
+"""
+
+STUBBORN = """
+import signal
+for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+    signal.signal(number, signal.SIG_IGN)
+print("up")
+while True:
+    signal.pause()
+"""
+
+# As a launcher that starts a server, which starts workers: in sessions and groups of their own,
+# orphaned, without an environment, and all of them deaf to SIGTERM.
+FAMILY = """
+import os, signal, sys
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+def child(leave):
+    ready, tell = os.pipe()
+    if os.fork() == 0:
+        if leave == "orphan" and os.fork():
+            os._exit(0)
+        os.set_inheritable(tell, True)
+        if leave != "stay":
+            os.setsid()
+        program = f"import os, signal; os.write({tell}, b'x'); os.close({tell}); signal.pause()"
+        os.execve(sys.executable, [sys.executable, "-I", "-S", "-c", program, sys.argv[1]], {})
+    os.read(ready, 1)
+for leave in ("stay", "setsid", "orphan"):
+    child(leave)
+print("up")
+while True:
+    signal.pause()
+"""
+
+
+@pytest.fixture
+def waits():
+    """Return a simulator that does nothing until a signal ends it."""
+    return WAITS
+
+
+@pytest.fixture
+def stubborn():
+    """Return a simulator that no signal but SIGKILL ends."""
+    return STUBBORN
+
+
+@pytest.fixture
+def family():
+    """Return a simulator that has started three processes in three ways of getting away."""
+    return FAMILY
+
+
+@pytest.fixture
+def ends():
+    """Return how to make a simulator that prints `up` and runs one statement at its end."""
+    return lambda statement: f"import os, signal, sys\nprint('up')\n{statement}\n"
+
+
+@pytest.fixture
+def alive():
+    """Return whether a process is there, zombies included."""
+
+    def ask(pid):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, 0)
+            return True
+        return False
+
+    return ask
+
+
+@pytest.fixture
+def states():
+    """Return the names of the states."""
+    return SidecarState

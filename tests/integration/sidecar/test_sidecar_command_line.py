@@ -1,0 +1,135 @@
+"""What a person types, and what is wrong with it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.world import RunIdentity, ros_name
+
+PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
+
+
+def run(*arguments):
+    """Return a sidecar that has ended by itself."""
+    return subprocess.run(
+        [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=20, check=False
+    )
+
+
+def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
+    """The page that a person sees first."""
+    told = run("--help")
+
+    assert told.returncode == 0
+    assert all(word in told.stdout for word in ("reads ", "prints ", "serves ", "exit codes: 0 "))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--driver=gazebo"], "argument --driver: invalid choice: 'gazebo' (choose from 'stub', "),
+        (["--world=/no.wbt"], "--world: /no.wbt: No such file or directory; give a .wbt file"),
+        (["--control=7100"], "argument --control: '7100' is no address such as 127.0.0.1:7100; see"),
+        (["--control=0.0.0.0:0"], "--control: 0.0.0.0:0 is not on loopback, and anyone could use it"),
+        (["--health=203.0.113.1:0"], "--health: 203.0.113.1:0: Cannot assign requested address; "),
+        (["--job=j"], "--work: is missing; with --job, give the folder for the generated world"),
+        (["--job=j", "--work=/proc/x"], "--work: /proc/x: No such file or directory; give a folder"),
+        (["--driver=command"], "--driver command: has no program; give it behind --, as -- sim {world}"),
+        (["--driver=command", "--", "no-such"], "--driver command: there is no program no-such; install"),
+        (["--", "sim"], "--driver stub: takes no program; use --driver command"),
+        (["--speed=2"], "unrecognized arguments: --speed=2; see --help"),
+    ],
+)
+def test_a_mistake_is_one_line_and_nothing_is_started(world, arguments, line) -> None:
+    """Exit code 2, known before a port is open."""
+    told = run("--driver=stub", f"--world={world}", "--control=127.0.0.1:0", *arguments)
+
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.startswith(f"palaestra-sidecar: {line}")
+    assert told.stderr.count("\n") == 1
+
+
+def test_a_broken_world_is_told_with_its_place(tmp_path) -> None:
+    """Line and column, as a compiler does."""
+    world = tmp_path / "broken.wbt"
+    world.write_text("#VRML_SIM R2023b utf8\nRobot { name \n}\n")
+
+    told = run("--driver=stub", f"--world={world}")
+
+    assert told.returncode == 2
+    assert told.stderr.startswith(f"palaestra-sidecar: {world}:3:1: ")
+
+
+def test_the_simulator_gets_a_world_with_its_own_names(sidecar, tmp_path) -> None:
+    """And the trainer gets the names from /state."""
+    program = "import sys\nprint('world', sys.argv[2])\nprint('up')\nsys.stdin.read()"
+    it = sidecar(program, f"--work={tmp_path}/work", "--job=j", "--uid=u", "--replica=1", "--group=eval")
+    identity = RunIdentity(job="j", uid="u", replica=1, group="eval", index=0)
+
+    state = it.state
+
+    assert state.world == f"{tmp_path}/work/eval-0.wbt"
+    assert state.robots[0].ros_name == ros_name(identity, "robotino")
+    assert state.robots[0].ros_name in Path(state.world).read_text()
+
+
+def test_without_a_job_the_world_runs_as_it_is(sidecar, waits, world) -> None:
+    """That is how a person tries a simulator by hand."""
+    state = sidecar(waits).state
+
+    assert state.world == str(world)
+    assert state.robots[0].ros_name == "robotino"
+
+
+def test_a_world_that_ships_needs_no_path(sidecar, waits) -> None:
+    """A notebook starts with one."""
+    state = sidecar(waits, "--world=arena").state
+
+    assert Path(state.world).name == "arena.wbt"
+    assert state.robots[0].robot == "robotino"
+
+
+def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
+    """A notebook that was killed has no time to send a signal."""
+    command = arguments(waits, "--until-stdin-closes")
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+
+        process.stdin.close()
+
+        assert process.wait(2) == 0
+
+
+def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:
+    """Repeatable, in order, and one may begin with two dashes."""
+    program = "import sys\nprint('got', sys.argv[2:])\nprint('up')\nsys.exit(0)"
+    it = sidecar(program, "--option=--a=1", "--option=b c")
+
+    it.start()
+
+    assert "got ['--a=1', 'b c']" in it.lines
+
+
+def test_a_simulator_has_its_signals_as_a_shell_would_give_them(sidecar) -> None:
+    """An ignored SIGPIPE, as Python has it, would let a simulator write to nobody for ever."""
+    it = sidecar(["sh", "-c", "grep -E '^Sig(Ign|Blk)' /proc/self/status; echo up; sleep 60"])
+
+    it.start()
+
+    masks = [int(line.split()[1], 16) for line in it.lines if line.startswith("Sig")]
+    standard = (1 << 31) - 1
+    assert [mask & standard for mask in masks] == [0, 0]
+
+
+def test_a_simulator_gets_none_of_our_files(sidecar) -> None:
+    """With the keeper's pipe in its hands it would hold itself alive."""
+    it = sidecar(["sh", "-c", "for fd in /proc/$$/fd/*; do readlink $fd; done; echo up; sleep 60"])
+
+    it.start()
+
+    files = it.lines[it.lines.index("/dev/null") : it.lines.index("up")]
+    assert files[0] == "/dev/null"
+    assert len(files) == 3
+    assert files[1] == files[2]

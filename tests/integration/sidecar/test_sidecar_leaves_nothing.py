@@ -1,0 +1,174 @@
+"""Whatever the simulator started ends with it, and with the sidecar, however that ended."""
+
+import http.client
+import os
+import shutil
+import signal
+import subprocess
+
+import pytest
+
+from palaestra_sim.protocol.control import LastExit, SidecarState
+from palaestra_sim.sidecar.keeper import children
+
+IN_A_NAMESPACE = ["unshare", "--pid", "--fork", "--mount-proc", "--kill-child"]
+
+
+def namespaces_work():
+    """Return whether this machine lets us be process 1."""
+    if shutil.which("unshare") is None:
+        return False
+    return subprocess.run([*IN_A_NAMESPACE, "true"], capture_output=True, check=False).returncode == 0
+
+
+as_process_1 = pytest.mark.skipif(not namespaces_work(), reason="no pid namespace may be made here")
+
+
+def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
+    """A child that left group, session, parent and environment is found as well as one that stayed."""
+    it = sidecar(family)
+    it.start()
+    assert len(left()) == 6  # sidecar, keeper, simulator, and three more
+
+    it.request("/stop", {"deadline_s": 0})
+    it.until(SidecarState.IDLE)
+
+    eventually_true(lambda: left() == {it.process.pid})
+
+
+def test_a_simulator_that_dies_takes_its_family_along(sidecar, family, left, eventually_true) -> None:
+    """A worker that lives on would keep the ROS name, and the graphics card."""
+    it = sidecar(family)
+    pid = it.start().pid
+
+    os.kill(pid, signal.SIGKILL)
+    failed = it.until(SidecarState.FAILED)
+
+    assert failed.last_exit == LastExit(code=None, signal="SIGKILL", expected=False)
+    eventually_true(lambda: left() == {it.process.pid})
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
+def test_a_signal_ends_everything_within_two_seconds(sidecar, request, left, number, what) -> None:
+    """The last sidecars of a pod get two seconds before SIGKILL."""
+    it = sidecar(request.getfixturevalue(what))
+    it.start()
+
+    seconds, code = it.end(number)
+
+    assert (code, left()) == (0, set())
+    assert seconds < 2
+
+
+def test_a_signal_ends_a_sidecar_whose_simulator_does_not_run(sidecar, waits) -> None:
+    """There is nothing to wait for."""
+    seconds, code = sidecar(waits).end()
+
+    assert code == 0
+    assert seconds < 1
+
+
+def test_a_signal_during_a_stop_does_not_wait_for_its_deadline(sidecar, stubborn) -> None:
+    """The container's end is nearer than the trainer's patience."""
+    it = sidecar(stubborn)
+    it.start()
+    it.request("/stop", {"deadline_s": 3600})
+
+    seconds, code = it.end()
+
+    assert code == 0
+    assert seconds < 2
+
+
+def test_a_simulator_gets_the_chance_to_end_by_itself(sidecar, ends) -> None:
+    """SIGTERM reaches it first: Webots' launcher removes its temporary files then."""
+    it = sidecar(
+        ends("signal.signal(signal.SIGTERM, lambda *_: (print('bye'), sys.exit(0)))\nsignal.pause()")
+    )
+    it.start()
+    it.until_said("up")
+
+    it.end()
+
+    it.until_said("bye")
+
+
+@pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
+def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_true, what) -> None:
+    """SIGKILL gives it no time to say anything: the keeper sees the end of its pipe."""
+    it = sidecar(request.getfixturevalue(what))
+    it.start()
+
+    _, code = it.end(signal.SIGKILL)
+
+    assert code == -signal.SIGKILL
+    eventually_true(lambda: not left(), 2)
+
+
+def test_a_killed_keeper_is_a_fault_and_leaves_no_process(sidecar, family, left, eventually_true) -> None:
+    """What it held becomes the sidecar's own, which ends it and can start again."""
+    it = sidecar(family)
+    it.start()
+    (keeper,) = children({it.process.pid})
+
+    os.kill(keeper, signal.SIGKILL)
+    failed = it.until(SidecarState.FAILED)
+
+    assert failed.detail.startswith("the simulator ended: its keeper ended before it")
+    eventually_true(lambda: left() == {it.process.pid})
+    assert it.start().starts == 2
+
+
+def test_a_sidecar_whose_log_nobody_reads_still_ends(arguments, ends, left, eventually_true) -> None:
+    """A full pipe stops whoever writes into it; the alarm does not write."""
+    source, sink = os.pipe()
+    program = "while True: print('x' * 1000)"
+    process = subprocess.Popen(arguments(ends(program)), stdout=sink, stdin=subprocess.DEVNULL)
+    os.close(sink)
+    with os.fdopen(source, "rb", buffering=0) as log:
+        line = log.readline().decode()
+        host, port = line.partition("control=")[2].split()[0].split(":")
+        connection = http.client.HTTPConnection(host, int(port), timeout=10)
+        connection.request("POST", "/start", "{}")
+        assert connection.getresponse().status == 200
+        connection.close()
+        eventually_true(lambda: len(left()) == 3)
+
+        process.send_signal(signal.SIGTERM)
+        process.wait(2)
+
+        eventually_true(lambda: not left(), 2)
+
+
+@pytest.fixture
+def inside():
+    """Return the sidecar's process as this machine sees it, when it is process 1 of a namespace."""
+    return lambda it: next(iter(children({it.process.pid})))
+
+
+@as_process_1
+def test_process_1_reaps_the_orphans_of_the_container(sidecar, waits, inside, eventually_true) -> None:
+    """Those of a shell that somebody opened in the container, too: nobody else would."""
+    it = sidecar(waits, before=IN_A_NAMESPACE)
+    it.start()
+    before = children({inside(it)})
+
+    enter = ["nsenter", "--target", str(inside(it)), "--pid", "sh", "-c"]
+    subprocess.run([*enter, "(sleep 0 & sleep 0 &) & exit"], check=True, timeout=20)
+
+    eventually_true(lambda: children({inside(it)}) == before)
+    assert it.state.state is SidecarState.STARTING
+
+
+@as_process_1
+@pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
+def test_process_1_ends_by_sigterm_as_any_other(sidecar, request, left, inside, what) -> None:
+    """The kernel keeps from process 1 whatever it did not ask for."""
+    it = sidecar(request.getfixturevalue(what), before=IN_A_NAMESPACE)
+    it.start()
+
+    os.kill(inside(it), signal.SIGTERM)
+    code = it.process.wait(2)
+
+    assert (code, left()) == (0, set())

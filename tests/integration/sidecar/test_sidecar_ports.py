@@ -1,0 +1,171 @@
+"""What the two listeners answer, and what they refuse."""
+
+import re
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.protocol.control import SidecarState
+from palaestra_sim.sidecar.keeper import children
+
+
+def raw(address, text):
+    """Return the first line of the answer to bytes that need not be HTTP."""
+    host, port = address.split(":")
+    with socket.create_connection((host, int(port)), 10) as connection:
+        connection.sendall(text)
+        return connection.makefile("rb").readline().decode()
+
+
+def test_health_answers_whatever_the_simulator_does(sidecar, ends) -> None:
+    """The liveness probe asks for the sidecar: a dead simulator is the trainer's to restart."""
+    it = sidecar(ends("sys.exit(1)"))
+    it.request("/start")
+    it.until(SidecarState.FAILED)
+
+    assert it.ask("GET", "/healthz", address=it.health) == (200, "ok\n")
+
+
+def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
+    """The trainer reads one, people and the operator the other."""
+    it = sidecar(waits)
+    it.start()
+
+    assert it.ask("GET", "/state", address=it.health) == it.ask("GET", "/state")
+
+
+@pytest.mark.parametrize("path", ["/start", "/ready", "/stop"])
+def test_the_health_port_takes_no_orders(sidecar, waits, path) -> None:
+    """It is open to whoever reaches the pod."""
+    it = sidecar(waits)
+
+    status, _ = it.ask("POST", path, {"deadline_s": 0}, it.health)
+
+    assert status == 404
+    assert it.state.starts == 0
+
+
+def test_the_metrics_count_starts_faults_and_states(sidecar, ends) -> None:
+    """All labels are there from the start, so that a rate over them is right."""
+    it = sidecar(ends("os.kill(os.getpid(), signal.SIGBUS)"))
+    it.request("/start")
+    it.until(SidecarState.FAILED)
+
+    _, text = it.ask("GET", "/metrics", address=it.health)
+
+    values = dict(re.findall(r"^(palaestra_\S+) (\S+)$", text, re.MULTILINE))
+    assert values.pop('palaestra_build_info{version="0.1.0"}') == "1.0"
+    assert {name.removeprefix("palaestra_simulator_"): float(value) for name, value in values.items()} == {
+        "up": 0,
+        "starts_total": 1,
+        'faults_total{kind="code"}': 0,
+        'faults_total{kind="signal"}': 1,
+        'faults_total{kind="unknown"}': 0,
+        'state{state="idle"}': 0,
+        'state{state="starting"}': 0,
+        'state{state="ready"}': 0,
+        'state{state="stopping"}': 0,
+        'state{state="failed"}': 1,
+        "rss_bytes": 0,
+    }
+
+
+def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> None:
+    """A launcher is small; what it launched is not."""
+    it = sidecar(family)
+    it.start()
+
+    _, text = it.ask("GET", "/metrics", address=it.health)
+
+    (rss,) = re.findall(r"^palaestra_simulator_rss_bytes (\S+)$", text, re.MULTILINE)
+    assert "palaestra_simulator_up 1.0" in text
+    assert float(rss) > 4 * 4e6  # four Pythons
+
+
+@pytest.mark.parametrize(
+    ("body", "error"),
+    [
+        ({"deadline": 1}, "deadline: is not a field of this request"),
+        ({}, "deadline_s: is missing"),
+        ([], "body: a list is no object"),
+        ({"deadline_s": -1}, "deadline_s: is not within 0 to 3600"),
+    ],
+)
+def test_a_wrong_body_is_named_and_changes_nothing(sidecar, waits, body, error) -> None:
+    """400, so that nobody takes it for a matter of the state."""
+    it = sidecar(waits)
+    it.start()
+
+    status, text = it.ask("POST", "/stop", body)
+
+    assert (status, text) == (400, f'{{"error": "{error}"}}\n')
+    assert it.state.state is SidecarState.STARTING
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        (b"POST /start HTTP/1.1\r\n\r\n", 411),
+        (b"POST /start HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 411),
+        (b"POST /start HTTP/1.1\r\nContent-Length: 4097\r\n\r\n", 413),
+        (b"POST /start HTTP/1.1\r\nContent-Length: " + b"9" * 5000 + b"\r\n\r\n", 413),
+        (b"POST /start HTTP/1.1\r\nContent-Length: -1\r\n\r\n", 411),
+        (b"POST /start HTTP/1.1\r\nContent-Length: 1\r\n\r\n[", 400),
+        (b"GET /start HTTP/1.1\r\n\r\n", 405),
+        (b"GET /etc/passwd HTTP/1.1\r\n\r\n", 404),
+        (b"DELETE /start HTTP/1.1\r\n\r\n", 501),
+        (b"GET /" + b"x" * 70_000 + b" HTTP/1.1\r\n\r\n", 414),
+    ],
+)
+def test_a_request_of_the_wrong_size_or_kind_is_refused(sidecar, waits, request_, status) -> None:
+    """Nothing is read that nobody asked for."""
+    it = sidecar(waits)
+
+    assert raw(it.control, request_).split()[1] == str(status)
+    assert it.state.starts == 0
+
+
+def test_many_silent_connections_do_not_take_the_port_away(sidecar, waits, eventually_true) -> None:
+    """Those beyond the limit are closed, the rest time out: then it answers again."""
+    it = sidecar(waits)
+    host, port = it.health.split(":")
+    silent = [socket.create_connection((host, int(port)), 10) for _ in range(60)]
+
+    def answers():
+        try:
+            return it.ask("GET", "/healthz", address=it.health)[0] == 200
+        except OSError:
+            return False
+
+    eventually_true(answers, 15)
+    for connection in silent:
+        connection.close()
+
+
+def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, arguments, waits) -> None:
+    """Exit code 2: trying again cannot help."""
+    taken = sidecar(waits).control
+
+    second = subprocess.run(
+        arguments(waits, "--control", taken), capture_output=True, text=True, timeout=20, check=False
+    )
+
+    assert (second.returncode, second.stdout) == (2, "")
+    assert second.stderr == (
+        f"palaestra-sidecar: --control: {taken}: Address already in use; choose another, or 0 for a "
+        "free one\n"
+    )
+
+
+def test_a_sidecar_is_small(sidecar, family) -> None:
+    """Under 40 MB with its keeper, so that a laptop and a node take many."""
+    it = sidecar(family)
+    it.start()
+    it.ask("GET", "/metrics", address=it.health)
+    own = {it.process.pid} | children({it.process.pid})
+
+    pages = [int(Path(f"/proc/{pid}/statm").read_text().split()[1]) for pid in own]
+
+    assert sum(pages) * 4096 < 40e6

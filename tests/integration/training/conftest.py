@@ -1,0 +1,78 @@
+"""Runs on fakes: in this process, or as a program of their own."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import yaml
+
+PROGRAM = Path(__file__).with_name("fakes.py")
+
+
+@pytest.fixture(scope="session")
+def fakes() -> ModuleType:
+    """Return the module with the fake simulators, which is a program as well."""
+    spec = importlib.util.spec_from_file_location("fakes", PROGRAM)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def write_job(tmp_path):
+    """Write a training.yaml; the test says what matters."""
+
+    def write(*, collectors: int = 1, **changes: Any) -> Path:
+        groups = [("collect", "Collect", index) for index in range(collectors)]
+        content = {
+            "job": "fakes",
+            "seed": 3,
+            "environment": {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 30}},
+            "steps": 600,
+            "evaluation": {"everySteps": 200, "episodes": 4},
+            "checkpoint": {"everySteps": 200, "keep": 3},
+            "statusAddress": "127.0.0.1:0",
+            "simulators": [
+                {"name": f"{group}-{index}", "group": group, "index": index, "role": role}
+                for group, role, index in [*groups, ("evaluate", "Evaluate", 0)]
+            ],
+        }
+        path = tmp_path / "training.yaml"
+        path.write_text(yaml.safe_dump(content | changes))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start the program on a configuration; it is killed at the end if it is still there."""
+    started = []
+
+    def begin(job: Path, deaths: str = "") -> subprocess.Popen[str]:
+        environment = os.environ | {
+            "OMP_NUM_THREADS": "1",
+            "PALAESTRA_TERMINATION_LOG": str(tmp_path / "word"),
+        }
+        process = subprocess.Popen(
+            [sys.executable, PROGRAM, job, tmp_path / "run", deaths],
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        process.kill()
+        process.communicate()

@@ -1,0 +1,104 @@
+"""A trainer as a process: signals, exit codes, resuming."""
+
+from __future__ import annotations
+
+import json
+import signal
+
+import pytest
+
+from palaestra_sim.protocol.status import Termination
+
+DEADLINE_S = 120.0
+PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}
+DQN = {"name": "DQN", "hyperparameters": {"learning_starts": 100, "policy_kwargs": {"net_arch": [16]}}}
+REINFORCE = {"name": "REINFORCE", "hyperparameters": {"episodes_per_update": 2}}
+
+
+def await_line(process, word):
+    """Read its log until a line holds `word`."""
+    for line in process.stderr:
+        if word in line:
+            return line
+    raise AssertionError(f"the process ended without {word!r}")
+
+
+def end(process):
+    """Return its exit code and the rest of its log."""
+    _, log = process.communicate(timeout=DEADLINE_S)
+    return process.returncode, log
+
+
+def summary(folder):
+    """Return summary.json of the run."""
+    return json.loads((folder / "run" / "summary.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "collectors", "steps"),
+    [(DQN, 1, 600), (PPO, 2, 639), (REINFORCE, 2, None)],
+    ids=["DQN", "PPO", "REINFORCE"],
+)
+def test_a_run_survives_a_fault(write_job, start, tmp_path, algorithm, collectors, steps):
+    """It ends with 0 and its full number of steps, and says that there was one."""
+    job = write_job(algorithm=algorithm, collectors=collectors)
+
+    code, log = end(start(job, deaths="77"))
+
+    result = summary(tmp_path)
+    assert code == 0
+    assert log.count("simulator fault") == 1
+    assert (result["faults"], result["restarts"]) == (1, 1)
+    assert result["steps"] == steps if steps else result["steps"] >= 600
+    assert (tmp_path / "run" / "model.zip").exists()
+
+
+@pytest.mark.parametrize(("algorithm", "total"), [(DQN, 1200), (PPO, 1216)], ids=["DQN", "PPO"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
+    write_job, start, tmp_path, algorithm, total, number
+):
+    """Ctrl-C at a third, and again: it goes on at the step of its checkpoint."""
+    job = write_job(algorithm=algorithm, steps=1200)
+    first = start(job)
+    await_line(first, "step=400" if algorithm is DQN else "evaluated")
+    first.send_signal(number)
+    code, _ = end(first)
+    word = Termination.from_message((tmp_path / "word").read_text())
+
+    again, log = end(start(job))
+
+    assert (code, again) == (75, 0)
+    assert word.reason == f"Interrupted: {number.name} received"
+    assert f"resumed at step {word.last_checkpoint.step}" in log
+    assert summary(tmp_path)["steps"] == total
+    assert summary(tmp_path)["attempts"] == 2
+
+
+def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, tmp_path):
+    """A node that dies says nothing before."""
+    job = write_job(algorithm=DQN, steps=800)
+    first = start(job)
+    await_line(first, "checkpoint written")
+    first.kill()
+    end(first)
+
+    code, log = end(start(job))
+
+    assert code == 0
+    assert "resumed at step" in log
+    assert summary(tmp_path)["steps"] == 800
+
+
+def test_a_second_signal_ends_the_process_at_once(write_job, start):
+    """Somebody who presses Ctrl-C twice does not want to wait for a long rollout's learning."""
+    endless = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 100_000}}
+    process = start(write_job(algorithm=endless))
+    await_line(process, "training")
+    process.send_signal(signal.SIGINT)
+    await_line(process, "a second signal ends at once")
+    process.send_signal(signal.SIGINT)
+
+    code, _ = end(process)
+
+    assert code == -signal.SIGINT

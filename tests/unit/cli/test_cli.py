@@ -1,0 +1,160 @@
+"""The command line: what each command reads, prints, and returns."""
+
+import pytest
+import yaml
+
+from palaestra.cli import main
+from palaestra_sim.world import builtin, robots
+
+JOB = """\
+apiVersion: palaestra.dev/v1alpha1
+kind: TrainingJob
+metadata:
+  name: a
+spec:
+  replicas: 2
+"""
+WRONG = """\
+apiVersion: palaestra.dev/v1alpha1
+kind: TrainingJob
+metadata:
+  name: A
+spec:
+  seed: -1
+  replica: 2
+  simulators:
+    - {name: collect, role: Collect}
+    - {name: evaluate, role: Eval}
+  trainer:
+    steps: many
+"""
+
+
+@pytest.fixture
+def job(tmp_path):
+    """A file with a job."""
+    path = tmp_path / "job.yaml"
+    path.write_text(JOB)
+    return path
+
+
+@pytest.fixture
+def fails(capsys):
+    """Run a command that fails and return its lines on standard error."""
+
+    def run(*arguments):
+        code = main([str(each) for each in arguments])
+        out, err = capsys.readouterr()
+        assert code == 2
+        assert out == ""
+        return err.splitlines()
+
+    return run
+
+
+def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
+    """`palaestra plan FILE | kubectl apply -f -` is what the operator does."""
+    assert main(["plan", str(job)]) == 0
+
+    kinds = [each["kind"] for each in yaml.safe_load_all(capsys.readouterr().out)]
+    assert kinds == ["ConfigMap", "PersistentVolumeClaim", "Job"] * 2
+
+
+def test_plan_can_print_what_run_would_do_here(job, tmp_path, capsys):
+    """The same function with another layout."""
+    main(["plan", str(job), "--layout", "local", "--dir", str(tmp_path)])
+
+    assert f"value: {tmp_path}/a/1" in capsys.readouterr().out
+
+
+def test_plan_quotes_text_that_kubectl_would_take_for_a_number(tmp_path, capsys):
+    """YAML readers differ over 5e-4."""
+    path = tmp_path / "job.yaml"
+    path.write_text(JOB + "  trainer: {env: [{name: RATE, value: '5e-4'}]}\n")
+
+    main(["plan", str(path)])
+
+    assert "value: '5e-4'" in capsys.readouterr().out
+
+
+def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
+    """A world builder sees what becomes of the file that was saved in Webots."""
+    path = tmp_path / "my.wbt"
+    path.write_bytes(builtin("arena"))
+
+    main(["world", str(path), "--job", "j", "--replica", "3", "--group", "g", "--index", "1"])
+
+    [robot] = robots(capsys.readouterr().out.encode())
+    assert robot.ros_name.startswith("j_r3_g_1a_robotino_")
+
+
+def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
+    """Line and column, as a compiler does."""
+    path = tmp_path / "broken.wbt"
+    path.write_text("#VRML_SIM R2023b utf8\nRobot { name [ }\n")
+
+    [line] = fails("world", path, "--job", "j", "--group", "g")
+
+    assert line.startswith(f"{path}:2:")
+
+
+def test_crd_prints_a_custom_resource_definition(capsys):
+    """Of the version that is installed."""
+    assert main(["crd"]) == 0
+
+    crd = yaml.safe_load(capsys.readouterr().out)
+    assert crd["metadata"]["name"] == "trainingjobs.palaestra.dev"
+
+
+@pytest.mark.parametrize("command", ["run", "plan", "eval"])
+def test_a_wrong_job_is_told_with_all_its_mistakes(command, tmp_path, fails, monkeypatch):
+    """Five mistakes, five lines, and nothing is started or written."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "wrong.yaml"
+    path.write_text(WRONG)
+
+    lines = fails(command, path)
+
+    assert len(lines) == 5
+    assert any("spec.simulators[1].role" in line for line in lines)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_is_not_there_is_one_line(tmp_path, fails):
+    """No traceback for a typing error."""
+    assert fails("run", tmp_path / "no.yaml") == [
+        f"{tmp_path}/no.yaml: No such file or directory; name a file that can be read"
+    ]
+
+
+def test_a_file_that_is_no_text_is_one_line(tmp_path, fails):
+    """A checkpoint instead of a job, perhaps."""
+    path = tmp_path / "model.zip"
+    path.write_bytes(b"PK\xff\xfe")
+
+    assert fails("plan", path) == [f"{path}: is not UTF-8; save it as UTF-8"]
+
+
+def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
+    """With the numbers that it has."""
+    [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
+
+    assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
+
+
+def test_what_was_not_trained_cannot_be_measured(job, tmp_path, fails):
+    """The message names the command that comes first."""
+    [line] = fails("eval", job, "--dir", tmp_path / "runs")
+
+    assert line.endswith("there is no model.zip; train it first with `palaestra run`")
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"], ["plan", "--help"]])
+def test_help_and_version_say_what_they_are(arguments, capsys):
+    """Every help ends with the exit codes."""
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+
+    assert ended.value.code == 0
+    out = capsys.readouterr().out
+    assert out.startswith("palaestra 0.") or "75   interrupted and checkpointed" in out

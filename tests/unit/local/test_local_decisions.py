@@ -1,0 +1,95 @@
+"""What the end of a pod means, and how long to wait: decided without starting anything."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.api import validate
+from palaestra.local.container import BackOff
+from palaestra.local.jobs import IDLE_PODS, Tries, Verdict, verdict
+from palaestra.plan import ClusterLayout, Images, identified, plan
+
+JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
+PLANNED = plan(identified(validate({**JOB, "spec": {}}), "uid"), ClusterLayout(images=Images.of_release("1")))
+
+
+@pytest.mark.parametrize(
+    ("code", "meaning"),
+    [
+        (0, Verdict.COMPLETE),
+        (1, Verdict.COUNT),
+        (2, Verdict.FAIL_JOB),
+        (75, Verdict.IGNORE),
+        (80, Verdict.FAIL_JOB),
+        (81, Verdict.FAIL_JOB),
+        (82, Verdict.COUNT),
+        (137, Verdict.COUNT),
+        (143, Verdict.COUNT),
+    ],
+)
+def test_the_planned_job_says_what_an_exit_code_means(code, meaning):
+    """The same rules that Kubernetes reads, and no second table of exit codes."""
+    assert verdict(PLANNED.replicas[0].job, code) is meaning
+
+
+def test_without_a_policy_every_failure_is_counted():
+    """Kubernetes' default."""
+    assert verdict({"spec": {}}, 75) is Verdict.COUNT
+
+
+def test_rules_are_read_in_order_and_the_first_match_decides():
+    """As the API server documents it."""
+    rules = [
+        {"action": "Ignore", "onExitCodes": {"operator": "NotIn", "values": [7]}},
+        {"action": "FailJob", "onExitCodes": {"operator": "In", "values": [7, 8]}},
+    ]
+    job = {"spec": {"podFailurePolicy": {"rules": rules}}}
+
+    assert verdict(job, 8) is Verdict.IGNORE
+    assert verdict(job, 7) is Verdict.FAIL_JOB
+
+
+@given(st.integers(min_value=0, max_value=20))
+def test_a_limit_of_n_means_n_plus_one_pods(limit):
+    """The first pod is no retry."""
+    tries = Tries(limit=limit)
+    pods = 1
+    while tries.another(Verdict.COUNT, step=0):
+        pods += 1
+
+    assert pods == limit + 1
+
+
+def test_ignored_pods_that_get_no_further_are_bounded():
+    """Kubernetes has no bound for them; a master that never comes up would be waited for for ever."""
+    tries = Tries(limit=0)
+    went_on = [tries.another(Verdict.IGNORE, step=0) for _ in range(IDLE_PODS)]
+
+    assert went_on == [True] * (IDLE_PODS - 1) + [False]
+
+
+def test_progress_makes_ignored_pods_unbounded():
+    """A run that is interrupted every hour and gets further each time ends some day."""
+    tries = Tries(limit=0)
+
+    assert all(tries.another(Verdict.IGNORE, step=step) for step in range(1, 50))
+
+
+def test_the_wait_before_the_next_pod_doubles_and_is_bounded():
+    """A pod that fails at once would otherwise be started hundreds of times a minute."""
+    tries = Tries(limit=100)
+    waits = []
+    for _ in range(9):
+        tries.another(Verdict.COUNT, step=0)
+        waits.append(tries.wait_s)
+
+    assert waits == [1, 2, 4, 8, 16, 32, 60, 60, 60]
+
+
+@given(st.integers(min_value=1, max_value=60))
+def test_a_sidecars_back_off_grows_up_to_its_bound(ends):
+    """A crash loop costs no processor, and a single crash costs no time."""
+    backoff = BackOff(first_s=0.5, most_s=30.0)
+
+    assert backoff.wait_s(1) == 0.5
+    assert backoff.wait_s(ends) <= backoff.wait_s(ends + 1) <= 30.0

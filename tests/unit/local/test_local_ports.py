@@ -1,0 +1,50 @@
+"""Free ports that stay free until their container listens."""
+
+import http.server
+import socket
+
+import pytest
+
+from palaestra.local.errors import Refused
+from palaestra.local.ports import HeldPorts
+
+
+def test_ports_differ_from_one_another():
+    """Chosen one by one and given back, two could be the same."""
+    with HeldPorts() as held:
+        ports = [held.any() for _ in range(50)]
+
+    assert len(set(ports)) == 50
+
+
+def test_a_held_port_is_for_its_container_and_nobody_else():
+    """A server that sets SO_REUSEADDR, as ours do, gets it; a program that does not, doesn't."""
+    with HeldPorts() as held:
+        port = held.any()
+
+        with pytest.raises(OSError, match="in use"), socket.socket() as stranger:
+            stranger.bind(("127.0.0.1", port))
+        http.server.ThreadingHTTPServer(
+            ("127.0.0.1", port), http.server.BaseHTTPRequestHandler
+        ).server_close()
+
+
+def test_a_held_port_can_be_listened_on_again_after_a_restart():
+    """A sidecar that crashed comes back on the same port."""
+    with HeldPorts() as held:
+        port = held.any()
+        for _ in range(3):
+            server = socket.create_server(("127.0.0.1", port))
+            client = socket.create_connection(("127.0.0.1", port))
+            server.accept()[0].close()
+            client.close()
+            server.close()
+
+
+def test_a_port_in_use_is_refused_with_a_remedy():
+    """Before anything is started."""
+    with socket.create_server(("127.0.0.1", 0)) as server, HeldPorts() as held:
+        port = server.getsockname()[1]
+
+        with pytest.raises(Refused, match=rf"^port {port}: .*in use.*--ros-port"):
+            held.this(port)

@@ -1,0 +1,107 @@
+"""What is wrong with a machine or a job is found before anything is started."""
+
+import pytest
+
+from palaestra.api import validate
+from palaestra.local import preflight
+from palaestra.local.errors import Refused
+from palaestra.local.preflight import Request
+from palaestra_sim.world import builtin
+
+JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
+
+
+@pytest.fixture
+def request_for(tmp_path):
+    """Return a builder of requests to run a job with this spec."""
+
+    def make(**spec):
+        return Request(job=validate({**JOB, "spec": spec}), runs=tmp_path / "runs")
+
+    return make
+
+
+def collecting(**fields):
+    """Return groups of simulators, the first with these fields."""
+    first = {"name": "collect", "role": "Collect", **fields}
+    return {"simulators": [first, {"name": "evaluate", "role": "Evaluate"}]}
+
+
+def test_this_machine_can_run_the_minimal_job(request_for):
+    """The checks find no fault where there is none, and write nothing."""
+    request = request_for()
+
+    preflight.check(request)
+
+    assert not request.runs.exists()
+
+
+def test_a_missing_ros_is_told_with_what_to_install(request_for, monkeypatch, tmp_path):
+    """Not as a traceback of the trainer, a minute later."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+
+    problems = list(preflight.ros_is_installed(request_for()))
+
+    assert problems == [f"rosmaster: is not installed; {preflight.ROS}"]
+
+
+@pytest.mark.parametrize(
+    ("spec", "problem"),
+    [
+        ({"trainer": {"command": ["no-such-program"]}}, "spec.trainer.command: no-such-program"),
+        (collecting(driver="webots"), "spec.simulators[0]: webots is not a program"),
+        (
+            collecting(driver="command", image="a", command=["no-sim"]),
+            "spec.simulators[0]: no-sim is not a program",
+        ),
+    ],
+)
+def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec, problem, monkeypatch):
+    """Whoever wrote the job can mend it."""
+    monkeypatch.setenv("PATH", "")
+
+    assert any(each.startswith(problem) for each in preflight.programs_exist(request_for(**spec)))
+
+
+def test_a_broken_world_file_is_told_with_line_and_column(request_for, tmp_path):
+    """Its sidecar would find it too, but in a log."""
+    world = tmp_path / "broken.wbt"
+    world.write_text("#VRML_SIM R2023b utf8\nWorldInfo {\n  basicTimeStep [\n}\n")
+
+    [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": str(world)})))
+
+    assert problem.startswith(f"spec.simulators[0].world.file: {world}:")
+    assert problem.split(f"{world}:")[1][0].isdigit()
+
+
+def test_a_world_file_that_is_right_passes(request_for, tmp_path):
+    """Also when it names files that lie beside it."""
+    world = tmp_path / "arena.wbt"
+    world.write_bytes(builtin("arena"))
+
+    assert not list(preflight.worlds_are_right(request_for(**collecting(world={"file": str(world)}))))
+
+
+def test_a_missing_world_file_is_told_with_its_path(request_for):
+    """And with the system's own words."""
+    [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": "/no/such.wbt"})))
+
+    assert "/no/such.wbt: No such file or directory" in problem
+
+
+def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
+    """It would end the run in the middle of a checkpoint."""
+    monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
+
+    with pytest.raises(Refused, match=r"MiB are free and a run takes .*--dir"):
+        preflight.check(request_for())
+
+
+def test_every_problem_is_told_at_once(request_for, monkeypatch):
+    """Nobody wants to mend a job one line at a time."""
+    monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
+
+    with pytest.raises(Refused) as refused:
+        preflight.check(request_for(trainer={"command": ["no-such-program"]}))
+
+    assert len(str(refused.value).splitlines()) == 2

@@ -1,0 +1,168 @@
+"""The run directory: whose it is, what it was made for, what is kept."""
+
+import errno
+import os
+import uuid
+
+import pytest
+import yaml
+
+from palaestra.local import rundir
+from palaestra.local.errors import Refused, StorageFailed
+from palaestra.local.files import write
+from palaestra.local.outcome import Outcome, summary
+
+SPEC = {"seed": 1, "replicas": 1, "simulators": [{"name": "a", "startDeadlineSeconds": 60}]}
+
+
+def record(**changes):
+    """Return a job as it is written down, with changes to its spec."""
+    return {"kind": "TrainingJob", "spec": {**SPEC, **changes}}
+
+
+@pytest.fixture
+def directory(tmp_path):
+    """A run directory that a job was started in."""
+    path = tmp_path / "job" / "0"
+    rundir.prepare(path, record())
+    return path
+
+
+def test_the_uid_of_a_job_follows_from_its_place(tmp_path):
+    """The same command resumes the same run; two directories are two jobs."""
+    here, there = tmp_path / "a", tmp_path / "b"
+
+    assert rundir.uid_of(here) == rundir.uid_of(here)
+    assert rundir.uid_of(here) != rundir.uid_of(there)
+    assert uuid.UUID(rundir.uid_of(here)).version == 5
+
+
+def test_a_run_goes_on_with_the_job_that_it_was_started_with(directory):
+    """The same file, read again."""
+    rundir.refuse_another_job(directory, record())
+
+
+def test_a_new_directory_takes_any_job(tmp_path):
+    """There is nothing to contradict."""
+    rundir.refuse_another_job(tmp_path / "new", record())
+
+
+def test_a_changed_job_is_refused_with_every_changed_field(directory):
+    """Half a run of one job and half of another is a run of none."""
+    changed = record(seed=2, simulators=[{"name": "b", "startDeadlineSeconds": 60}])
+
+    with pytest.raises(Refused) as refused:
+        rundir.refuse_another_job(directory, changed)
+
+    lines = str(refused.value).splitlines()
+    assert lines[:2] == ["spec.seed: was 1, is 2", "spec.simulators[0].name: was 'a', is 'b'"]
+    assert "--fresh" in lines[2]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"replicas": 3},
+        {"suspend": True},
+        {"backoffLimit": 9},
+        {"stallDeadlineSeconds": 5},
+        {"simulators": [{"name": "a", "startDeadlineSeconds": 90}]},
+    ],
+)
+def test_what_does_not_change_what_is_learned_may_change(directory, change):
+    """Deadlines and the number of replicas, as in a cluster."""
+    rundir.refuse_another_job(directory, record(**change))
+
+
+def test_a_field_that_is_new_or_gone_is_a_change():
+    """Absent is a value too."""
+    assert list(rundir.changed_fields({"a": {"b": 1}}, {"a": {"c": [1]}})) == [
+        "a.b: was 1, is absent",
+        "a.c[0]: was absent, is 1",
+    ]
+
+
+def test_only_one_runner_at_a_time_has_a_directory(tmp_path):
+    """Two trainers in one directory would overwrite each other's checkpoints."""
+    path = tmp_path / "job" / "0"
+
+    with rundir.locked(path), pytest.raises(Refused, match=rf"process {os.getpid()}"), rundir.locked(path):
+        pass
+
+
+def test_a_lock_is_free_again_afterwards(tmp_path):
+    """Also after an error; the kernel sees to it when the process is gone."""
+    path = tmp_path / "job" / "0"
+    with pytest.raises(ZeroDivisionError), rundir.locked(path):
+        raise ZeroDivisionError
+
+    with rundir.locked(path):
+        assert path.with_name("0.lock").exists()
+
+
+def test_replicas_are_locked_apart(tmp_path):
+    """Two terminals may run one each."""
+    with rundir.locked(tmp_path / "0"), rundir.locked(tmp_path / "1"):
+        assert (tmp_path / "1.lock").exists()
+
+
+def test_what_was_there_is_set_aside_not_deleted(directory):
+    """A trained policy is worth more than a typing error."""
+    first = rundir.set_aside(directory)
+    rundir.prepare(directory, record(seed=2))
+    second = rundir.set_aside(directory)
+
+    assert [first.name, second.name] == ["0.old-1", "0.old-2"]
+    assert yaml.safe_load((first / "job.yaml").read_text()) == record()
+    assert rundir.set_aside(directory) is None
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch):
+    """A full disk shows itself while writing, not before."""
+    path = tmp_path / "file"
+    write(path, b"old")
+    monkeypatch.setattr(os, "fsync", _full)
+
+    with pytest.raises(StorageFailed, match=r"No space left on device; choose another folder"):
+        write(path, b"new")
+
+    assert path.read_bytes() == b"old"
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]
+
+
+def _full(descriptor):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_an_outcome_is_kept_in_the_directory(directory):
+    """A finished run is reported from it, without starting anything."""
+    outcome = Outcome(exit_code=0, steps=50, success_rate=0.95, faults=1)
+
+    outcome.keep(directory)
+
+    assert Outcome.of(directory) == outcome
+    assert outcome.finished
+
+
+@pytest.mark.parametrize("content", [None, "", "{", "[]", '{"exit_code": 0, "other": 1}'])
+def test_a_directory_without_a_readable_outcome_is_not_finished(directory, content):
+    """It was cut off, so it goes on."""
+    if content is not None:
+        (directory / "outcome.json").write_text(content)
+
+    assert Outcome.of(directory) is None
+
+
+def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
+    """What nobody measured is left out."""
+    (directory / "model.zip").touch()
+
+    lines = summary(
+        Outcome(exit_code=0, steps=50_000, success_rate=0.951), directory, "palaestra eval x.yaml"
+    )
+
+    assert [line.split()[0] for line in lines] == ["success", "steps", "run", "look", "try"]
+    assert lines[0].endswith("95%")
+    assert lines[1].endswith("50,000")
+    assert lines[3].endswith(f"tensorboard --logdir {directory}/tensorboard")
+    assert lines[4].endswith("palaestra eval x.yaml")

@@ -1,0 +1,409 @@
+"""Fields over ROS: types, values, when a write is seen, and what a rotation goes through."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_sim.stub.catalogue import FieldType, field_kinds, type_number
+from palaestra_sim.stub.fields import quaternion_to_axis_angle
+from palaestra_sim.stub.geometry import axis_angle_to_quaternion
+from palaestra_sim.stub.nodes import SceneTree
+from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.world import builtin
+
+HALF = math.sqrt(0.5)
+
+
+@pytest.fixture
+def field(robot):
+    """`field("TARGET", "translation")`: the handle of a field."""
+
+    def find(def_name, name):
+        node = robot.get("supervisor/get_from_def", name=def_name)
+        return robot.get("supervisor/node/get_field", node=node, fieldName=name)
+
+    return find
+
+
+def xyz(vector):
+    """A vector message as a tuple."""
+    return vector.x, vector.y, vector.z
+
+
+@pytest.mark.parametrize(
+    ("path", "number", "type_name", "count"),
+    [
+        ("TARGET.translation", 5, "SFVec3f", -1),
+        ("TARGET.rotation", 6, "SFRotation", -1),
+        ("TARGET.children", 0x19, "MFNode", 1),
+        ("ROBOTINO.customData", 8, "SFString", -1),
+        ("ROBOTINO.controllerArgs", 0x18, "MFString", 3),
+        ("ROBOTINO.supervisor", 1, "SFBool", -1),
+        ("ROBOTINO.physics", 9, "SFNode", -1),
+        ("ROBOTINO.battery", 0x13, "MFFloat", 0),
+        ("FLOOR_BOX.size", 5, "SFVec3f", -1),
+        ("BODY.radius", 3, "SFFloat", -1),
+        ("BODY.subdivision", 2, "SFInt32", -1),
+    ],
+)
+def test_a_field_tells_its_type(robot, field, path, number, type_name, count):
+    """MF types have 0x10 added; an SF field counts -1."""
+    def_name, name = path.split(".")
+    handle = field(def_name, name)
+
+    assert robot.get("supervisor/field/get_name", field=handle) == name
+    assert robot.get("supervisor/field/get_type", field=handle) == number
+    assert robot.get("supervisor/field/get_type_name", field=handle) == type_name
+    assert robot.get("supervisor/field/get_count", field=handle) == count
+
+
+def test_values_of_the_world_file_and_defaults_are_read(robot, field):
+    """Whether the file writes them or not."""
+    get = robot.get
+
+    assert xyz(get("supervisor/field/get_vec3f", field=field("TARGET", "translation"))) == (1.5, 0, 0.001)
+    assert get("supervisor/field/get_float", field=field("BODY", "radius")) == 0.2266
+    assert get("supervisor/field/get_bool", field=field("ROBOTINO", "supervisor")) == 1
+    assert get("supervisor/field/get_string", field=field("ROBOTINO", "name")) == "robotino"
+    assert get("supervisor/field/get_int32", field=field("BODY", "subdivision")) == 36
+    assert get("supervisor/field/get_string", field=field("ROBOTINO", "window")) == "<generic>"
+    assert xyz(get("supervisor/field/get_vec3f", field=field("TARGET", "translation"), index=7))[0] == 1.5
+
+
+def test_colours_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
+    """The services' types, not the fields'."""
+    start(
+        world(
+            "DEF LIGHT DirectionalLight { color 1 0.5 0.25 } DEF P Pose { children [ Shape {"
+            " geometry DEF PLANE Plane { size 3 4 } } ] }"
+        )
+    )
+    robot = ros.node("robotino")
+
+    def find(def_name, name):
+        node = robot.get("supervisor/get_from_def", name=def_name)
+        return robot.get("supervisor/node/get_field", node=node, fieldName=name)
+
+    colour = robot.get("supervisor/field/get_color", field=find("LIGHT", "color"))
+    size = robot.get("supervisor/field/get_vec2f", field=find("PLANE", "size"))
+
+    assert (colour.r, colour.g, colour.b, colour.a) == pytest.approx((1.0, 0.5, 0.25, 1.0))
+    assert xyz(size) == (3.0, 4.0, 0.0)
+
+
+def test_mf_values_are_read_by_index(robot, field):
+    """Negative ones count from the end."""
+    handle = field("ROBOTINO", "controllerArgs")
+
+    values = [robot.get("supervisor/field/get_string", field=handle, index=index) for index in (0, 1, -1)]
+
+    assert values == ["--name=robotino", "--synchronize", "--clock"]
+
+
+def test_nodes_of_fields_are_handles(robot, field):
+    """0 where there is none."""
+    children = field("TARGET", "children")
+
+    first = robot.get("supervisor/field/get_node", field=children, index=0)
+
+    assert robot.get("supervisor/node/get_type_name", node=first) == "Shape"
+    assert robot.get("supervisor/field/get_node", field=children, index=5) == 0
+    assert robot.get("supervisor/field/get_node", field=field("TARGET", "translation")) == 0
+
+
+def test_a_written_value_is_read_at_once_and_seen_with_the_next_step(robot, field, position):
+    """Writes are queued; `get` answers what is pending, getters of the node what is."""
+    handle = field("TARGET", "translation")
+
+    assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": -1.0, "y": 0.5}) == 1
+    assert xyz(robot.get("supervisor/field/get_vec3f", field=handle)) == (-1.0, 0.5, 0.0)
+    assert position(robot, "TARGET") == (1.5, 0.0, 0.001)
+    robot.call("robot/time_step", value=32)
+
+    assert position(robot, "TARGET") == (-1.0, 0.5, 0.0)
+
+
+def test_the_last_of_several_writes_wins(robot, field, position):
+    """Within one step."""
+    handle = field("TARGET", "translation")
+    for x in (0.1, 0.2, 0.3):
+        robot.call("supervisor/field/set_vec3f", field=handle, value={"x": x})
+
+    robot.call("robot/time_step", value=32)
+
+    assert position(robot, "TARGET") == (0.3, 0.0, 0.0)
+
+
+def test_a_robot_is_moved_by_its_translation_and_rotation(robot, field, position):
+    """As an episode begins; the robot drives on from there."""
+    robot.call(
+        "supervisor/field/set_vec3f",
+        field=field("ROBOTINO", "translation"),
+        value={"x": 1.2, "y": -0.3},
+    )
+    robot.call(
+        "supervisor/field/set_rotation",
+        field=field("ROBOTINO", "rotation"),
+        value={"z": HALF, "w": HALF},
+    )
+
+    robot.call("robot/time_step", value=32)
+    handle = robot.get("supervisor/get_from_def", name="ROBOTINO")
+    turned = robot.get("supervisor/node/get_orientation", node=handle)
+
+    assert position(robot, "ROBOTINO") == (1.2, -0.3, 0.0)
+    assert (turned.z, turned.w) == pytest.approx((HALF, HALF))
+
+
+def test_the_translation_of_a_robot_is_where_it_is(robot, field, drive):
+    """Not where it was put."""
+    drive(robot, 0.1, 0.0, 0.0)
+
+    robot.call("robot/time_step", value=3200)
+
+    point = robot.get("supervisor/field/get_vec3f", field=field("ROBOTINO", "translation"))
+    assert xyz(point) == pytest.approx((0.32, 0.0, 0.0))
+
+
+def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
+    """Rays and collisions follow."""
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=32)
+    robot.call(
+        "supervisor/field/set_vec3f",
+        field=field("CYLINDER_0", "translation"),
+        value={"x": 0.5, "z": 0.2},
+    )
+
+    robot.call("robot/time_step", value=32)
+
+    assert inbox[0] == pytest.approx(1.1, rel=0.2)
+
+
+def test_a_write_beyond_the_values_that_there_are_is_lost(robot, field):
+    """Answered with success all the same."""
+    handle = field("ROBOTINO", "controllerArgs")
+
+    assert robot.get("supervisor/field/set_string", field=handle, index=9, value="x") == 1
+    assert robot.get("supervisor/field/get_string", field=handle, index=9) == ""
+
+
+def test_other_values_are_kept_and_change_nothing(robot, field):
+    """The physics knows the size that the world file has."""
+    handle = field("BODY", "radius")
+    robot.call("supervisor/field/set_float", field=handle, value=0.5)
+    robot.call("robot/time_step", value=32)
+
+    assert robot.get("supervisor/field/get_float", field=handle) == 0.5
+
+
+def test_custom_data_can_be_written_both_ways(robot, field):
+    """At once through the robot, with the next step through the field."""
+    handle = field("ROBOTINO", "customData")
+    robot.call("robot/set_custom_data", value="a")
+    assert robot.get("supervisor/field/get_string", field=handle) == "a"
+
+    robot.call("supervisor/field/set_string", field=handle, value="b")
+    assert robot.get("robot/get_custom_data") == "a"
+    robot.call("robot/time_step", value=32)
+
+    assert robot.get("robot/get_custom_data") == robot.get("robot/get_data") == "b"
+
+
+def test_an_episode_is_seeded_by_custom_data_and_reset_in_one_step(robot, field):
+    """Write, reset, step: the write is seen before the reset, so both take one step."""
+    handle = field("ROBOTINO", "customData")
+    inbox = robot.inbox("ir1/value")
+    robot.call("ir1/enable", value=192)
+    runs = []
+    for seed in ("3", "4", "3"):
+        robot.call("supervisor/field/set_string", field=handle, value=f'{{"seed": {seed}}}')
+        robot.call("supervisor/simulation_reset")
+        del inbox[:]
+        for _ in range(5):
+            robot.call("robot/time_step", value=192)
+        runs.append(list(inbox))
+
+    assert runs[0] == runs[2] != runs[1]
+    assert robot.get("supervisor/field/get_string", field=handle) == '{"seed": 3}'
+
+
+def test_a_reset_restores_places_and_not_other_fields(robot, field, position):
+    """Poses are restored, field edits stay."""
+    robot.call("supervisor/field/set_vec3f", field=field("TARGET", "translation"), value={"x": -1.0})
+    robot.call("supervisor/field/set_float", field=field("BODY", "radius"), value=0.5)
+    robot.call("robot/time_step", value=32)
+    robot.call("supervisor/simulation_reset")
+    robot.call("robot/time_step", value=32)
+
+    assert position(robot, "TARGET") == (1.5, 0.0, 0.001)
+    assert robot.get("robot/get_time") == pytest.approx(0.032)
+    assert robot.get("supervisor/field/get_float", field=field("BODY", "radius")) == 0.5
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_value_that_libcontroller_refuses_answers_success(robot, field, bad):
+    """And leaves the field as it was."""
+    handle = field("TARGET", "translation")
+
+    assert robot.get("supervisor/field/set_vec3f", field=handle, value={"x": bad}) == 1
+
+    assert xyz(robot.get("supervisor/field/get_vec3f", field=handle)) == (1.5, 0.0, 0.001)
+
+
+def test_a_value_of_the_wrong_type_answers_success(robot, field):
+    """And is not there."""
+    handle = field("TARGET", "translation")
+
+    assert robot.get("supervisor/field/set_float", field=handle, value=1.0) == 1
+    assert robot.get("supervisor/field/set_string", field=handle, value="x") == 1
+    assert robot.get("supervisor/field/set_vec3f", field=field("BODY", "radius"), value={}) == 1
+
+
+def test_a_read_of_the_wrong_type_answers_nothing_or_fails(robot, field):
+    """0 and "" where libController has them; a null vector crashes the real controller."""
+    handle = field("TARGET", "translation")
+
+    assert robot.get("supervisor/field/get_float", field=handle) == 0.0
+    assert robot.get("supervisor/field/get_string", field=handle) == ""
+    with pytest.raises(ServiceFailed, match=r"radius .SFFloat. has no VEC3F"):
+        robot.call("supervisor/field/get_vec3f", field=field("BODY", "radius"))
+
+
+def test_mf_values_can_be_set_inserted_and_removed(robot, field):
+    """An insertion into an SF field is the one write that says no."""
+    handle = field("ROBOTINO", "controllerArgs")
+
+    def values():
+        count = robot.get("supervisor/field/get_count", field=handle)
+        return [robot.get("supervisor/field/get_string", field=handle, index=i) for i in range(count)]
+
+    assert robot.get("supervisor/field/insert_string", field=handle, index=0, value="first") == 1
+    assert robot.get("supervisor/field/insert_string", field=handle, index=-1, value="last") == 1
+    assert robot.get("supervisor/field/set_string", field=handle, index=1, value="second") == 1
+    assert values() == ["first", "second", "--synchronize", "--clock", "last"]
+    assert robot.get("supervisor/field/remove", field=handle, index=0) == 1
+    assert robot.get("supervisor/field/remove", field=handle, index=9) == 0
+    assert robot.get("supervisor/field/insert_string", field=handle, index=9, value="x") == 0
+    assert values() == ["second", "--synchronize", "--clock", "last"]
+    translation = field("TARGET", "translation")
+    assert robot.get("supervisor/field/insert_vec3f", field=translation, index=0, value={}) == 0
+    assert robot.get("supervisor/field/remove", field=translation, index=0) == 0
+
+
+def test_nodes_are_neither_added_nor_removed(robot, field):
+    """The stub simulates what the world file has."""
+    handle = field("TARGET", "children")
+
+    assert robot.get("supervisor/field/import_node_from_string", field=handle, nodeString="Box {}") == 0
+    assert robot.get("supervisor/field/remove_node", field=handle, position=0) == 0
+    assert robot.get("supervisor/field/remove", field=handle, index=0) == 0
+    assert robot.get("supervisor/field/enable_sf_tracking", field=handle, sampling_period=32) == 1
+
+
+def test_a_rotation_of_zero_cannot_be_written_back(robot, field):
+    """The fault of the real controller: reading gives the identity, writing that is refused in silence."""
+    handle = field("ROBOTINO", "rotation")
+    saved = robot.get("supervisor/field/get_rotation", field=handle)
+    assert (saved.x, saved.y, saved.z, saved.w) == (0.0, 0.0, 0.0, 1.0)
+    turned = {"z": HALF, "w": HALF}
+    robot.call("supervisor/field/set_rotation", field=handle, value=turned)
+    robot.call("robot/time_step", value=32)
+
+    identity = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    assert robot.get("supervisor/field/set_rotation", field=handle, value=identity) == 1
+    robot.call("robot/time_step", value=32)
+
+    assert robot.get("supervisor/field/get_rotation", field=handle).z == pytest.approx(HALF)
+
+
+def test_the_workaround_writes_a_rotation_of_zero(robot, field):
+    """A tiny z beside w = 1: the angle is exactly 0, the axis is z."""
+    handle = field("ROBOTINO", "rotation")
+    robot.call("supervisor/field/set_rotation", field=handle, value={"z": HALF, "w": HALF})
+    robot.call("robot/time_step", value=32)
+
+    robot.call("supervisor/field/set_rotation", field=handle, value={"z": 1e-6, "w": 1.0})
+    robot.call("robot/time_step", value=32)
+
+    restored = robot.get("supervisor/field/get_rotation", field=handle)
+    assert (restored.x, restored.y, restored.z, restored.w) == (0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("w", [1.0000001, -1.5, math.nan])
+def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
+    """So it is refused: normalise first."""
+    assert math.isnan(quaternion_to_axis_angle(0.0, 0.0, 0.1, w)[3])
+
+
+@given(
+    angle=st.floats(0.001, 6.2),
+    axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda a: math.hypot(*a) > 0.1),
+)
+def test_other_rotations_survive_the_way_there_and_back(angle, axis):
+    """Within what float64 and acos leave."""
+    length = math.hypot(*axis)
+    unit = tuple(it / length for it in axis)
+    x, y, z, w = axis_angle_to_quaternion((*unit, angle))
+
+    back = quaternion_to_axis_angle(x, y, z, max(-1.0, min(1.0, w)))
+
+    assert back[3] == pytest.approx(angle, abs=1e-4)
+    assert back[:3] == pytest.approx(unit, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("type_name", "number"),
+    [("Robot", 34), ("Solid", 80), ("WorldInfo", 84), ("TouchSensor", 60), ("Nonsense", 0), ("-", 0)],
+)
+def test_type_numbers_are_those_of_nodes_h(type_name, number):
+    """Counted from WB_NODE_NO_NODE = 0."""
+    assert type_number(type_name) == number
+
+
+def test_a_kind_of_robot_is_a_kind_of_solid():
+    """Inherited fields come first; a default of its own replaces the inherited one in place."""
+    solid, robot = list(field_kinds("Solid")), list(field_kinds("Robot"))
+
+    assert robot[: len(solid)] == solid
+    assert field_kinds("Robot")["name"].default == "robot"
+    assert field_kinds("Nonsense") == {}
+
+
+@pytest.mark.parametrize(
+    ("written", "kind"),
+    [
+        ("1", "SFFloat"),
+        ("1 2", "SFVec2f"),
+        ("1 2 3", "SFVec3f"),
+        ("0 0 1 2", "SFRotation"),
+        ("[ 1 2 3 ]", "MFFloat"),
+        ('"text"', "SFString"),
+        ('[ "text" ]', "MFString"),
+        ("TRUE", "SFBool"),
+        ("NULL", "SFNode"),
+        ("[ Box { } ]", "MFNode"),
+        ("[ ]", "MFNode"),
+        ("1 2 3 4 5 6", "MFFloat"),
+    ],
+)
+def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, written, kind):
+    """So that a newer or rarer field can still be read."""
+    tree = SceneTree(Simulation.load(world(f"DEF A Pose {{ novelty {written} }}")))
+
+    assert tree.of_def("A").field("novelty").kind.name == kind
+
+
+def test_every_field_of_the_shipped_worlds_has_values():
+    """No default is malformed, no value is lost."""
+    for name in ("arena", "two_robots"):
+        tree = SceneTree(Simulation.load(builtin(name)))
+        for node in list(tree.nodes):
+            for field_name, kind in node.kinds.items():
+                found = node.field(field_name)
+                if not kind.multiple:
+                    found.get(FieldType(kind.type))
+                assert found.count >= -1

@@ -1,0 +1,274 @@
+"""A stub from one world to the next: reload, load, restart, quit, and what controllerArgs ask for."""
+
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.stub.simulation import Mode
+from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.world import builtin
+
+
+def test_a_controller_starts_for_each_ros_robot(ros, start):
+    """Under the names of controllerArgs."""
+    simulator = start(builtin("two_robots"))
+
+    assert list(simulator.controllers) == ["supervisor", "robotino"]
+    assert [node.name for node in ros.nodes] == ["supervisor", "robotino"]
+
+
+def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_robot):
+    """They stand about, and the world does not wait for them."""
+    start(world('Robot { name "statue" controller "<none>" }', robot=simple_robot))
+
+    assert [node.name for node in ros.nodes] == ["robotino"]
+    assert ros.node("robotino").get("robot/time_step", value=32) is True
+
+
+def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
+    """The error comes before any node does."""
+    path = tmp_path / "bad.wbt"
+    path.write_bytes(b"#VRML_SIM R2023b utf8\nRectangleArena { }\n")
+
+    with pytest.raises(WorldError, match=r"bad.wbt:2:1: the stub simulates no RectangleArena"):
+        Simulator(path, ros.make_node)
+
+    assert ros.nodes == []
+
+
+@pytest.mark.parametrize(
+    ("change", "fact"),
+    [
+        (('"--name=robotino" ', ""), "controllerArgs without --name=; generate the world"),
+        (('"--synchronize"', ""), "controllerArgs without --synchronize"),
+        (('"--synchronize"', '"--synchronize" "--use-sim-time"'), "the stub knows no --use-sim-time"),
+        (('"--synchronize"', '"--synchronize" "--use-ros-control"'), "no --use-ros-control"),
+    ],
+)
+def test_arguments_that_the_stub_cannot_follow_are_refused(start, world, simple_robot, change, fact):
+    """A robot that runs freely, or under another's control, is not what this simulates."""
+    with pytest.raises(WorldError, match=fact):
+        start(world(robot=simple_robot.replace(*change)))
+
+
+def test_unknown_arguments_are_ignored(ros, start, world, simple_robot):
+    """The real controller complains in its log and goes on."""
+    start(world(robot=simple_robot.replace('"--synchronize"', '"--synchronize" "--speed=7"')))
+
+    assert ros.node("robotino").get("robot/get_time") == 0.0
+
+
+def test_a_reload_ends_the_controllers_and_starts_new_ones(ros, start):
+    """Services vanish and come back; enables are lost; the file's state is restored."""
+    start()
+    old = ros.node("robotino")
+    old.call("ir1/enable", value=32)
+    old.call("robot/time_step", value=320)
+
+    assert old.get("supervisor/world_reload") is True
+    new = ros.node("robotino")
+
+    assert old.closed
+    assert new is not old
+    assert new.get("robot/get_time") == 0.0
+    assert new.get("ir1/get_sampling_period") == 0
+
+
+def test_handles_do_not_survive_a_reload(ros, start):
+    """In Webots they dangle; here they fail."""
+    start()
+    old = ros.node("robotino")
+    handle = old.get("supervisor/get_from_def", name="TARGET")
+    old.call("supervisor/world_reload")
+    new = ros.node("robotino")
+
+    assert new.get("supervisor/get_from_def", name="TARGET") != handle
+    with pytest.raises(ServiceFailed, match="does not exist; get a new handle"):
+        new.call("supervisor/node/get_position", node=handle)
+
+
+def test_revert_is_the_old_name_of_reload(ros, start):
+    """Deprecated, still served."""
+    start()
+
+    ros.node("robotino").call("supervisor/simulation_revert")
+
+    assert len(ros.nodes) == 2
+
+
+def test_a_reload_reads_the_file_again(ros, start):
+    """What was edited meanwhile is there; the mode stays."""
+    simulator = start(mode=Mode.FAST)
+    text = simulator.world_path.read_bytes()
+    simulator.world_path.write_bytes(text.replace(b"basicTimeStep 32", b"basicTimeStep 16"))
+
+    ros.node("robotino").call("supervisor/world_reload")
+
+    assert ros.node("robotino").get("robot/get_basic_time_step") == 16.0
+    assert ros.node("robotino").get("supervisor/simulation_get_mode") == Mode.FAST
+
+
+def test_another_world_can_be_loaded(ros, start, world, tmp_path):
+    """By its absolute path."""
+    start()
+    other = tmp_path / "other.wbt"
+    other.write_bytes(world())
+
+    assert ros.node("robotino").get("supervisor/world_load", value=str(other)) is True
+    assert ros.node("robotino").get("robot/get_world_path") == str(other)
+    assert ros.node("robotino").get("robot/get_number_of_devices") == 8
+
+
+@pytest.mark.parametrize("content", [None, b"", b"#VRML_SIM R2023b utf8\nSphere { }"])
+def test_a_world_that_cannot_be_loaded_leaves_the_present_one(ros, start, tmp_path, content):
+    """Missing, empty, or beyond the stub."""
+    start()
+    other = tmp_path / "other.wbt"
+    if content is not None:
+        other.write_bytes(content)
+
+    assert ros.node("robotino").get("supervisor/world_load", value=str(other)) is False
+    assert len(ros.nodes) == 1
+    assert ros.node("robotino").get("robot/time_step", value=32) is True
+
+
+def test_a_reload_with_two_robots_restarts_both(two_robots, ros):
+    """And the world waits for both again."""
+    supervisor, _ = two_robots
+
+    supervisor.call("supervisor/world_reload")
+    pending = ros.node("supervisor").ask("robot/time_step", value=32)
+    ros.advance(1)
+    assert pending not in ros.node("supervisor").answers
+    ros.node("robotino").call("robot/time_step", value=32)
+
+    assert ros.node("supervisor").answers[pending].success is True
+
+
+def test_one_controller_can_be_restarted_alone(two_robots, ros):
+    """The world and the other robot go on."""
+    supervisor, robotino = two_robots
+    handle = supervisor.get("supervisor/get_from_def", name="ROBOTINO")
+    for node in (supervisor, robotino):
+        node.ask("robot/time_step", value=32)
+    ros.advance(0)
+
+    assert supervisor.get("supervisor/node/restart_controller", node=handle) == 1
+
+    assert robotino.closed
+    assert not supervisor.closed
+    assert ros.node("robotino").get("robot/get_time") == pytest.approx(0.032)
+
+
+def test_only_robots_have_controllers_to_restart(two_robots):
+    """Anything else answers 0."""
+    supervisor, _ = two_robots
+    handle = supervisor.get("supervisor/get_from_def", name="TARGET")
+
+    assert supervisor.get("supervisor/node/restart_controller", node=handle) == 0
+
+
+def test_quit_tells_the_process_its_exit_status(ros, start):
+    """After the answer was sent."""
+    simulator = start()
+    statuses = []
+    simulator.on_quit(statuses.append)
+    robot = ros.node("robotino")
+
+    number = robot.ask("supervisor/simulation_quit", value=3)
+    assert robot.answers[number].success is True
+    assert statuses == []
+    ros.advance(0)
+
+    assert statuses == [3]
+    assert simulator.quit_status == 3
+
+
+def test_quit_ends_pending_steps_without_success(two_robots):
+    """-1 from wb_robot_step: the controller ends."""
+    supervisor, robotino = two_robots
+    pending = robotino.ask("robot/time_step", value=32)
+
+    supervisor.call("supervisor/simulation_quit", value=0)
+
+    assert robotino.answers[pending].success is False
+
+
+def test_quitting_twice_keeps_the_first_status(ros, start):
+    """Whoever is second comes too late."""
+    simulator = start()
+    robot = ros.node("robotino")
+
+    robot.ask("supervisor/simulation_quit", value=0)
+    robot.ask("supervisor/simulation_quit", value=1)
+    ros.advance(0)
+
+    assert simulator.quit_status == 0
+
+
+def test_closing_ends_every_controller(ros, start):
+    """As on SIGTERM: services are unregistered in good order."""
+    simulator = start(builtin("two_robots"))
+
+    simulator.close()
+
+    assert simulator.controllers == {}
+    assert all(node.closed for node in ros.nodes)
+
+
+def test_messages_that_were_due_at_a_reload_never_come(ros, start):
+    """Their controller is gone."""
+    start(publish_delay_s=0.01)
+    old = ros.node("robotino")
+    inbox = old.inbox("ir1/value")
+    old.call("ir1/enable", value=32)
+    old.call("robot/time_step", value=32)
+
+    old.call("supervisor/world_reload")
+    ros.advance(1)
+
+    assert inbox == []
+
+
+def test_a_step_that_sleeps_through_a_restart_is_not_answered(ros, start):
+    """The connection is gone by then."""
+    start(builtin("two_robots"), step_sleep_s=0.01)
+    supervisor, robotino = ros.node("supervisor"), ros.node("robotino")
+    numbers = [node.ask("robot/time_step", value=32) for node in (supervisor, robotino)]
+    ros.advance(0.02)
+    assert [n in node.answers for n, node in zip(numbers, (supervisor, robotino), strict=True)] == [True] * 2
+
+    handle = supervisor.get("supervisor/get_from_def", name="ROBOTINO")
+    sleeping = robotino.ask("robot/time_step", value=32)
+    supervisor.call("supervisor/node/restart_controller", node=handle)
+    ros.advance(1)
+
+    assert sleeping not in robotino.answers
+
+
+def test_reset_through_the_supervisor_needs_a_step(robot, drive, position):
+    """The flag is set at once, the work is done inside the next basic step; nothing restarts."""
+    drive(robot, 0.3, 0.0, 0.0)
+    robot.call("ir1/enable", value=192)
+    inbox = robot.inbox("ir1/value")
+    robot.call("robot/time_step", value=192)
+
+    assert robot.get("supervisor/simulation_reset") is True
+    assert position(robot, "ROBOTINO")[0] > 0.0
+    robot.call("robot/time_step", value=192)
+
+    assert position(robot, "ROBOTINO") == (0.0, 0.0, 0.0)
+    assert robot.get("ir1/get_sampling_period") == 192
+    assert robot.get("wheel0_joint/get_target_position") == 0.0
+    assert len(inbox) == 2
+
+
+def test_reset_physics_through_the_supervisor_is_at_once(robot, drive):
+    """No step needed."""
+    drive(robot, 1.0, 0.0, 0.0)
+    robot.call("robot/time_step", value=320)
+    handle = robot.get("supervisor/get_self")
+
+    assert robot.get("supervisor/simulation_reset_physics") is True
+
+    assert robot.get("supervisor/node/get_velocity", node=handle).linear.x == 0.0
