@@ -4,10 +4,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-ros_packages=(python3-rospy python3-rosmaster python3-venv)
+# rospy's own service proxies import netifaces, on which its package forgets to depend.
+ros_packages=(python3-rospy python3-rosmaster python3-netifaces python3-venv)
 
 ros_is_installed() {
-  /usr/bin/python3 -c 'import ensurepip, rospy, rosmaster' 2>/dev/null
+  /usr/bin/python3 -c 'import ensurepip, netifaces, rospy, rosmaster' 2>/dev/null
 }
 
 if ! ros_is_installed; then

@@ -11,7 +11,6 @@ from palaestra.api import TrainingJob, load
 from palaestra.api.generated import crd_text
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import LocalError
-from palaestra.local.evaluate import evaluate
 from palaestra.local.replica import KILLED
 from palaestra.local.run import Options, run
 from palaestra.local.rundir import job_directory, uid_of
@@ -39,10 +38,6 @@ Reads the TrainingJob in FILE and writes <dir>/<job name>/<replica>/: checkpoint
 evaluations.jsonl, model.zip, the generated worlds, training.yaml and logs/. Typed again it goes on from
 the newest checkpoint. Replicas run one after another; --replica picks one.
 Ctrl-C ends it with a checkpoint, a second one at once.
-"""
-EVAL = """\
-Reads the TrainingJob in FILE and the model.zip of its run in <dir>, plays episodes with seeds on which
-nothing was chosen, and writes what it measured to standard output as one JSON object.
 """
 PLAN = """\
 Reads the TrainingJob in FILE and writes the Kubernetes objects that it needs to standard output, as
@@ -83,22 +78,16 @@ def _failed(error: Exception, exit_code: int) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    return run(_job(options.file), _options(options, fresh=options.fresh))
-
-
-def _eval(options: argparse.Namespace) -> int:
-    return evaluate(_job(options.file), _options(options), options.episodes)
-
-
-def _options(options: argparse.Namespace, *, fresh: bool = False) -> Options:
-    return Options(
-        file=options.file,
-        runs=options.dir,
-        version=version("palaestra"),
-        replica=options.replica,
-        fresh=fresh,
-        verbose=options.verbose,
-        ros_port=options.ros_port,
+    return run(
+        _job(options.file),
+        Options(
+            runs=options.dir,
+            version=version("palaestra"),
+            replica=options.replica,
+            fresh=options.fresh,
+            verbose=options.verbose,
+            ros_port=options.ros_port,
+        ),
     )
 
 
@@ -165,7 +154,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"palaestra {version('palaestra')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_run(commands)
-    _add_eval(commands)
     _add_plan(commands)
     _add_world(commands)
     _command(commands, "crd", _crd, "print the CustomResourceDefinition", CRD)
@@ -192,21 +180,10 @@ def _command(
 
 def _add_run(commands: Commands) -> None:
     parser = _command(commands, "run", _run, "train on this machine", RUN)
-    _add_place(parser)
-    parser.add_argument("--fresh", action="store_true", help="begin anew; what was there is moved aside")
-
-
-def _add_eval(commands: Commands) -> None:
-    parser = _command(commands, "eval", _eval, "measure a policy that was trained here", EVAL)
-    _add_place(parser)
-    parser.add_argument("--episodes", metavar="N", type=int, default=100, help="how many; default: 100")
-
-
-def _add_place(parser: argparse.ArgumentParser) -> None:
-    """Add what `run` and `eval` have in common."""
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     _add_dir(parser)
     parser.add_argument("--replica", metavar="N", type=int, help="this replica only")
+    parser.add_argument("--fresh", action="store_true", help="begin anew; what was there is moved aside")
     parser.add_argument(
         "--ros-port", metavar="PORT", type=int, help="port of the ROS master; default: a free one"
     )

@@ -35,17 +35,17 @@ def alive(pod_uid: str) -> list[int]:
     return found
 
 
+def _eventually(claim: Callable[[], object]) -> None:
+    deadline = time.monotonic() + PATIENCE_S
+    while not claim():
+        assert time.monotonic() < deadline, f"{claim} never held"
+        time.sleep(0.01)
+
+
 @pytest.fixture
 def eventually() -> Callable[[Callable[[], object]], None]:
     """Wait until a claim holds; fail when it does not within the patience."""
-
-    def wait(claim: Callable[[], object]) -> None:
-        deadline = time.monotonic() + PATIENCE_S
-        while not claim():
-            assert time.monotonic() < deadline, f"{claim} never held"
-            time.sleep(0.01)
-
-    return wait
+    return _eventually
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Stage:
 
     def sidecar(self, name: str, **options: object) -> Container:
         """Return a sidecar that tells its start and its end, and ends on SIGTERM."""
-        script = "event start; trap 'event stop; exit 0' TERM; while :; do sleep 0.02; done"
+        script = "trap 'event stop; exit 0' TERM; event start; while :; do sleep 0.02; done"
         return self.container(name, script, **options)
 
     def pod(self, *init: Container, main: str, grace_s: float = PATIENCE_S) -> RunningPod:
@@ -91,6 +91,22 @@ class Stage:
             pod,
             Kubelet(logs=self.logs, backoff=backoff, start_deadline_s=self.start_deadline_s),
         )
+
+    def interrupt(
+        self, event: str, *init: Container, main: str, grace_s: float = PATIENCE_S, kill: bool = False
+    ) -> int | None:
+        """Run a pod, stop it (and kill it) after an event, and return the main exit code."""
+
+        async def run() -> int | None:
+            pod = self.pod(*init, main=main, grace_s=grace_s)
+            running = asyncio.create_task(pod.run())
+            await asyncio.to_thread(_eventually, lambda: event in self.events)
+            pod.stop()
+            if kill:
+                pod.kill()
+            return await running
+
+        return asyncio.run(asyncio.wait_for(run(), PATIENCE_S * 2))
 
     def log(self, name: str) -> Log:
         """Return a log that is closed with the test."""

@@ -3,7 +3,6 @@
 import contextlib
 import http.client
 import json
-import os
 import re
 import signal
 import subprocess
@@ -14,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.control import SidecarState, SimulatorState
+from palaestra_sim.protocol.control import SimulatorState
 from palaestra_sim.world import builtin
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
@@ -229,22 +228,3 @@ def family():
 def ends():
     """Return how to make a simulator that prints `up` and runs one statement at its end."""
     return lambda statement: f"import os, signal, sys\nprint('up')\n{statement}\n"
-
-
-@pytest.fixture
-def alive():
-    """Return whether a process is there, zombies included."""
-
-    def ask(pid):
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, 0)
-            return True
-        return False
-
-    return ask
-
-
-@pytest.fixture
-def states():
-    """Return the names of the states."""
-    return SidecarState

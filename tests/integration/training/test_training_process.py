@@ -53,8 +53,11 @@ def test_a_run_survives_a_fault(write_job, start, tmp_path, algorithm, collector
     assert (tmp_path / "run" / "model.zip").exists()
 
 
-@pytest.mark.parametrize(("algorithm", "total"), [(DQN, 1200), (PPO, 1216)], ids=["DQN", "PPO"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("algorithm", "total", "number"),
+    [(DQN, 1200, signal.SIGINT), (PPO, 1216, signal.SIGTERM)],
+    ids=["DQN", "PPO"],
+)
 def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
     write_job, start, tmp_path, algorithm, total, number
 ):

@@ -106,7 +106,7 @@ def test_crd_prints_a_custom_resource_definition(capsys):
     assert crd["metadata"]["name"] == "trainingjobs.palaestra.dev"
 
 
-@pytest.mark.parametrize("command", ["run", "plan", "eval"])
+@pytest.mark.parametrize("command", ["run", "plan"])
 def test_a_wrong_job_is_told_with_all_its_mistakes(command, tmp_path, fails, monkeypatch):
     """Five mistakes, five lines, and nothing is started or written."""
     monkeypatch.chdir(tmp_path)
@@ -140,13 +140,6 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
     [line] = fails("run", job, "--replica", "2", "--dir", tmp_path / "runs")
 
     assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
-
-
-def test_what_was_not_trained_cannot_be_measured(job, tmp_path, fails):
-    """The message names the command that comes first."""
-    [line] = fails("eval", job, "--dir", tmp_path / "runs")
-
-    assert line.endswith("there is no model.zip; train it first with `palaestra run`")
 
 
 @pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"], ["plan", "--help"]])

@@ -130,7 +130,7 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch)
     assert [each.name for each in tmp_path.iterdir()] == ["file"]
 
 
-def _full(descriptor):
+def _full(_descriptor):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
@@ -157,12 +157,10 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     """What nobody measured is left out."""
     (directory / "model.zip").touch()
 
-    lines = summary(
-        Outcome(exit_code=0, steps=50_000, success_rate=0.951), directory, "palaestra eval x.yaml"
-    )
+    lines = summary(Outcome(exit_code=0, steps=50_000, success_rate=0.951), directory)
 
     assert [line.split()[0] for line in lines] == ["success", "steps", "run", "look", "try"]
     assert lines[0].endswith("95%")
     assert lines[1].endswith("50,000")
     assert lines[3].endswith(f"tensorboard --logdir {directory}/tensorboard")
-    assert lines[4].endswith("palaestra eval x.yaml")
+    assert lines[4].endswith(f"palaestra-eval {directory}")

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from palaestra_sim.protocol.status import Termination
 from palaestra_trainer import cli
 
 WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
@@ -15,7 +16,7 @@ WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
 @pytest.fixture(autouse=True)
 def nothing_given(monkeypatch):
     """Forget what the shell of whoever runs the tests has set."""
-    for name in ("PALAESTRA_CONFIG", "PALAESTRA_RUN"):
+    for name in ("PALAESTRA_CONFIG", "PALAESTRA_RUN", "PALAESTRA_TERMINATION_LOG"):
         monkeypatch.delenv(name, raising=False)
 
 
@@ -31,8 +32,9 @@ def test_help_says_what_is_read_and_written_and_the_exit_codes(program, capsys):
         assert word in text
 
 
-def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path, capsys):
-    """And with no traceback."""
+def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path, capsys, monkeypatch):
+    """And with no traceback; the last word has them too."""
+    monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
     (tmp_path / "training.yaml").write_text(WRONG)
 
     code = cli.train(["--config", str(tmp_path / "training.yaml"), "--run", str(tmp_path / "run")])
@@ -42,21 +44,27 @@ def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path,
     assert "training.yaml: steps: 0 is refused" in text
     assert "training.yaml: simulators:" in text
     assert "Traceback" not in text
+    assert "steps: 0 is refused" in Termination.from_message((tmp_path / "word").read_text()).reason
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
-    ("program", "arguments", "variable"),
-    [(cli.train, [], "PALAESTRA_CONFIG"), (cli.evaluate, ["run"], "PALAESTRA_CONFIG")],
+    ("program", "arguments", "fact"),
+    [
+        (cli.train, [], "PALAESTRA_CONFIG: is not set"),
+        (cli.train, ["--config", "training.yaml"], "training.yaml: cannot be read"),
+        (cli.evaluate, ["run"], "run/training.yaml: cannot be read"),
+    ],
 )
-def test_what_is_not_given_is_named(program, arguments, variable, capsys, monkeypatch, tmp_path):
+def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, capsys, monkeypatch, tmp_path):
     """The variables are set in a pod; a person types the programs by hand."""
     monkeypatch.chdir(tmp_path)
 
     code = program(arguments)
 
     assert code == 2
-    assert f"{variable}: is not set" in capsys.readouterr().err
+    assert fact in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_wrong_configuration_is_told_before_a_learning_library_is_imported(tmp_path):

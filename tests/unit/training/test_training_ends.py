@@ -33,7 +33,7 @@ from palaestra_trainer.watchdog import Watchdog
         (FaultBudgetSpent("x"), 80, "FaultBudgetSpent"),
         (Diverged("NaN"), 81, "Diverged"),
         (SimulatorHung("x", "slow"), 82, "Stalled"),
-        (SimulatorDead("x", "gone"), 1, "Unexpected"),
+        (SimulatorDead("x", "gone"), 1, "SimulatorUnavailable"),
         (OSError(errno.ENOSPC, "full", "run/x"), 1, "DiskFull"),
         (RuntimeError("bug"), 1, "Unexpected"),
     ],

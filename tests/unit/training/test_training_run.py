@@ -237,13 +237,14 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     assert reasons == ["new run", f"resumed at step {saved.step}"]
 
 
-def test_a_finished_run_is_reported_and_not_repeated(play, job, directory):
+def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_word):
     """A pod that is started once more must not cost anything."""
     play(job())
 
     code, members = play(job())
 
     assert (code, members) == (0, {})
+    assert (last_word().step, last_word().reason) == (100, "Completed: before")
     assert len(list(read_lines(directory.attempts))) == 1
 
 

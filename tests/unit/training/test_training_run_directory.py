@@ -15,6 +15,7 @@ from palaestra_trainer.summary import finished, summarise, write_summary
 @pytest.fixture
 def directory(tmp_path):
     """Return a run directory."""
+    (tmp_path / "uid" / "0").mkdir(parents=True)
     return RunDirectory(tmp_path / "uid" / "0")
 
 

@@ -12,11 +12,12 @@ from typing import Any
 
 import structlog
 
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_sim.protocol.status import ExitCode, Termination
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.logs import configure_logs
 from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
+from palaestra_trainer.termination import end_of, write_last_word
 
 log = structlog.get_logger(__name__)
 
@@ -131,9 +132,8 @@ def _run_directory(chosen: Path | None) -> Path:
 
 
 def _refuse(error: Exception) -> int:
-    from palaestra_trainer.termination import end_of  # noqa: PLC0415 - see train()
-
     end = end_of(error)
     for line in end.message.splitlines():
         log.error(line, reason=end.reason)
+    write_last_word(Termination(step=0, reason=f"{end.reason}: {end.message}"))
     return int(end.code)

@@ -19,7 +19,7 @@ RUN_VARIABLE = "PALAESTRA_RUN"
 
 
 class RunDirectory:
-    """One run directory, made if it isn't there.
+    """One run directory, which need not be there yet.
 
     Attributes:
         path: the folder itself.
@@ -27,7 +27,6 @@ class RunDirectory:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        path.mkdir(parents=True, exist_ok=True)
 
     @property
     def attempts(self) -> Path:

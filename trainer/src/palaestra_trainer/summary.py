@@ -56,6 +56,8 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
         content = json.loads(directory.summary.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):
         return None
-    if not isinstance(content, dict) or content.get("target", 0) < configuration.steps:
+    if not isinstance(content, dict) or not content.keys() >= {"target", "steps", "success_rate"}:
+        return None
+    if content["target"] < configuration.steps:
         return None
     return content

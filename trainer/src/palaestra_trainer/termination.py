@@ -18,6 +18,7 @@ from palaestra_trainer.errors import (
     ConfigurationError,
     FaultBudgetSpent,
     MasterLost,
+    SimulatorFault,
     SimulatorHung,
     TrainerError,
 )
@@ -50,13 +51,14 @@ class End:
 
 
 # The first that fits counts.
-ENDS: tuple[tuple[type[BaseException], ExitCode, str], ...] = (
+ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),
     (ConfigurationError, ExitCode.CONFIGURATION, "ConfigurationWrong"),
     (FaultBudgetSpent, ExitCode.FAULT_BUDGET, "FaultBudgetSpent"),
     (Diverged, ExitCode.DIVERGED, "Diverged"),
     (SimulatorHung, ExitCode.STALLED, "Stalled"),
+    (SimulatorFault, UNEXPECTED, "SimulatorUnavailable"),
 )
 
 

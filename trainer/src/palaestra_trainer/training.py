@@ -82,6 +82,9 @@ def run(
     before = finished(directory, configuration)
     if before is not None:
         log.info("already finished", **before)
+        write_last_word(
+            Termination(step=before["steps"], reason="Completed: before", success_rate=before["success_rate"])
+        )
         return ExitCode.DONE
     progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
     attempt = Attempt(configuration, directory, progress, around)
@@ -111,6 +114,7 @@ class Attempt:
     def play(self) -> End:
         """Train; return how it ended. Nothing is left running, whatever happens."""
         try:
+            self._directory.path.mkdir(parents=True, exist_ok=True)
             with ExitStack() as stack:
                 run = self._prepare(stack)
                 self._train(run, stack)

@@ -35,7 +35,8 @@ def verdict(job: Mapping[str, Any], exit_code: int) -> Verdict:
 
 
 def _matches(codes: Mapping[str, Any], exit_code: int) -> bool:
-    return (exit_code in codes["values"]) == (codes["operator"] == "In")
+    listed = exit_code in codes["values"]
+    return listed if codes["operator"] == "In" else not listed
 
 
 @dataclass(slots=True, kw_only=True)

@@ -1,6 +1,8 @@
 """How the run of a replica ended, as it is kept in the run directory and told to a person."""
 
 import json
+import shutil
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Self
@@ -47,21 +49,31 @@ class Outcome:
             return None
 
 
-def summary(outcome: Outcome, run_directory: Path, evaluate: str) -> tuple[str, ...]:
-    """Return the lines that a person reads at the end; `evaluate` is a command to type.
+def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
+    """Return the lines that a person reads at the end.
 
     What nobody measured is left out: a program of the user's own need not measure anything.
     """
+    trained = (run_directory / "model.zip").exists()
     facts = {
         "success rate": _shown(outcome.success_rate, "{:.0%}"),
         "steps": _shown(outcome.steps, "{:,}"),
         "steps per second": _shown(outcome.steps_per_second, "{:.0f}"),
         "faults": _shown(outcome.faults, "{}"),
         "run directory": str(run_directory),
-        "look at it": f"tensorboard --logdir {run_directory / 'tensorboard'}",
-        "try the policy": evaluate if (run_directory / "model.zip").exists() else "",
+        "look at it": f"{typed('tensorboard')} --logdir {run_directory / 'tensorboard'}",
+        "try the policy": f"{typed('palaestra-eval')} {run_directory}" if trained else "",
     }
     return tuple(f"  {name:<18}{value}" for name, value in facts.items() if value)
+
+
+def typed(program: str) -> str:
+    """Return how a program of this installation is typed: its path, unless a shell would find it."""
+    beside = Path(sys.executable).with_name(program)
+    if shutil.which(program) or not beside.exists():
+        return program
+    here = Path.cwd()
+    return str(beside.relative_to(here)) if beside.is_relative_to(here) else str(beside)
 
 
 def _shown(value: float | None, form: str) -> str:

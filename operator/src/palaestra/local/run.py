@@ -28,7 +28,6 @@ SHOWN_LINES = 5  # of the trainer's log, when it failed without a last word
 class Options:
     """What a person chose on the command line; `file` is the job's, to be named in advice."""
 
-    file: Path
     runs: Path
     version: str
     replica: int | None = None
@@ -123,11 +122,11 @@ def _trained(planned: ReplicaPlan, path: Path, ports: Ports, options: Options) -
     )
     outcome = asyncio.run(run_replica(planned, setting))
     outcome.keep(path)
-    _tell(outcome, path, options)
+    _tell(outcome, path)
     return outcome.exit_code
 
 
-def _tell(outcome: Outcome, path: Path, options: Options) -> None:
+def _tell(outcome: Outcome, path: Path) -> None:
     if outcome.exit_code == ExitCode.INTERRUPTED:
         say(f"interrupted at step {outcome.steps or 0}; the same command goes on from there")
     elif outcome.exit_code == KILLED:
@@ -137,6 +136,5 @@ def _tell(outcome: Outcome, path: Path, options: Options) -> None:
         last = log.read_text(errors="replace").splitlines()[-SHOWN_LINES:]
         said = outcome.reason or "\n".join(last)
         say(f"failed: the trainer ended with {meaning(outcome.exit_code)}: {said}; more in {log}")
-    place = "" if options.runs == Path("runs") else f" --dir {options.runs}"
-    for line in summary(outcome, path, f"palaestra eval {options.file}{place}"):
+    for line in summary(outcome, path):
         say(line)

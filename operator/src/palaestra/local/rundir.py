@@ -3,7 +3,6 @@
     <dir>/<job name>/<replica>/     job.yaml, training.yaml, worlds/, logs/, scratch/, outcome.json,
                                     and what the trainer writes: checkpoints/, tensorboard/, ...
     <dir>/<job name>/<replica>.lock held by the runner that uses the directory
-    <dir>/<job name>/evaluation/    pods of `palaestra eval`, made anew each time
     <dir>/<job name>/<replica>.old-<n>/   what --fresh has set aside; no run is ever deleted
 
 A job's uid on a laptop follows from this place: it is the same for every `palaestra run` of one
@@ -14,7 +13,6 @@ import fcntl
 import itertools
 import os
 import re
-import shutil
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -131,17 +129,6 @@ def set_aside(directory: Path) -> Path | None:
     aside = next(name for name in names if not name.exists())
     with storage(directory):
         return directory.rename(aside)
-
-
-def remove(directory: Path) -> None:
-    """Delete a directory that holds nothing worth keeping; harmless when there is none.
-
-    Raises:
-        StorageFailed: it cannot be deleted.
-    """
-    with storage(directory):
-        if directory.exists():
-            shutil.rmtree(directory)
 
 
 def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:

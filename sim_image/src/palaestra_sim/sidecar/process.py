@@ -136,6 +136,7 @@ def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
         dict(command.environment),
         file_actions=[(os.POSIX_SPAWN_DUP2, ours, its) for its, ours in descriptors.items()],
         setsid=True,
+        setsigmask=(),
     )
 
 
@@ -158,7 +159,7 @@ def _end_orphans() -> None:
     """Kill what a keeper left behind that was killed itself: it has become ours."""
     while orphans := keeper.kill_children():
         for pid in orphans:
-            with contextlib.suppress(ChildProcessError):  # reaped by the signal handler
+            with contextlib.suppress(ChildProcessError):  # reaped by the signals' thread
                 os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
         reap()
 

@@ -95,7 +95,7 @@ class Simulator:
             raise NoAnswer(f"no answer to {event} within {_ANSWER_S:g} s") from None
 
     def shut_down(self) -> None:
-        """End the simulator and let `run` return; may be called from a signal handler."""
+        """End the simulator and let `run` return; from any thread."""
         self._inbox.put(_Message(event=Event.SHUTDOWN))
 
     def resident_bytes(self) -> int:

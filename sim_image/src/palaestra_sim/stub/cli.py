@@ -70,6 +70,7 @@ class _Process:
 
     def run(self) -> int:
         """Serve until the end; return the exit code."""
+        self._loop.wake_on_signals()
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: self._loop.post(lambda: self._end(0)))
         self._simulator.start()

@@ -3,12 +3,14 @@
 The defaults suit the task that ships, `MoveToTargetEnv-v0`; whatever a
 TrainingJob sets takes their place, one by one. Hyperparameters are keyword
 arguments of the class and are checked against its signature, so a mistyped
-one is found before a simulator is started.
+one is found before a simulator is started. Where Stable-Baselines3 takes a
+schedule, "lin_0.001" is one from 0.001 at the start to 0 at the end.
 """
 
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,6 +18,7 @@ from typing import Any
 
 from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_trainer.algorithms.reinforce import REINFORCE
@@ -32,6 +35,9 @@ OURS = frozenset(
         "rollout_buffer_class", "rollout_buffer_kwargs", "action_noise",
     }
 )  # fmt: skip
+
+
+LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,13 +144,12 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
             f"environment.id: its observation is a {type(env.observation_space).__name__}; "
             "give it one Box, e.g. by gymnasium's FlattenObservation"
         )
-    chosen = {**entry.defaults, **algorithm.hyperparameters}
+    given = {**entry.defaults, **algorithm.hyperparameters}
+    chosen = {name: _as_python(value) for name, value in given.items()}
     if "target_update_interval" in chosen:
         # A vector step is num_envs steps: the target can't be updated more often than that.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
     chosen["policy_kwargs"] = dict(chosen.get("policy_kwargs") or {})
-    if isinstance(chosen.get("train_freq"), list):
-        chosen["train_freq"] = tuple(chosen["train_freq"])  # YAML has no tuples
     try:
         return entry.cls("MlpPolicy", env, seed=seed, device="cpu", **chosen)
     except (AssertionError, TypeError, ValueError) as error:
@@ -153,6 +158,15 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
             f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
             f"({error}); change them, or use another algorithm"
         ) from error
+
+
+def _as_python(value: Any) -> Any:
+    """Return what YAML cannot say: a list as a tuple, "lin_0.001" as a schedule."""
+    if isinstance(value, list):
+        return tuple(value)
+    if isinstance(value, str) and (number := LINEAR.fullmatch(value)):
+        return LinearSchedule(float(number[1]), 0.0, 1.0)
+    return value
 
 
 def _hyperparameters(cls: type[BaseAlgorithm]) -> list[str]:

@@ -11,6 +11,7 @@ import heapq
 import itertools
 import os
 import selectors
+import signal
 import time
 from collections import deque
 from collections.abc import Callable
@@ -32,6 +33,7 @@ class Loop:
         os.set_blocking(self._wake_write, False)
         self._selector.register(self._wake_read, selectors.EVENT_READ, self._run_posted)
         self._running = False
+        self._wakes_on_signals = False
 
     def watch(self, file: Any, ready: Callback, *, writing: bool = False) -> None:
         """Call `ready` whenever `file` can be read, or with `writing` also when it can be written."""
@@ -57,6 +59,11 @@ class Loop:
         with contextlib.suppress(BlockingIOError):
             os.write(self._wake_write, b"\0")
 
+    def wake_on_signals(self) -> None:
+        """Let signals end the wait, so that a handler runs even if its signal came just before."""
+        signal.set_wakeup_fd(self._wake_write, warn_on_full_buffer=False)
+        self._wakes_on_signals = True
+
     def stop(self) -> None:
         """Let `run` return after the callbacks that are ready."""
         self._running = False
@@ -71,7 +78,9 @@ class Loop:
                 heapq.heappop(self._timers)[2]()
 
     def close(self) -> None:
-        """Close what the loop itself opened."""
+        """Close what the loop itself opened; signals end no wait any more."""
+        if self._wakes_on_signals:
+            signal.set_wakeup_fd(-1)
         self._selector.close()
         os.close(self._wake_read)
         os.close(self._wake_write)

@@ -1,0 +1,88 @@
+"""What a person may write behind `palaestra-sidecar`."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from palaestra_sim.sidecar.drivers import Driver
+from palaestra_sim.sidecar.preparation import located
+from palaestra_sim.sidecar.server import Address
+
+EXIT_WRONG = 2
+
+EPILOG = """
+The simulator is not started by this program's start but by POST /start on the control port; see
+palaestra_sim.protocol.control. It gets this program's environment, so ROS_MASTER_URI and ROS_HOSTNAME.
+
+reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work
+prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
+serves  control: /start /ready /stop /state; health: /healthz /state /metrics
+
+exit codes: 0 after SIGTERM or SIGINT, with nothing left running; 1 the same, but something hung;
+            2 wrong options or world, a port in use, a missing program: nothing was started
+"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(EXIT_WRONG, f"{self.prog}: {message}; see --help\n")
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options; ends the program with code 2 when they are wrong."""
+    parser = _Parser(
+        prog="palaestra-sidecar",
+        description="Start, watch and stop one simulator, as its trainer commands.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    _add_simulator(parser)
+    _add_listeners(parser)
+    _add_identity(parser)
+    return parser.parse_args(arguments)
+
+
+def _add_simulator(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("the simulator")
+    group.add_argument("--driver", choices=[driver.value for driver in Driver], required=True)
+    group.add_argument(
+        "--world", type=located, required=True, metavar="WORLD", help="a file, or one that ships"
+    )
+    group.add_argument(
+        "--option", action="append", default=[], metavar="X", help="for the simulator; repeatable"
+    )
+    group.add_argument(
+        "program", nargs="*", help="for driver command, behind --; {world} stands for the world's path"
+    )
+
+
+def _add_listeners(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("listeners (port 0: any that is free)")
+    group.add_argument("--control", type=_address, default="127.0.0.1:7100", metavar="HOST:PORT")
+    group.add_argument("--health", type=_address, default="0.0.0.0:7200", metavar="HOST:PORT")
+    group.add_argument("--until-stdin-closes", action="store_true", help="end too when standard input does")
+
+
+def _add_identity(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("ROS names (without --job the world runs as it is)")
+    group.add_argument("--job", metavar="NAME")
+    group.add_argument("--namespace", default="default", metavar="NAME")
+    group.add_argument("--uid", default="", metavar="UID")
+    group.add_argument("--replica", type=int, default=0, metavar="N")
+    group.add_argument("--group", default="collect", metavar="NAME")
+    group.add_argument("--index", type=int, default=0, metavar="N")
+    group.add_argument("--work", type=Path, metavar="DIR", help="where the named world is written")
+    group.add_argument(
+        "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"
+    )
+
+
+def _address(text: str) -> Address:
+    try:
+        return Address.parse(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error  # argparse drops other messages

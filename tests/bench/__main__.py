@@ -1,0 +1,39 @@
+"""`make bench`: measure what the project promises, and print it as JSON.
+
+Every figure is a ratio within one run, or stands beside what it is compared with: machines are noisy. Names as
+arguments choose parts, e.g. `python -m tests.bench stepping parallel`.
+"""
+
+import argparse
+import json
+import sys
+import time
+
+from tests.bench import learning, parallel, runs, stepping
+
+PARTS = {
+    "stepping": stepping.measure,
+    "parallel": parallel.measure,
+    "recovery": runs.measure_recovery,
+    "memory": runs.measure_memory,
+    "learning": learning.measure,
+}
+
+
+def main():
+    """Print one JSON object a line: part, seconds it took, what it found."""
+    parser = argparse.ArgumentParser(prog="tests.bench", description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
+    chosen = parser.parse_args().parts or list(PARTS)
+    if unknown := [name for name in chosen if name not in PARTS]:
+        parser.error(f"{unknown[0]} is no part; choose from {', '.join(PARTS)}")
+    for name in chosen:
+        started = time.monotonic()
+        found = PARTS[name]()
+        line = {"part": name, "seconds": round(time.monotonic() - started, 1), **found}
+        sys.stdout.write(json.dumps(line) + "\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,25 @@
+"""A stub of the shipped arena with its facades, for the measurements."""
+
+from contextlib import contextmanager
+
+from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.webots import Mode, Webots
+
+
+@contextmanager
+def running(*options, world="arena", name="robotino"):
+    """Yield a connected robot, its scene and its launcher."""
+    launcher = ProcessLauncher(world, options=options)
+    webots = Webots(name, world, launcher=launcher)
+    webots.start()
+    webots.supervisor.set_mode(Mode.FAST)
+    robot = Robotino(webots)
+    robot.connect()
+    try:
+        yield robot, RobotinoScene(webots, robot), launcher
+    finally:
+        robot.close()
+        webots.stop()
+        webots.close()
+        launcher.close()

@@ -1,0 +1,120 @@
+"""Environment steps over ROS, ours against rospy's, in turns.
+
+One step is three wheel commands, one time_step, nine distances, the bumper and the position.
+"""
+
+import statistics
+import threading
+import time
+
+import genpy
+import rospy
+from palaestra_sim.protocol.rostypes import service_type
+
+from tests.bench.arena import running
+
+ROUNDS = 5
+OURS = 1000
+ROSPYS = 60
+PERIOD_MS = 192
+TOPICS = [*(f"ir{number}" for number in range(1, 10)), "touch_sensor"]
+
+
+def measure():
+    """Return steps per second of both, and their ratio round by round."""
+    with running() as (robot, _, _):
+        theirs = RospyStepper("robotino")
+        pairs = [(rate(lambda: step(robot), OURS), rate(theirs.step, ROSPYS)) for _ in range(ROUNDS)]
+        theirs.close()
+    return {
+        "steps_per_second": round(statistics.median(ours for ours, _ in pairs)),
+        "rospy_steps_per_second": round(statistics.median(rospys for _, rospys in pairs)),
+        "times_rospy": round(statistics.median(ours / rospys for ours, rospys in pairs), 1),
+    }
+
+
+def rate(step_once, count):
+    """Return how often a second `step_once` can be called."""
+    started = time.perf_counter()
+    for _ in range(count):
+        step_once()
+    return count / (time.perf_counter() - started)
+
+
+def step(robot):
+    """Take one step of ours."""
+    robot.drive(0.3, 0.1, 0.5)
+    robot.advance()
+    robot.pose()
+
+
+class RospyStepper:
+    """The same step as a rospy program does it: a proxy a service, a subscriber a topic."""
+
+    def __init__(self, name):
+        self._calls = [
+            *(proxy(f"/{name}/wheel{number}_joint/set_velocity", "set_float") for number in range(3)),
+            proxy(f"/{name}/robot/time_step", "set_int"),
+        ]
+        self._position = proxy(f"/{name}/supervisor/node/get_position", "node_get_position")
+        self._node = proxy(f"/{name}/supervisor/get_from_def", "supervisor_get_from_def")(name="ROBOTINO")
+        self._arrived = threading.Semaphore(0)
+        self._subscribers = [
+            rospy.Subscriber(f"/{name}/{topic}/value", rospy.AnyMsg, self._count) for topic in TOPICS
+        ]
+        while any(subscriber.get_num_connections() == 0 for subscriber in self._subscribers):
+            time.sleep(0.01)
+
+    def step(self):
+        """Take one step."""
+        for wheel in self._calls[:3]:
+            wheel(value=1.0)
+        self._calls[3](value=PERIOD_MS)
+        self._position(node=self._node.value.node)
+        for _ in TOPICS:
+            if not self._arrived.acquire(timeout=5):
+                raise TimeoutError("a sensor stays silent")
+
+    def close(self):
+        """Unsubscribe."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+    def _count(self, _message):
+        self._arrived.release()
+
+
+def proxy(name, type_name):
+    """Return rospy's proxy of a webots_ros service, not persistent, as most programs use it."""
+    type_ = service_type(f"webots_ros/{type_name}")
+    service = type(
+        type_name,
+        (),
+        {
+            "_type": type_.name,
+            "_md5sum": type_.md5,
+            "_request_class": message(f"{type_.name}Request", type_.request),
+            "_response_class": message(f"{type_.name}Response", type_.response),
+        },
+    )
+    return rospy.ServiceProxy(name, service)
+
+
+def message(name, codec):
+    """Return a class that rospy can send and receive."""
+
+    class Message(genpy.Message):
+        __slots__ = ("fields", "value")
+        _type = name
+
+        def __init__(self, **fields):
+            self.fields = fields
+
+        def serialize(self, buffer):
+            buffer.write(codec.encode(self.fields))
+
+        def deserialize(self, data):
+            self.value = codec.decode(bytes(data))
+            return self
+
+    return Message

@@ -1,0 +1,52 @@
+"""What the README shows is what there is."""
+
+import re
+from pathlib import Path
+
+import palaestra.api
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
+
+
+def block(language):
+    return re.search(rf"```{language}\n(.*?)\n```", README, re.DOTALL)[1]
+
+
+def test_the_first_command_stands_within_25_lines():
+    """A stranger decides in one screen."""
+    lines = README.splitlines()
+
+    assert any(line.startswith("make run") for line in lines[:25])
+    assert len(lines) <= 120
+
+
+def test_the_job_shown_is_the_minimal_example():
+    """It is also run by the tests of the examples."""
+    text = (ROOT / "manifests/examples/minimal.yaml").read_text().rstrip()
+
+    assert block("yaml") == text
+    palaestra.api.load(text, "minimal.yaml")
+
+
+def test_the_script_shown_is_the_facade_example():
+    """It is also run by a test of its own."""
+    script = (ROOT / "examples/facade.py").read_text()
+
+    assert script.endswith(block("python") + "\n")
+
+
+def test_every_link_leads_somewhere():
+    """Relative links only; a link to nothing is worse than none."""
+    targets = re.findall(r"\]\(([^)#]+)", README)
+
+    assert targets
+    assert [target for target in targets if not (ROOT / target).exists()] == []
+
+
+def test_every_verb_of_the_makefile_is_documented():
+    """`make help` prints what stands behind `##`."""
+    makefile = (ROOT / "Makefile").read_text()
+    verbs = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)[1].split()
+
+    assert [verb for verb in verbs if not re.search(rf"^{verb}:.*## ", makefile, re.MULTILINE)] == []

@@ -1,0 +1,97 @@
+"""The stub as a program: what it prints, how it ends, what it asks of the master."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from palaestra_trainer.ros import Master, RosService
+
+STUB = Path(sys.executable).with_name("palaestra-stub")
+ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
+
+
+@pytest.fixture
+def stub(master, tmp_path):
+    """Starts stubs of the arena under a name of its own; killed when the test ends."""
+    world = tmp_path / "arena.wbt"
+    world.write_bytes(ARENA.read_bytes().replace(b"--name=robotino", b"--name=process_test"))
+    started = []
+
+    def start(*options, uri=master):
+        environment = {**os.environ, "ROS_MASTER_URI": uri}
+        command = [STUB, *options, world]
+        process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def ready(process):
+    """Wait for the line that says that the controllers are up."""
+    line = process.stderr.readline()
+    assert "process_test" in line
+    return RosService("/process_test/robot/get_time", "webots_ros/get_float")
+
+
+def test_sigterm_ends_it_in_good_order(stub):
+    """Its names are gone from the master, so the next one is not mistaken for it."""
+    process = stub()
+    ready(process)
+
+    process.send_signal(signal.SIGTERM)
+
+    assert process.wait(5) == 0
+    assert Master("/test").service_address("/process_test/robot/get_time") is None
+
+
+def test_a_client_can_choose_the_exit_status(stub):
+    """As `simulation_quit` of Webots."""
+    process = stub()
+    ready(process)
+    quit_ = RosService("/process_test/supervisor/simulation_quit", "webots_ros/set_int")
+
+    assert quit_(value=7).success
+    quit_.close()
+
+    assert process.wait(5) == 7
+
+
+def test_without_a_master_it_says_so_and_ends(stub):
+    """A controller of Webots would leave a simulation that nobody can reach."""
+    process = stub(uri="http://localhost:1")
+
+    assert process.wait(10) == 1
+    assert "no ROS master at http://localhost:1" in process.stderr.read()
+
+
+def test_a_world_that_is_none_is_told_with_line_and_column(master, tmp_path):
+    """The person who wrote it can mend it."""
+    del master
+    world = tmp_path / "broken.wbt"
+    world.write_text("#VRML_SIM R2023b utf8\nRobot {\n  name 3 {\n}\n")
+
+    result = subprocess.run([STUB, world], capture_output=True, text=True, timeout=20, check=False)
+
+    assert result.returncode == 2
+    assert "broken.wbt:3:" in result.stderr
+
+
+def test_a_second_one_of_the_same_name_takes_the_name(stub):
+    """By the rules of ROS 1: the older node is asked to go, its simulation runs on."""
+    older = stub()
+    ready(older)
+    newer = stub()
+    get_time = ready(newer)
+
+    line = older.stderr.readline()
+
+    assert "another node took the name process_test" in line
+    assert get_time(ask=True).value == 0.0
+    get_time.close()
