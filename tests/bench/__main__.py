@@ -1,7 +1,7 @@
 """`make bench`: measure what the project promises, and print it as JSON.
 
-Every figure is a ratio within one run, or stands beside what it is compared with: machines are noisy. Names as
-arguments choose parts, e.g. `python -m tests.bench stepping parallel`.
+Every figure is a ratio within one run, or stands beside what it is compared with: machines are noisy.
+Names as arguments choose parts, e.g. `python -m tests.bench stepping parallel`.
 """
 
 import argparse

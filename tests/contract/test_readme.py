@@ -10,6 +10,8 @@ README = (ROOT / "README.md").read_text()
 
 
 def block(language):
+    """Return the first block of a language."""
+    """Return the first block of a language."""
     return re.search(rf"```{language}\n(.*?)\n```", README, re.DOTALL)[1]
 
 

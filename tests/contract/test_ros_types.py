@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from palaestra_sim.protocol.rostypes import message_type, service_type, type_names
 
 MD5 = json.loads(Path(__file__).with_name("ros_md5.json").read_text())

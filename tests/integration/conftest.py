@@ -4,12 +4,12 @@ import os
 
 import pytest
 
+from palaestra_trainer.simulators.master import ensure_master
+
 
 @pytest.fixture(scope="session")
 def master():
     """One master a process, since rospy registers once; it ends with the process."""
-    from palaestra_trainer.simulators.master import ensure_master  # rospy takes half a second
-
     os.environ["ROS_HOSTNAME"] = "localhost"
     os.environ["ROS_MASTER_URI"] = "http://localhost:1"
     ensure_master()

@@ -3,6 +3,7 @@
 import threading
 
 import pytest
+
 from palaestra_sim.stub.ros import LATER, Loop, RosNode, ServiceFailed
 
 

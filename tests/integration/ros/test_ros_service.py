@@ -1,6 +1,7 @@
 """Services over a real master and real sockets: they answer, or the fault has a kind."""
 
 import pytest
+
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
 
@@ -55,8 +56,8 @@ def test_a_failed_call_is_wrong_data_with_the_servers_words(service):
 
 
 def test_a_service_that_does_not_answer_hangs(service):
-    """rospy's proxy would wait for ever here."""
-    with pytest.raises(SimulatorHung, match="does not answer within 0.2 s"):
+    """Rospy's proxy would wait for ever here."""
+    with pytest.raises(SimulatorHung, match=r"does not answer within 0\.2 s"):
         service("never", deadline_s=0.2)(ask=True)
 
 

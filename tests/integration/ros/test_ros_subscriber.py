@@ -3,6 +3,7 @@
 import struct
 
 import pytest
+
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
 from palaestra_trainer.ros import RosSubscriber
 
@@ -17,6 +18,7 @@ def ranges(peer):
 
 
 def send(peer, *values):
+    """Publish readings, one after the other."""
     peer.do(lambda: [peer.publisher.send_value(value) for value in values])
 
 

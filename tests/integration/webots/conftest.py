@@ -1,6 +1,7 @@
 """A stub simulator, started the way a notebook does it."""
 
 import pytest
+
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.webots import Mode, Webots

@@ -1,6 +1,7 @@
 """The simulated Robotino passes what every Robotino has to pass, and the same environment runs on it."""
 
 from gymnasium.utils.env_checker import check_env
+
 from palaestra_trainer.environments.move_to_target import make
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.testing import check_robot, check_scene

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from palaestra_trainer.errors import NoSuchSensor, WrongData
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.robotino import Robotino, metres

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from palaestra_trainer.ros import Master, RosService
 
 STUB = Path(sys.executable).with_name("palaestra-stub")

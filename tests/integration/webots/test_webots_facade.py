@@ -4,6 +4,7 @@ import os
 import signal
 
 import pytest
+
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.webots import Mode

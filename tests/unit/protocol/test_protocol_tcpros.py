@@ -5,6 +5,7 @@ import struct
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from palaestra_sim.protocol.tcpros import (
     MAX_FRAME_BYTES,
     FrameReader,

@@ -104,7 +104,7 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> in
         before = Outcome.of(path)
         if before is not None and before.finished:
             say(f"{job.metadata.name}-{replica}: finished already; --fresh begins anew")
-            _tell(before, path, options)
+            _tell(before, path)
             return 0
         rundir.prepare(path, record)
         planned = plan(job, layout(path.parent, options, ports)).replicas[replica]

@@ -113,7 +113,7 @@ def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 @cache
 def _definition_lines() -> dict[str, str]:
-    text = resources.files(__package__).joinpath("ros_definitions.txt").read_text("utf-8")
+    text = resources.files("palaestra_sim.protocol").joinpath("ros_definitions.txt").read_text("utf-8")
     lines = (line for line in text.splitlines() if line and not line.startswith("#"))
     return {name: fields for name, _, fields in (line.partition(":") for line in lines)}
 

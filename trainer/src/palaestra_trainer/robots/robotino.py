@@ -140,7 +140,5 @@ def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
 
 def metres(volts: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return distances in metres, within the sensor's range, for readings in volts."""
-    distances = (
-        _RANGE_SCALE * np.maximum(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
-    )
+    distances = _RANGE_SCALE * np.maximum(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
     return np.clip(distances, *SENSOR_RANGE_M).astype(np.float32)

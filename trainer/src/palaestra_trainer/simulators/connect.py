@@ -30,9 +30,7 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
     """
     chosen = configuration or load()
     ensure_node(f"trainer_r{chosen.replica}")
-    return [
-        _simulator(chosen, entry, Sidecar(entry.control, entry.name)) for entry in chosen.simulators
-    ]
+    return [_simulator(chosen, entry, Sidecar(entry.control, entry.name)) for entry in chosen.simulators]
 
 
 def connect_here(configuration: Configuration) -> list[Simulator]:

@@ -36,6 +36,21 @@ class Sidecar:
         """Return what the sidecar says of its simulator."""
         return self._ask("GET", "/state")
 
+    def first_state(self, deadline_s: float) -> SimulatorState:
+        """Return the state, waiting for a sidecar that does not listen yet.
+
+        Raises:
+            SimulatorDead, SimulatorHung: it has not answered within `deadline_s` seconds.
+        """
+        give_up = time.monotonic() + deadline_s
+        while True:
+            try:
+                return self.state()
+            except SimulatorDead:
+                if time.monotonic() > give_up:
+                    raise
+            time.sleep(_POLL_S)  # another process is on its way, and has no call that waits
+
     def start(self) -> None:
         """Begin to start the simulator; one that is on its way already is left alone."""
         self._ask("POST", "/start", {})

@@ -23,7 +23,7 @@ class Simulator:
         name: `<group>-<index>`, as in the configuration.
         sidecar: where the simulator is started and stopped.
         make_environment: makes the environment from robot and scene.
-        start_deadline_s: the longest time until the simulator answers.
+        start_deadline_s: the longest time until the sidecar, and after a start the simulator, answers.
 
     Raises:
         SimulatorDead, SimulatorHung: the sidecar cannot be asked for the robots' names.
@@ -34,7 +34,7 @@ class Simulator:
         self, name: str, sidecar: Sidecar, make_environment: MakeEnvironment, start_deadline_s: float
     ) -> None:
         self.name = name
-        state = sidecar.state()
+        state = sidecar.first_state(start_deadline_s)
         supervisor = next((robot for robot in state.robots if robot.supervisor), None)
         if supervisor is None:
             raise WrongData(name, "the world has no robot with supervisor TRUE; give it one")

@@ -70,7 +70,6 @@ class Master:
             raise MasterUnreachable(f"the ROS master refused {method}: {text}")
         return value
 
-
     def close(self) -> None:
         """Close the connection to the master."""
         self._proxy("close")()
@@ -108,15 +107,11 @@ class SlaveApi:
         self._port = tcpros_port
         self._has_topic = has_topic
         self._on_shutdown = on_shutdown
-        self._server = _Server(
-            (bind_address(host), 0), _RequestHandler, logRequests=False, allow_none=True
-        )
+        self._server = _Server((bind_address(host), 0), _RequestHandler, logRequests=False, allow_none=True)
         for name, answer in self._answers().items():
             self._server.register_function(answer, name)
         self.uri = f"http://{host}:{self._server.server_address[1]}/"
-        self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(_POLL_S,), daemon=True
-        )
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(_POLL_S,), daemon=True)
         self._thread.start()
 
     def close(self) -> None:
