@@ -12,9 +12,14 @@ from palaestra_trainer.environments import rewards
 from palaestra_trainer.environments.rewards import TERMS, WEIGHTS, Outcome, Transition, reward_terms
 
 
-def transition(before_m: float = 1.0, after_m: float = 1.0, outcome: Outcome = Outcome.RUNNING) -> Transition:
+def transition(
+    before_m: float = 1.0,
+    after_m: float = 1.0,
+    outcome: Outcome = Outcome.RUNNING,
+    nearest_m: float = 0.4,
+) -> Transition:
     """Return a step in which nothing happened but what is said."""
-    return Transition(before_m=before_m, after_m=after_m, outcome=outcome)
+    return Transition(before_m=before_m, after_m=after_m, outcome=outcome, nearest_m=nearest_m)
 
 
 def test_progress_is_what_was_gained_toward_the_target():
@@ -36,6 +41,12 @@ def test_no_detour_earns_more_progress_than_the_straight_way(distances):
     )
 
     assert total == pytest.approx(distances[0] - distances[-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(("nearest_m", "worth"), [(0.4, 0.0), (0.18, 0.0), (0.105, 0.5), (0.03, 1.0)])
+def test_proximity_grows_as_things_come_nearer(nearest_m, worth):
+    """A collision is learned of before it happens, and open floor costs nothing."""
+    assert rewards.proximity(transition(nearest_m=nearest_m)) == pytest.approx(worth)
 
 
 @pytest.mark.parametrize(

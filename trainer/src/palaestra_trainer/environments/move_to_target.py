@@ -92,6 +92,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | progress  | 1     |        | metres gained toward the target             |
     | success   | 1     | 1      | 1 when the robot came to stand on it        |
     | collision | -1    | -1     | 1 when it ran into something                |
+    | proximity | -0.1  |        | 0 to 1 as things come nearer than 0.18 m    |
     | time_up   |       | -0.5   | 1 when the last step was taken without that |
     | duration  | -0.01 |        | 1 for every step                            |
 
@@ -235,4 +236,9 @@ def make(
 
 
 def _transition(before: Situation, after: Situation, outcome: Outcome) -> Transition:
-    return Transition(before_m=before.target_distance_m, after_m=after.target_distance_m, outcome=outcome)
+    return Transition(
+        before_m=before.target_distance_m,
+        after_m=after.target_distance_m,
+        nearest_m=float(after.distances_m.min()),
+        outcome=outcome,
+    )

@@ -11,6 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from palaestra_trainer.robots.base import SENSOR_RANGE_M
+
+MARGIN_M = 0.18  # what should be kept free around the robot: it drives half of it in a step
+
 
 class Outcome(Enum):
     """How an episode ended, or that it goes on."""
@@ -33,11 +37,13 @@ class Transition:
     Attributes:
         before_m: metres to the target before the step.
         after_m: metres to the target after it.
+        nearest_m: metres to the nearest thing after it, as far as sensors see it.
         outcome: what the step led to.
     """
 
     before_m: float
     after_m: float
+    nearest_m: float
     outcome: Outcome
 
 
@@ -62,6 +68,12 @@ def collision(step: Transition) -> float:
     return float(step.outcome is Outcome.COLLIDED)
 
 
+def proximity(step: Transition) -> float:
+    """Return how far the margin around the robot is used up, from 0 to 1 (as near as is measured)."""
+    used_m = MARGIN_M - step.nearest_m
+    return max(0.0, used_m) / (MARGIN_M - SENSOR_RANGE_M[0])
+
+
 def time_up(step: Transition) -> float:
     """Return 1 when the last step was taken and the target not reached, else 0."""
     return float(step.outcome is Outcome.TIME_UP)
@@ -76,12 +88,13 @@ TERMS: dict[str, Term] = {
     "progress": progress,
     "success": success,
     "collision": collision,
+    "proximity": proximity,
     "time_up": time_up,
     "duration": duration,
 }
 
 WEIGHTS: dict[str, dict[str, float]] = {
-    "Dense": {"progress": 1.0, "success": 1.0, "collision": -1.0, "duration": -0.01},
+    "Dense": {"progress": 1.0, "success": 1.0, "collision": -1.0, "proximity": -0.1, "duration": -0.01},
     "Sparse": {"success": 1.0, "collision": -1.0, "time_up": -0.5},
 }
 

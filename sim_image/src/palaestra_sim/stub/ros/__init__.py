@@ -7,6 +7,7 @@ loop for everything that moves (`loop`), and names, services and topics on top (
 
 from palaestra_sim.stub.ros.loop import Loop
 from palaestra_sim.stub.ros.master import MasterUnreachable
-from palaestra_sim.stub.ros.node import LATER, Publisher, RosNode, ServiceFailed
+from palaestra_sim.stub.ros.node import LATER, RosNode, ServiceFailed
+from palaestra_sim.stub.ros.topics import Publisher
 
 __all__ = ["LATER", "Loop", "MasterUnreachable", "Publisher", "RosNode", "ServiceFailed"]

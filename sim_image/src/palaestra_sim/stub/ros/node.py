@@ -9,27 +9,20 @@ from __future__ import annotations
 
 import contextlib
 import socket
-import struct
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from palaestra_sim.protocol.rostypes import MessageType, ServiceType, message_type, service_type
-from palaestra_sim.protocol.tcpros import LENGTH, encode_header, frame
+from palaestra_sim.protocol.rostypes import ServiceType, message_type, service_type
+from palaestra_sim.protocol.tcpros import encode_header, frame
 from palaestra_sim.stub.ros.links import Endpoint, Link, Refused
 from palaestra_sim.stub.ros.loop import Loop
 from palaestra_sim.stub.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name
+from palaestra_sim.stub.ros.topics import Publisher, Topic
 
 LATER: Final = object()
 Handler = Callable[[Any], Any]
 
-_STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds
-_TRAILING_VALUES = {
-    "sensor_msgs/Range": struct.Struct("<f"),
-    "webots_ros/BoolStamped": struct.Struct("<?"),
-    "webots_ros/Float64Stamped": struct.Struct("<d"),
-}
 _BACKLOG = 128
 
 
@@ -54,7 +47,7 @@ class RosNode:
         self._ended: Callable[[], None] = self.abandon
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
-        self._topics: dict[str, _Topic] = {}
+        self._topics: dict[str, Topic] = {}
         self._links: set[Link] = set()
         self._waiting: deque[tuple[_ServiceEnd, bytes]] = deque()
         host = host_name()
@@ -93,7 +86,7 @@ class RosNode:
         name = self.resolve(path)
         topic = self._topics.get(name)
         if topic is None:
-            topic = self._topics[name] = _Topic(name, message_type(type_name), latched=latched)
+            topic = self._topics[name] = Topic(name, message_type(type_name), latched=latched)
             self._master.call("registerPublisher", name, type_name, self._slave.uri)
         topic.publishers += 1
         return Publisher(topic, dict(template or {}))
@@ -271,81 +264,3 @@ class _ServiceEnd:
         self._link.send(data)
         if not self._persistent:
             self._link.close()
-
-
-class _Topic:
-    """A published topic and the connections of its subscribers."""
-
-    def __init__(self, name: str, type_: MessageType, *, latched: bool) -> None:
-        self.name = name
-        self.type = type_
-        self.latched = latched
-        self.links: list[Link] = []
-        self.publishers = 0
-        self._last: bytes | None = None
-
-    def connect(self, link: Link, dropped: Callable[[Link], None]) -> Endpoint:
-        self.links.append(link)
-        if self._last is not None:
-            link.send(self._last)
-        return _SubscriberEnd(self, link, dropped)
-
-    def send(self, data: bytes) -> None:
-        if self.latched:
-            self._last = data
-        for link in self.links:
-            link.send_newest(data)
-
-
-class _SubscriberEnd:
-    """The publisher's end of one subscriber's connection, which only ever closes."""
-
-    def __init__(self, topic: _Topic, link: Link, dropped: Callable[[Link], None]) -> None:
-        self._topic = topic
-        self._link = link
-        self._dropped = dropped
-
-    def receive(self, payload: bytes) -> None:
-        """Ignore it: a subscriber has nothing to say after its header."""
-
-    def lost(self) -> None:
-        self._topic.links.remove(self._link)
-        self._dropped(self._link)
-
-
-class Publisher:
-    """Sends messages to the subscribers that are connected at that moment, queue size 1."""
-
-    def __init__(self, topic: _Topic, template: dict[str, Any]) -> None:
-        self.topic = topic
-        self._template = template
-        self._sequence = 0
-        self._frame: bytearray | None = None
-
-    @property
-    def subscribers(self) -> int:
-        """How many subscribers are connected."""
-        return len(self.topic.links)
-
-    def send(self, fields: Mapping[str, Any]) -> None:
-        """Send a message of `fields`, over the template's."""
-        payload = self.topic.type.codec.encode({**self._template, **fields})
-        self.topic.send(frame(payload))
-
-    def send_value(self, value: float, stamp_ns: int | None = None) -> None:
-        """Send a stamped message whose last field is `value`, the rest as in the template.
-
-        Args:
-            value: the reading.
-            stamp_ns: nanoseconds of the header's time; the wall clock by default.
-        """
-        data = self._frame
-        if data is None:
-            empty = self.topic.type.codec.encode(self._template)
-            data = self._frame = bytearray(frame(empty))
-        self._sequence += 1
-        seconds, nanoseconds = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 1_000_000_000)
-        _STAMP.pack_into(data, LENGTH.size, self._sequence, seconds, nanoseconds)
-        trailing = _TRAILING_VALUES[self.topic.type.name]
-        trailing.pack_into(data, len(data) - trailing.size, value)
-        self.topic.send(bytes(data))

@@ -1,0 +1,104 @@
+"""Topics that a node publishes: the subscribers that are connected, and the messages they get."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from palaestra_sim.protocol.rostypes import MessageType
+from palaestra_sim.protocol.tcpros import LENGTH, frame
+from palaestra_sim.stub.ros.links import Endpoint, Link
+
+_STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds
+_TRAILING_VALUES = {
+    "sensor_msgs/Range": struct.Struct("<f"),
+    "webots_ros/BoolStamped": struct.Struct("<?"),
+    "webots_ros/Float64Stamped": struct.Struct("<d"),
+}
+
+
+class Topic:
+    """A published topic and the connections of its subscribers.
+
+    Attributes:
+        links: of the subscribers that are connected.
+        publishers: how many share the topic.
+    """
+
+    def __init__(self, name: str, type_: MessageType, *, latched: bool) -> None:
+        self.name = name
+        self.type = type_
+        self.latched = latched
+        self.links: list[Link] = []
+        self.publishers = 0
+        self._last: bytes | None = None
+
+    def connect(self, link: Link, dropped: Callable[[Link], None]) -> Endpoint:
+        """Take a subscriber, with the last message if the topic is latched."""
+        self.links.append(link)
+        if self._last is not None:
+            link.send(self._last)
+        return _SubscriberEnd(self, link, dropped)
+
+    def send(self, data: bytes) -> None:
+        """Send a framed message to every subscriber."""
+        if self.latched:
+            self._last = data
+        for link in self.links:
+            link.send_newest(data)
+
+
+class _SubscriberEnd:
+    """The publisher's end of one subscriber's connection, which only ever closes."""
+
+    def __init__(self, topic: Topic, link: Link, dropped: Callable[[Link], None]) -> None:
+        self._topic = topic
+        self._link = link
+        self._dropped = dropped
+
+    def receive(self, payload: bytes) -> None:
+        """Ignore it: a subscriber has nothing to say after its header."""
+
+    def lost(self) -> None:
+        self._topic.links.remove(self._link)
+        self._dropped(self._link)
+
+
+class Publisher:
+    """Sends messages to the subscribers that are connected at that moment, queue size 1."""
+
+    def __init__(self, topic: Topic, template: dict[str, Any]) -> None:
+        self.topic = topic
+        self._template = template
+        self._sequence = 0
+        self._frame: bytearray | None = None
+
+    @property
+    def subscribers(self) -> int:
+        """How many subscribers are connected."""
+        return len(self.topic.links)
+
+    def send(self, fields: Mapping[str, Any]) -> None:
+        """Send a message of `fields`, over the template's."""
+        payload = self.topic.type.codec.encode({**self._template, **fields})
+        self.topic.send(frame(payload))
+
+    def send_value(self, value: float, stamp_ns: int | None = None) -> None:
+        """Send a stamped message whose last field is `value`, the rest as in the template.
+
+        Args:
+            value: the reading.
+            stamp_ns: nanoseconds of the header's time; the wall clock by default.
+        """
+        data = self._frame
+        if data is None:
+            empty = self.topic.type.codec.encode(self._template)
+            data = self._frame = bytearray(frame(empty))
+        self._sequence += 1
+        seconds, nanoseconds = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 1_000_000_000)
+        _STAMP.pack_into(data, LENGTH.size, self._sequence, seconds, nanoseconds)
+        trailing = _TRAILING_VALUES[self.topic.type.name]
+        trailing.pack_into(data, len(data) - trailing.size, value)
+        self.topic.send(bytes(data))

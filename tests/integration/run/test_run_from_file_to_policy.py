@@ -1,0 +1,145 @@
+"""From a TrainingJob file to a policy, on one machine."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.world import robots
+from palaestra_trainer.ros.master import Master
+
+EVAL = Path(sys.executable).with_name("palaestra-eval")
+FEW = {
+    "steps": 600,
+    "evaluation": {"everySteps": 300, "episodes": 2},
+    "checkpoint": {"everySteps": 200, "keep": 2},
+}
+
+
+@pytest.mark.parametrize(
+    "example", ["minimal", "move-to-target", "two-collectors", "reinforce", "sparse-reward"]
+)
+def test_every_example_runs(run, example):
+    """With few steps here; what people copy must work."""
+    code, output = run(example, **FEW).start().end()
+
+    assert code == 0, output
+    assert "success rate" in output
+
+
+@pytest.mark.timeout(1500)
+def test_move_to_target_in_full_learns_to_reach_its_target(run):
+    """The promise of the README, measured on episodes that nothing was chosen on."""
+    whole = run().start()
+    output, _ = whole.process.communicate(timeout=1400)
+
+    result = subprocess.run([EVAL, whole.directory], capture_output=True, text=True, timeout=200, check=True)
+
+    assert whole.process.returncode == 0, output
+    assert whole.summary()["steps"] == 50_000
+    assert json.loads(result.stdout)["success_rate"] >= 0.95
+
+
+def test_each_simulator_has_a_legal_name_of_its_own(run):
+    """What `rosnode list` shows, and what stands in the generated worlds of the run directory."""
+    training = run("two-collectors", **FEW | {"steps": 50_000}).start("-v")
+    uri = next(line for line in training.process.stdout if line.startswith("ROS_MASTER_URI=")).strip()
+    training.wait_for_step(100)
+
+    master = Master("/test")
+    master.uri = uri.partition("=")[2]
+    nodes = {name for name in master.node_names() if "robotino" in name}
+
+    worlds = sorted((training.directory / "worlds").glob("*.wbt"))
+    named = {f"/{robot.ros_name}" for world in worlds for robot in robots(world.read_bytes())}
+    assert len(nodes) == 3
+    assert nodes == named
+    training.process.stdout.close()
+
+
+def test_a_killed_simulator_is_one_fault_and_training_goes_on(run):
+    """It alone is restarted; the run ends as if nothing had been."""
+    training = run(**FEW | {"steps": 1500}).start()
+    training.wait_for_step(200)
+
+    os.kill(training.pid_of("palaestra-stub", "collect-0"), signal.SIGKILL)
+    code, output = training.end()
+
+    assert code == 0, output
+    assert training.summary()["steps"] == 1500
+    assert training.summary()["faults"] == 1
+    assert "faults            1" in output
+
+
+@pytest.mark.parametrize(("example", "steps"), [("move-to-target", 3000), ("two-collectors", 9000)])
+def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(run, example, steps):
+    """DQN exactly at its steps, PPO at its rollout boundary, as without the interruption."""
+    wanted = FEW | {"steps": steps, "evaluation": {"everySteps": 0}}
+    training = run(example, **wanted).start()
+    training.wait_for_step(steps // 3)
+    training.process.send_signal(signal.SIGINT)
+    code, output = training.end()
+    saved = max(int(folder.name) for folder in (training.directory / "checkpoints").iterdir())
+
+    assert code == 75, output
+    assert "the same command goes on" in output
+    code, output = training.start().end()
+
+    assert code == 0, output
+    assert f"resumed at step {saved}" in training.log()
+    rollout = 2 * 1024 if example == "two-collectors" else 1
+    assert training.summary()["steps"] == -(-steps // rollout) * rollout
+
+
+def test_a_finished_run_is_reported_and_not_repeated(run):
+    """A second `make run` says what there is, in seconds."""
+    run_ = run(**FEW)
+    run_.start().end()
+    before = (run_.directory / "attempts.jsonl").read_text()
+
+    code, output = run_.start().end()
+
+    assert code == 0
+    assert "finished already; --fresh begins anew" in output
+    assert (run_.directory / "attempts.jsonl").read_text() == before
+
+
+def test_after_a_sigkill_of_the_runner_nothing_is_left(run):
+    """Pulling the plug on the runner must not leave simulators behind."""
+    training = run(**FEW | {"steps": 50_000}).start()
+    training.wait_for_step(50)
+    pids = [pid for pid, _ in training.processes()]
+
+    training.process.kill()
+    training.process.communicate()
+
+    assert len(pids) >= 8
+    give_up = time.monotonic() + 10
+    while any(map(running, pids)) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    assert [pid for pid in pids if running(pid)] == []
+
+
+def running(pid):
+    """Return whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (OSError, IndexError):
+        return False
+
+
+def test_a_policy_can_be_measured_afterwards(run):
+    """As the runner says at its end."""
+    training = run(**FEW)
+    training.start().end()
+
+    result = subprocess.run(
+        [EVAL, training.directory, "--episodes", "3"], capture_output=True, text=True, timeout=100, check=True
+    )
+
+    assert json.loads(result.stdout)["episodes"] == 3
