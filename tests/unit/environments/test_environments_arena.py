@@ -54,7 +54,7 @@ def test_tasks_are_spread_over_the_whole_floor():
 
 @pytest.mark.parametrize(
     ("place", "expected_m"),
-    [((0.0, 0.0), math.hypot(0.8, 0.8) - 0.15), ((1.9, 0.0), 0.1), ((0.8, 0.8), -0.15), ((3, 0), -1.0)],
+    [((0.0, 0.0), math.hypot(0.8, 0.8) - 0.25), ((1.9, 0.0), 0.1), ((0.8, 0.8), -0.25), ((3, 0), -1.0)],
 )
 def test_the_gap_is_to_the_nearest_wall_or_cylinder(place, expected_m):
     """Negative inside of one, so that one comparison tells free from not."""

@@ -175,7 +175,7 @@ def test_an_obstacle_that_is_moved_is_seen_where_it_is(robot, field):
     robot.call(
         "supervisor/field/set_vec3f",
         field=field("CYLINDER_0", "translation"),
-        value={"x": 0.5, "z": 0.2},
+        value={"x": 0.6, "z": 0.2},
     )
 
     robot.call("robot/time_step", value=32)

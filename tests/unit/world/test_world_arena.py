@@ -140,7 +140,7 @@ def test_four_cylinders_stand_in_the_corners_of_a_square(scene: World) -> None:
         (-0.8, -0.8, 0.2),
         (0.8, -0.8, 0.2),
     ]
-    assert {(s.numbers("radius"), s.numbers("height")) for s in shapes} == {((0.15,), (0.4,))}
+    assert {(s.numbers("radius"), s.numbers("height")) for s in shapes} == {((0.25,), (0.4,))}
     assert all(cylinder.nodes("boundingObject")[0].uses for cylinder in cylinders)
 
 

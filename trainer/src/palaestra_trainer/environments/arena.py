@@ -18,7 +18,7 @@ from palaestra_trainer.robots.base import RADIUS_M, Pose
 
 HALF_SIDE_M = 2.0  # from the centre to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
-CYLINDER_RADIUS_M = 0.15
+CYLINDER_RADIUS_M = 0.25  # wide enough that none hides between two of the robot's infrared rays
 CLEARANCE_M = 0.10  # between the robot's body and anything else, at the start and on the target
 APART_M = 1.0  # least distance from start to target
 

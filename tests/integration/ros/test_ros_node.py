@@ -1,0 +1,194 @@
+"""The stub's node on the wire, as programs that are not ours would use it."""
+
+import os
+import socket
+import struct
+import xmlrpc.client
+
+import pytest
+
+from palaestra_sim.protocol.rostypes import message_type, service_type
+from palaestra_sim.protocol.tcpros import FrameReader, decode_header, encode_header, frame
+from palaestra_sim.stub.ros import LATER
+from palaestra_trainer.ros import Master
+
+ASK = b"\x01"
+
+
+@pytest.fixture
+def dial(peer):
+    """Opens raw TCPROS connections to the peer: sends a header, returns socket and answer header."""
+    opened = []
+
+    def connect(**header):
+        address = Master("/raw").service_address(f"/{peer.name}/double")
+        connection = socket.create_connection(address, timeout=5)
+        opened.append(connection)
+        connection.sendall(encode_header({"callerid": "/raw", **header}))
+        return connection, decode_header(read_frame(connection))
+
+    yield connect
+    for connection in opened:
+        connection.close()
+
+
+def read_exactly(connection, count):
+    """Return that many bytes."""
+    data = b""
+    while len(data) < count:
+        piece = connection.recv(count - len(data))
+        assert piece, "the peer closed the connection"
+        data += piece
+    return data
+
+
+def read_frame(connection):
+    """Return the payload of one frame."""
+    return read_exactly(connection, struct.unpack("<I", read_exactly(connection, 4))[0])
+
+
+def service_header(peer, path, type_name, **more):
+    """Return the header of a client of a service."""
+    return {"service": f"/{peer.name}/{path}", "md5sum": service_type(type_name).md5, **more}
+
+
+def slave_api(peer):
+    """Return the XML-RPC interface that the master lists for the peer."""
+    with xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
+        return xmlrpc.client.ServerProxy(master.lookupNode("/raw", f"/{peer.name}")[2])
+
+
+def test_the_answer_header_tells_the_type(peer, dial):
+    """`rosservice type` reads it."""
+    _, header = dial(**service_header(peer, "double", "webots_ros/set_float"))
+
+    assert header["type"] == "webots_ros/set_float"
+    assert header["callerid"] == f"/{peer.name}"
+
+
+def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
+    """Without `persistent` a connection serves one call."""
+    connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
+    connection.sendall(frame(ASK))
+
+    assert read_exactly(connection, 1) == b"\x01"
+    assert struct.unpack("<d", read_frame(connection)) == (1.25,)
+    assert connection.recv(1) == b""
+
+
+def test_two_requests_in_one_packet_are_both_answered(peer, dial):
+    """The stream is cut into frames, not into packets."""
+    header = service_header(peer, "get_time", "webots_ros/get_float", persistent="1")
+    connection, _ = dial(**header)
+    connection.sendall(frame(ASK) * 2)
+
+    answers = [(read_exactly(connection, 1), read_frame(connection)) for _ in range(2)]
+
+    assert answers == [(b"\x01", struct.pack("<d", 1.25))] * 2
+
+
+def test_a_request_that_cannot_be_read_fails_alone(peer, dial):
+    """The connection stays, as roscpp's does."""
+    header = service_header(peer, "double", "webots_ros/set_float", persistent="1")
+    connection, _ = dial(**header)
+    connection.sendall(frame(b"abc") + frame(struct.pack("<d", 1.0)))
+
+    refused = (read_exactly(connection, 1), read_frame(connection))
+    answered = (read_exactly(connection, 1), read_frame(connection))
+
+    assert refused == (b"\x00", b"3 bytes for 8")
+    assert answered == (b"\x01", b"\x01")
+
+
+@pytest.mark.parametrize(
+    ("header", "fact"),
+    [
+        ({"service": "/nobody/here", "md5sum": "*"}, "no such service /nobody/here"),
+        ({"topic": "/nobody/value", "md5sum": "*"}, "no such topic /nobody/value"),
+        ({}, "no such topic None"),
+    ],
+)
+def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):
+    """And the connection is closed."""
+    connection, answer = dial(**header)
+
+    assert answer["error"] == fact
+    assert connection.recv(1) == b""
+
+
+def test_noise_on_the_port_disturbs_nobody(peer, dial):
+    """A port scanner must not end a training run."""
+    connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
+    connection.sendall(b"\xff" * 64)
+
+    _, header = dial(**service_header(peer, "double", "webots_ros/set_float"))
+
+    assert "error" not in header
+
+
+def test_requests_wait_while_the_controller_is_blocked(peer, dial):
+    """Webots holds a mutex during a step: everything else of that robot waits its turn."""
+    blocked = []
+    calls = []
+
+    def step(_request):
+        blocked.append(True)
+        calls.append(peer.node.current_call)
+        return LATER
+
+    def prepare():
+        peer.node.blocked = lambda: bool(blocked)
+        peer.node.serve("step", "webots_ros/set_int", step)
+
+    peer.do(prepare)
+    stepping, _ = dial(**service_header(peer, "step", "webots_ros/set_int"))
+    stepping.sendall(frame(struct.pack("<i", 32)))
+    asking, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
+    asking.sendall(frame(ASK))
+    asking.settimeout(0.2)
+    with pytest.raises(TimeoutError):
+        asking.recv(1)
+
+    def finish():
+        blocked.clear()
+        peer.node.answer(calls[0], {"success": True})
+
+    peer.do(finish)
+
+    asking.settimeout(5)
+    assert read_exactly(stepping, 1) == b"\x01"
+    assert read_exactly(asking, 1) == b"\x01"
+
+
+def test_a_late_subscriber_of_a_latched_topic_gets_the_last_message(peer, dial):
+    """How /model_name tells who is there."""
+    peer.do(lambda: peer.node.advertise("name", "std_msgs/String", latched=True).send({"data": "robot"}))
+
+    connection, header = dial(topic=f"/{peer.name}/name", md5sum="*", type="std_msgs/String")
+
+    assert header["latching"] == "1"
+    assert message_type("std_msgs/String").codec.decode(read_frame(connection)).data == "robot"
+
+
+def test_a_subscriber_that_does_not_read_gets_the_newest(peer, dial):
+    """Queue size 1: it loses old messages and slows nobody down."""
+    topic = {"topic": f"/{peer.name}/ir1/value", "md5sum": "*", "type": "sensor_msgs/Range"}
+    connection, _ = dial(**topic)
+    count = 200_000
+
+    peer.do(lambda: [peer.publisher.send_value(float(number)) for number in range(count)])
+
+    reader, values = FrameReader(), []
+    while not values or values[-1] != count - 1:
+        values += [struct.unpack("<f", data[-4:])[0] for data in reader.feed(connection.recv(65536))]
+    assert len(values) < count
+    assert values == sorted(values)
+
+
+def test_the_slave_api_answers_what_tools_ask(peer):
+    """`rosnode info` and `rosnode ping` do."""
+    with slave_api(peer) as slave:
+        assert slave.getPid("/raw")[2] == os.getpid()
+        assert slave.getMasterUri("/raw")[2] == os.environ["ROS_MASTER_URI"]
+        assert slave.requestTopic("/raw", f"/{peer.name}/ir1/value", [["TCPROS"]])[2][0] == "TCPROS"
+        assert slave.requestTopic("/raw", "/nothing", [["TCPROS"]])[0] == 0
