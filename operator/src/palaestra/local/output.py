@@ -1,7 +1,7 @@
 """Where the output of containers goes: always to a file, and to the screen when asked.
 
-Every line goes to `logs/<container>.log`. With `-v` it is shown too, behind the container's name. Without,
-the trainer may draw on the person's terminal (`terminal`).
+Every line goes to `logs/<container>.log`, and those of some containers to the screen, behind the container's
+name. The trainer may draw on the person's terminal (`terminal`) instead.
 """
 
 import asyncio

@@ -5,6 +5,7 @@ import contextlib
 import json
 import signal
 import uuid
+from collections.abc import Container
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,11 +28,13 @@ KILLED = 128 + signal.SIGINT
 class Setting:
     """Where a replica runs, and who sees its output.
 
-    `terminal` is the descriptor of a terminal that the trainer may draw on, None without one.
+    `shown` are the containers whose output is shown. `terminal` is the descriptor of a terminal that the
+    trainer may draw on, None without one.
     """
 
     directory: Path
     show: Show | None = None
+    shown: Container[str] = ()
     terminal: int | None = None
     backoff: BackOff = field(default_factory=BackOff)
 
@@ -84,7 +87,10 @@ async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt)
 
 def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str, Log]:
     folder = setting.directory / "logs"
-    logs = {each.name: Log(each.name, folder, setting.show) for each in pod.containers}
+    logs = {
+        each.name: Log(each.name, folder, setting.show if each.name in setting.shown else None)
+        for each in pod.containers
+    }
     for log in logs.values():
         opened.callback(log.close)
     return logs

@@ -19,6 +19,7 @@ from palaestra.local.output import say
 from palaestra.local.ports import HeldPorts
 from palaestra.local.replica import KILLED, Setting, meaning, run_replica
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
+from palaestra.plan.replica import TRAINER
 from palaestra_sim.protocol.status import ExitCode
 
 SHOWN_LINES = 5  # of the trainer's log, when it failed without a last word
@@ -117,13 +118,22 @@ def _trained(planned: ReplicaPlan, path: Path, ports: Ports, options: Options) -
     on_terminal = sys.stdout.isatty() and not options.verbose
     setting = Setting(
         directory=path,
-        show=say if options.verbose else None,
+        show=say,
+        shown=_shown(planned, options, on_terminal=on_terminal),
         terminal=sys.stdout.fileno() if on_terminal else None,
     )
     outcome = asyncio.run(run_replica(planned, setting))
     outcome.keep(path)
     _tell(outcome, path)
     return outcome.exit_code
+
+
+def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tuple[str, ...]:
+    """Return the containers whose lines are shown: all, or the trainer where it cannot draw."""
+    if options.verbose:
+        pod = planned.job["spec"]["template"]["spec"]
+        return tuple(each["name"] for each in (*pod["initContainers"], *pod["containers"]))
+    return () if on_terminal else (TRAINER,)
 
 
 def _tell(outcome: Outcome, path: Path) -> None:
