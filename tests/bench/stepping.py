@@ -23,14 +23,28 @@ TOPICS = [*(f"ir{number}" for number in range(1, 10)), "touch_sensor"]
 def measure():
     """Return steps per second of both, and their ratio round by round."""
     with running() as (robot, _, _):
-        theirs = RospyStepper("robotino")
-        pairs = [(rate(lambda: step(robot), OURS), rate(theirs.step, ROSPYS)) for _ in range(ROUNDS)]
-        theirs.close()
+        pairs = [(rate_of_ours(robot), rate_of_rospy()) for _ in range(ROUNDS)]
     return {
         "steps_per_second": round(statistics.median(ours for ours, _ in pairs)),
         "rospy_steps_per_second": round(statistics.median(rospys for _, rospys in pairs)),
         "times_rospy": round(statistics.median(ours / rospys for ours, rospys in pairs), 1),
     }
+
+
+def rate_of_ours(robot):
+    """Return steps per second with our sockets, alone on the simulator."""
+    robot.connect()
+    found = rate(lambda: step(robot), OURS)
+    robot.close()
+    return found
+
+
+def rate_of_rospy():
+    """Return steps per second with rospy, alone on the simulator."""
+    stepper = RospyStepper("robotino")
+    found = rate(stepper.step, ROSPYS)
+    stepper.close()
+    return found
 
 
 def rate(step_once, count):

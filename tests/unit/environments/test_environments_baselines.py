@@ -18,7 +18,7 @@ def test_driving_straight_succeeds_until_something_is_in_the_way(make_env):
     """So the task is about the cylinders, and a trained policy has something to win."""
     rate = success_rate(make_env(), straight_to_target, SEEDS)
 
-    assert 0.3 < rate < 0.6
+    assert 0.15 < rate < 0.5
 
 
 def test_random_movements_hardly_ever_succeed(make_env):

@@ -48,9 +48,9 @@ class Robotino(RobotinoAbc):
         self._infrared = tuple(DistanceSensor(name, f"ir{number + 1}") for number in range(SENSORS))
         self._bumper = TouchSensor(name, "touch sensor")
         robots = dict.fromkeys((name, webots.supervisor_node_name))
-        self.simulation = Simulation(tuple(robots), webots.supervisor, period_ms)
+        self.simulation = Simulation(tuple(robots), webots.supervisor, webots.observer, period_ms)
+        self.simulation.track(definition)
         self.simulation.add((*self._infrared, self._bumper), self._wheels)
-        self._pose: Pose | None = None
 
     @property
     def period_s(self) -> float:
@@ -64,14 +64,12 @@ class Robotino(RobotinoAbc):
             SimulatorDead, SimulatorHung, WrongData
         """
         self.close()  # what is left of connections to a simulator before this one
-        self._pose = None
         self._observer.forget_handles()
         self.simulation.connect()
 
     def distances(self) -> NDArray[np.float32]:
         """Return metres to the nearest obstacle, shape (9,), forward first, counter-clockwise."""
-        volts = np.array([sensor.value for sensor in self._infrared], dtype=np.float32)
-        return metres(volts)
+        return np.array([metres(sensor.value) for sensor in self._infrared], dtype=np.float32)
 
     def bumped(self) -> bool:
         """Return whether the bumper touches something."""
@@ -79,9 +77,7 @@ class Robotino(RobotinoAbc):
 
     def pose(self) -> Pose:
         """Return the true pose after the last step."""
-        if self._pose is None:
-            self._pose = Pose(*self._observer.pose(self.definition))
-        return self._pose
+        return Pose(*self.simulation.pose(self.definition))
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
         """Set the wanted velocity: forward, left (m/s) and counter-clockwise (rad/s), until changed."""
@@ -95,7 +91,6 @@ class Robotino(RobotinoAbc):
 
     def advance(self) -> int:
         """Simulate one control period; return how many extra ones it took, normally 0."""
-        self._pose = None
         return self.simulation.step()
 
     def close(self) -> None:
@@ -138,7 +133,7 @@ def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
     )
 
 
-def metres(volts: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return distances in metres, within the sensor's range, for readings in volts."""
-    distances = _RANGE_SCALE * np.maximum(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
-    return np.clip(distances, *SENSOR_RANGE_M).astype(np.float32)
+def metres(volts: float) -> float:
+    """Return the distance in metres, within the sensor's range, for a reading in volts."""
+    distance: float = _RANGE_SCALE * max(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
+    return min(max(distance, SENSOR_RANGE_M[0]), SENSOR_RANGE_M[1])

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from palaestra_trainer.errors import WrongData
-from palaestra_trainer.ros import call_together
+from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.services import Services
 
 
@@ -60,16 +60,18 @@ class Observer:
 
     def pose(self, name: str) -> tuple[float, float, float]:
         """Return x and y in metres and the heading in radians of the node with DEF `name`."""
+        self.begin_pose(name)
+        return self.finish_pose(name)
+
+    def begin_pose(self, name: str) -> None:
+        """Ask for a pose; `finish_pose` must follow, and may after other things were done."""
         node = self.node(name)
-        position, orientation = call_together(
-            (
-                (self._services.get("supervisor/node/get_position", "node_get_position"), {"node": node}),
-                (
-                    self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
-                    {"node": node},
-                ),
-            )
-        )
+        for service in self._pose_services():
+            service.begin(node=node)
+
+    def finish_pose(self, name: str) -> tuple[float, float, float]:
+        """Return the pose that `begin_pose` asked for."""
+        position, orientation = (service.finish() for service in self._pose_services())
         turn = orientation.orientation
         heading = 2.0 * math.atan2(turn.z, turn.w)
         pose = (position.position.x, position.position.y, math.remainder(heading, 2.0 * math.pi))
@@ -115,6 +117,12 @@ class Observer:
         """Drop handles and connections."""
         self.forget_handles()
         self._services.close()
+
+    def _pose_services(self) -> tuple[RosService, RosService]:
+        return (
+            self._services.get("supervisor/node/get_position", "node_get_position"),
+            self._services.get("supervisor/node/get_orientation", "node_get_orientation"),
+        )
 
     def _known(self, handle: Any, fact: str) -> int:
         if not handle:

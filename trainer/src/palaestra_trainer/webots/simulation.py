@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
 from palaestra_trainer.webots.devices import Motor, Sensor
+from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.supervisor import Supervisor
 
 # Two extra steps deliver whatever a lost wake-up withheld; a sensor that is silent after them is broken.
@@ -24,20 +25,33 @@ class Simulation:
     Args:
         robots: the ROS names of all robots of the world; a step lasts until each has asked for it.
         supervisor: resets, and places what is moved.
+        observer: tells the poses that are tracked.
         period_ms: simulated milliseconds a step, a multiple of the world's basicTimeStep.
     """
 
-    def __init__(self, robots: Sequence[str], supervisor: Supervisor, period_ms: int) -> None:
+    def __init__(
+        self, robots: Sequence[str], supervisor: Supervisor, observer: Observer, period_ms: int
+    ) -> None:
         self.period_ms = period_ms
+        self._observer = observer
         self._supervisor = supervisor
         self._steps = [RosService(f"/{robot}/robot/time_step", "webots_ros/set_int") for robot in robots]
         self._sensors: list[Sensor] = []
         self._motors: list[Motor] = []
+        self._tracked: dict[str, tuple[float, float, float] | None] = {}
 
     def add(self, sensors: Sequence[Sensor], motors: Sequence[Motor]) -> None:
         """Let a robot's devices take part: its sensors are read each step, its motors released at resets."""
         self._sensors += sensors
         self._motors += motors
+
+    def track(self, name: str) -> None:
+        """Read the pose of the node with DEF `name` at each step, for `pose`."""
+        self._tracked[name] = None
+
+    def pose(self, name: str) -> tuple[float, float, float]:
+        """Return x, y (metres) and heading (radians) of a tracked node after the last step."""
+        return self._tracked[name] or self._observer.pose(name)
 
     def connect(self) -> None:
         """Enable every sensor and release every motor, after the simulator has started.
@@ -45,6 +59,7 @@ class Simulation:
         Raises:
             SimulatorDead, SimulatorHung, WrongData
         """
+        self._tracked = dict.fromkeys(self._tracked)
         for sensor in self._sensors:
             sensor.enable(self.period_ms)
         self._release_motors()
@@ -58,15 +73,13 @@ class Simulation:
         """
         for sensor in self._sensors:
             sensor.forget_old()
-        self._advance()
-        silent = self._read_sensors()
+        silent = self._advance_and_read()
         extra_steps = 0
         while silent is not None:
             if extra_steps == _MOST_EXTRA_STEPS:
                 raise SimulatorHung(self._supervisor.node_name, f"{silent.device} stays silent")
             extra_steps += 1
-            self._advance()
-            silent = self._read_sensors()
+            silent = self._advance_and_read()
         return extra_steps
 
     def reset(self, seed: int) -> None:
@@ -86,11 +99,21 @@ class Simulation:
         for part in parts:
             part.close()
 
+    def _advance_and_read(self) -> Sensor | None:
+        self._advance()
+        # Asked before the sensors are read, so that the answers come while they are.
+        for name in self._tracked:
+            self._observer.begin_pose(name)
+        silent = self._read_sensors()
+        for name in self._tracked:
+            self._tracked[name] = self._observer.finish_pose(name)
+        return silent
+
     def _read_sensors(self) -> Sensor | None:
         """Read every sensor once; return the first that stays silent, None when all have spoken."""
         silent = None
         for sensor in self._sensors:
-            # What is lost is lost for all, so only the first is waited for.
+            # What is lost is lost for all, so only one is waited for.
             spoke = sensor.read() if silent is None else sensor.read_arrived()
             if not spoke:
                 silent = silent or sensor

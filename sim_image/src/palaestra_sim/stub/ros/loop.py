@@ -19,6 +19,11 @@ from typing import Any
 
 Callback = Callable[[], None]
 
+# Being woken costs a virtual machine 30 us, more than the answer to a request. So where the last wait was
+# short, the next one first looks a few times, and lets others run in between.
+_QUICK_S = 200e-6
+_LOOKS = 30
+
 
 class Loop:
     """Runs callbacks when sockets are ready, moments have come, or other threads posted."""
@@ -33,6 +38,7 @@ class Loop:
         os.set_blocking(self._wake_write, False)
         self._selector.register(self._wake_read, selectors.EVENT_READ, self._run_posted)
         self._running = False
+        self._quick = False
         self._wakes_on_signals = False
 
     def watch(self, file: Any, ready: Callback, *, writing: bool = False) -> None:
@@ -72,7 +78,7 @@ class Loop:
         """Run until `stop`."""
         self._running = True
         while self._running:
-            for key, _ in self._selector.select(self._wait_s()):
+            for key, _ in self._ready():
                 key.data()
             while self._timers and self._timers[0][0] <= time.monotonic():
                 heapq.heappop(self._timers)[2]()
@@ -84,6 +90,21 @@ class Loop:
         self._selector.close()
         os.close(self._wake_read)
         os.close(self._wake_write)
+
+    def _ready(self) -> list[tuple[selectors.SelectorKey, int]]:
+        """Return what is ready, after a wait; where the last wait was short, look a few times first."""
+        wait_s = self._wait_s()
+        if wait_s == 0.0:
+            return self._selector.select(0)
+        if self._quick:
+            for _ in range(_LOOKS):
+                if ready := self._selector.select(0):
+                    return ready
+                os.sched_yield()
+        began = time.monotonic()
+        ready = self._selector.select(wait_s)
+        self._quick = time.monotonic() - began < _QUICK_S
+        return ready
 
     def _wait_s(self) -> float | None:
         return max(0.0, self._timers[0][0] - time.monotonic()) if self._timers else None
