@@ -25,7 +25,7 @@ def measure_recovery():
     """Return the seconds from a SIGKILL of the collecting stub to the next environment step."""
     with local_run() as (process, folder):
         status = wait_for_step(folder, WARM_STEPS, process)
-        stub = next(pid for pid, name in processes(process.pid) if "palaestra-stub" in name)
+        stub = next(pid for pid, name in programs(process.pid, "palaestra-stub") if "collect-0.wbt" in name)
         killed = time.monotonic()
         os.kill(stub, signal.SIGKILL)
         before = status["step"]
@@ -40,12 +40,16 @@ def measure_memory():
     """Return the resident megabytes of the processes of a run, by kind, the largest of each."""
     with local_run() as (process, folder):
         wait_for_step(folder, WARM_STEPS, process)
-        found = {}
-        for pid, name in processes(process.pid):
-            kind = next((k for k in ("train", "stub", "sidecar", "rosmaster") if k in name), None)
-            if kind is not None:
-                found[kind] = max(found.get(kind, 0), resident_mb(pid))
-        return {f"{kind}_mb": megabytes for kind, megabytes in sorted(found.items())}
+        return {
+            f"{program}_mb": max(resident_mb(pid) for pid, _ in programs(process.pid, program))
+            for program in (
+                "palaestra-train",
+                "palaestra-stub",
+                "palaestra-sidecar",
+                "keeper.py",
+                "rosmaster",
+            )
+        }
 
 
 @contextmanager
@@ -87,6 +91,16 @@ def status_of(folder):
             return json.load(answer)
     except (OSError, ValueError):
         return None
+
+
+def programs(ancestor, name):
+    """Return pid and command line of the processes below `ancestor` that run the program `name`."""
+    return [
+        (pid, command)
+        for pid, command in processes(ancestor)
+        if any(word.endswith(name) for word in command.split()[:3])
+        and not any(word.endswith("keeper.py") for word in command.split() if name != "keeper.py")
+    ]
 
 
 def processes(ancestor):

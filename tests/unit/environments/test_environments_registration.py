@@ -109,3 +109,31 @@ def test_without_robot_or_configuration_the_error_says_so(monkeypatch):
 
     with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG"):
         gymnasium.make(NAME)
+
+
+class _Startable:
+    """A simulator that only tells whether it was started."""
+
+    def __init__(self) -> None:
+        self.robot, self.scene = fake_arena()
+        self.started = False
+
+    def start(self) -> None:
+        self.started = True
+
+
+def test_each_environment_takes_the_next_simulator_and_starts_it():
+    """Two environments in one simulator would move each other's robot."""
+    simulators = [_Startable(), _Startable()]
+    waiting = iter(simulators)
+
+    robot, scene = configured.take(waiting)
+
+    assert (robot, scene) == (simulators[0].robot, simulators[0].scene)
+    assert [it.started for it in simulators] == [True, False]
+
+
+def test_more_environments_than_simulators_are_refused():
+    """The remedy is the job's or the script's: more of the one, or fewer of the other."""
+    with pytest.raises(ConfigurationError, match="add some, or make fewer"):
+        configured.take(iter([]))

@@ -7,6 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,7 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     from palaestra_trainer.measuring import measure  # noqa: PLC0415 - see train()
     from palaestra_trainer.simulators.connect import connect, connect_here  # noqa: PLC0415
 
-    members = connect if in_pod else connect_here
+    members = connect if in_pod else partial(connect_here, run=directory.path)
     return measure(configuration, directory.model, members, episodes=episodes, stream=stream)
 
 

@@ -102,6 +102,8 @@ class SimulatorConfiguration(_Section):
         name: `<group>-<index>`, unique in the file.
         role: Collect gathers experience, Evaluate measures the policy.
         control: address of its sidecar's control port.
+        driver: how it is started: stub, webots or command.
+        options: its command-line options.
         world: path of its generated world.
         names_prefix: readable start of the ROS names of its robots.
         start_deadline_seconds: it must have answered this long after its start.
@@ -112,6 +114,8 @@ class SimulatorConfiguration(_Section):
     index: Annotated[int, Field(ge=0)]
     role: Role
     control: str = ""
+    driver: str = "stub"
+    options: tuple[str, ...] = ()
     world: str = ""
     names_prefix: str = ""
     recycle: Recycle | None = None

@@ -52,6 +52,8 @@ def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes
         "group": group.name,
         "index": simulator.identity.index,
         "role": group.role.value,
+        "driver": group.driver.value,
+        "options": list(group.options),
         "control": f"http://{LOOPBACK}:{port}",
         "world": world_path(replica, simulator, files),
         "namesPrefix": name_prefix(simulator.identity),

@@ -4,13 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
-if TYPE_CHECKING:
-    from palaestra_trainer.simulators.simulator import Simulator
+
+class Startable(Protocol):
+    """A simulator, as far as an environment has to know one."""
+
+    @property
+    def robot(self) -> RobotinoAbc:
+        """What is driven in it."""
+        ...
+
+    @property
+    def scene(self) -> Scene:
+        """Where its episodes are arranged."""
+        ...
+
+    def start(self) -> None:
+        """Start it; `SimulatorFault` if it doesn't come up."""
+        ...
 
 
 def next_simulator() -> tuple[RobotinoAbc, Scene]:
@@ -20,17 +35,27 @@ def next_simulator() -> tuple[RobotinoAbc, Scene]:
         ConfigurationError: there is no configuration, or all its simulators are taken.
         SimulatorFault: the simulator does not start.
     """
-    simulator = next(configured_simulators(), None)
+    return take(configured_simulators())
+
+
+def take(simulators: Iterator[Startable]) -> tuple[RobotinoAbc, Scene]:
+    """Return robot and scene of the next of these simulators, started.
+
+    Raises:
+        ConfigurationError: none is left.
+        SimulatorFault: it does not start.
+    """
+    simulator = next(simulators, None)
     if simulator is None:
         raise ConfigurationError(
-            "every simulator in PALAESTRA_CONFIG has its environment; add some, or make fewer"
+            "PALAESTRA_CONFIG: each of its simulators has an environment; add some, or make fewer"
         )
     simulator.start()
     return simulator.robot, simulator.scene
 
 
 @cache
-def configured_simulators() -> Iterator[Simulator]:
+def configured_simulators() -> Iterator[Startable]:
     """Return what is left of the simulators in PALAESTRA_CONFIG, the same iterator to everyone."""
     # Only here do environments meet ROS, and only when nobody gave them a robot.
     from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415

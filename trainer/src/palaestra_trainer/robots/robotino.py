@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class Robotino(RobotinoAbc):
         node_name: the ROS name of the robot's controller; by default the robot is its own supervisor.
         definition: the DEF name of the robot in the world.
         period_ms: simulated milliseconds in one `advance`.
+        robots: the ROS names of all robots in the world; they step together. By default robot and supervisor.
     """
 
     def __init__(
@@ -40,6 +41,7 @@ class Robotino(RobotinoAbc):
         node_name: str | None = None,
         definition: str = "ROBOTINO",
         period_ms: int = PERIOD_MS,
+        robots: Iterable[str] = (),
     ) -> None:
         name = node_name or webots.supervisor_node_name
         self.definition = definition
@@ -47,8 +49,8 @@ class Robotino(RobotinoAbc):
         self._wheels = tuple(Motor(name, f"wheel{number}_joint") for number in range(3))
         self._infrared = tuple(DistanceSensor(name, f"ir{number + 1}") for number in range(SENSORS))
         self._bumper = TouchSensor(name, "touch sensor")
-        robots = dict.fromkeys((name, webots.supervisor_node_name))
-        self.simulation = Simulation(tuple(robots), webots.supervisor, webots.observer, period_ms)
+        together = dict.fromkeys((name, webots.supervisor_node_name, *robots))
+        self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, period_ms)
         self.simulation.track(definition)
         self.simulation.add((*self._infrared, self._bumper), self._wheels)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from palaestra_sim.protocol.rostypes import service_type
 from palaestra_sim.protocol.tcpros import LENGTH, frame
-from palaestra_trainer.errors import SimulatorDead, SimulatorFault, WrongData
+from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node
 from palaestra_trainer.ros.wire import Wire
@@ -52,7 +52,7 @@ class RosService:
         data = frame(self._type.request.encode(fields))
         try:
             self._connected().send(data)
-        except SimulatorFault:
+        except BaseException:  # a Ctrl-C too: the next answer would be this request's
             self.close()
             raise
 
@@ -65,12 +65,8 @@ class RosService:
         if self._wire is None:
             raise SimulatorDead(self.simulator, f"{self.name} has no request under way")
         try:
-            answer = self._wire.receive(ahead=1)
-            payload = bytes(answer[1 + LENGTH.size :])
-            if answer[0] != _OK_BYTE:
-                raise WrongData(self.simulator, f"{self.name} failed: {payload.decode(errors='replace')}")
-            return self._decode(payload)
-        except SimulatorFault:
+            return self._read_answer(self._wire)
+        except BaseException:  # a Ctrl-C too: the next answer would be this request's
             self.close()
             raise
 
@@ -79,6 +75,13 @@ class RosService:
         if self._wire is not None:
             self._wire.close()
             self._wire = None
+
+    def _read_answer(self, wire: Wire) -> Any:
+        answer = wire.receive(ahead=1)
+        payload = bytes(answer[1 + LENGTH.size :])
+        if answer[0] != _OK_BYTE:
+            raise WrongData(self.simulator, f"{self.name} failed: {payload.decode(errors='replace')}")
+        return self._decode(payload)
 
     def _decode(self, payload: bytes) -> Any:
         try:
@@ -116,7 +119,7 @@ def call_together(calls: Iterable[tuple[RosService, dict[str, Any]]]) -> list[An
             service.begin(**fields)
             sent.append(service)
         return [service.finish() for service in sent]
-    except SimulatorFault:
+    except BaseException:  # a Ctrl-C too
         for service in sent:
             service.close()
         raise

@@ -7,8 +7,11 @@ file as its order to stop.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import selectors
 import subprocess
+import threading
+from typing import IO
 
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 
@@ -34,10 +37,26 @@ def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
 
 def end_child(process: subprocess.Popen[bytes]) -> None:
     """Close what the process lives on, and wait for its end; safe to repeat."""
-    for pipe in (process.stdin, process.stdout, process.stderr):
+    if process.stdin is not None:
+        process.stdin.close()
+    process.wait(_ANSWER_S)
+    for pipe in (process.stdout, process.stderr):
         if pipe is not None:
             pipe.close()
-    process.wait(_ANSWER_S)
+
+
+def drain(process: subprocess.Popen[bytes]) -> None:
+    """Read and drop what the process prints from now on: a full pipe would stop it for ever."""
+    for pipe in (process.stdout, process.stderr):
+        if pipe is not None:
+            threading.Thread(target=_drop, args=(pipe,), daemon=True).start()
+
+
+def _drop(pipe: IO[bytes]) -> None:
+    # The pipe is closed under the reader when the process is ended.
+    with contextlib.suppress(OSError, ValueError):
+        while pipe.read1(65536):  # type: ignore[attr-defined]  # Popen's pipes are buffered
+            pass
 
 
 def first_line(process: subprocess.Popen[bytes]) -> str:

@@ -15,6 +15,7 @@ from palaestra_trainer.configuration import Configuration, SimulatorConfiguratio
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.ros import ensure_node
+from palaestra_trainer.simulators.master import ensure_master
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
@@ -33,21 +34,38 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
     return [_simulator(chosen, entry, Sidecar(entry.control, entry.name)) for entry in chosen.simulators]
 
 
-def connect_here(configuration: Configuration) -> list[Simulator]:
-    """Return the same simulators as processes of this program, without a pod: not started either.
+def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
+    """Return the simulators of a run directory as processes of this program, without a pod: not started.
 
     Raises:
-        ConfigurationError: a world is not on this machine, or the environment is not known.
+        ConfigurationError: the run directory lacks a world, or a simulator cannot be started here.
     """
-    for entry in configuration.simulators:
-        if not Path(entry.world).exists():
-            raise ConfigurationError(
-                f"{entry.world}: the world of {entry.name} is not on this machine; "
-                "copy the whole run directory, its worlds too"
-            )
+    ensure_master()
     return [
-        _simulator(configuration, entry, ProcessLauncher(entry.world)) for entry in configuration.simulators
+        _simulator(configuration, entry, _process(configuration, entry, run))
+        for entry in configuration.simulators
     ]
+
+
+def _process(configuration: Configuration, entry: SimulatorConfiguration, run: Path) -> ProcessLauncher:
+    # A run directory may have been moved; worlds of the image's own lie outside of it.
+    inside = run / "worlds" / Path(entry.world).name
+    world = inside if inside.exists() else Path(entry.world)
+    if not world.exists() or entry.driver == "command":
+        raise ConfigurationError(
+            f"{entry.name}: {world} with driver {entry.driver} cannot be started here; "
+            "copy the whole run directory, or measure in the pod"
+        )
+    names = (
+        f"--job={configuration.job}",
+        f"--namespace={configuration.namespace}",
+        f"--uid={configuration.uid}",
+        f"--replica={configuration.replica}",
+        f"--group={entry.group}",
+        f"--index={entry.index}",
+        f"--work={run / 'scratch' / f'{entry.name}-here'}",
+    )
+    return ProcessLauncher(world.absolute(), entry.driver, entry.options, names)
 
 
 def _simulator(configuration: Configuration, entry: SimulatorConfiguration, sidecar: Sidecar) -> Simulator:

@@ -25,4 +25,7 @@ def ensure_master() -> None:
         os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
         os.environ["ROS_HOSTNAME"] = "localhost"
         module = [sys.executable, "-m", "palaestra_trainer.simulators.own_master", str(port)]
-        first_line(start_child(module, stderr=subprocess.DEVNULL))
+        if not first_line(start_child(module, stderr=subprocess.DEVNULL)):
+            raise MasterLost(
+                f"a ROS master could not be started on port {port}; start rosmaster by hand"
+            ) from None

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.child import end_child, first_line, start_child
+from palaestra_trainer.simulators.child import drain, end_child, first_line, start_child
 from palaestra_trainer.simulators.master import ensure_master
 from palaestra_trainer.simulators.sidecar import Sidecar
 
@@ -27,12 +27,19 @@ class ProcessLauncher(Sidecar):
         world: path of the world, or the name of one that ships.
         driver: stub or webots.
         options: command-line options for the simulator.
+        names: the sidecar's options that give the robots ROS names of their own.
 
     Raises:
         ConfigurationError: the sidecar refused the world or the driver; its words are in the message.
     """
 
-    def __init__(self, world: str | Path, driver: str = "stub", options: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        world: str | Path,
+        driver: str = "stub",
+        options: Sequence[str] = (),
+        names: Sequence[str] = (),
+    ) -> None:
         ensure_master()
         command = [
             *_program("palaestra-sidecar"),
@@ -42,6 +49,7 @@ class ProcessLauncher(Sidecar):
             "--health=127.0.0.1:0",
             "--until-stdin-closes",
             *(f"--option={option}" for option in options),
+            *names,
         ]
         self._process = start_child(command, stderr=subprocess.PIPE)
         line = first_line(self._process)
@@ -49,6 +57,7 @@ class ProcessLauncher(Sidecar):
         if found is None:
             _, said = self._process.communicate(timeout=_END_S)
             raise ConfigurationError(said.decode(errors="replace").strip() or f"the sidecar said {line!r}")
+        drain(self._process)
         super().__init__(f"http://{found[1]}", Path(world).stem)
 
     def close(self) -> None:

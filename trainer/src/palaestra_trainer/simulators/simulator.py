@@ -42,7 +42,7 @@ class Simulator:
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
         )
-        self.robot = Robotino(self.webots, driven.ros_name)
+        self.robot = Robotino(self.webots, driven.ros_name, robots=[robot.ros_name for robot in state.robots])
         self.scene = RobotinoScene(self.webots, self.robot)
         self.env = make_environment(self.robot, self.scene)
 

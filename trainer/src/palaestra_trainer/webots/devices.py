@@ -64,6 +64,10 @@ class Sensor:
         self._values.connect()
         self._late = False
 
+    def mistrust(self) -> None:
+        """Take nothing that has arrived until the next step for a reading of that step."""
+        self._late = True
+
     def forget_old(self) -> None:
         """Throw away what came too late for the step it belonged to."""
         if self._late:

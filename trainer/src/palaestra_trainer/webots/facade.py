@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, TrainerError
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervisor import Supervisor
@@ -48,6 +48,14 @@ class Launcher(Protocol):
         ...
 
 
+class Owned(Launcher, Protocol):
+    """A launcher that lives for one facade."""
+
+    def close(self) -> None:
+        """End what it started."""
+        ...
+
+
 class Webots:
     """One simulator, started, stopped and switched between fast and pause.
 
@@ -68,11 +76,12 @@ class Webots:
         start_deadline_s: float = 60.0,
         stop_deadline_s: float = 5.0,
     ) -> None:
+        self._own: Owned | None = None
         if launcher is None:
             # The launcher talks to a sidecar, which this layer knows nothing of.
             from palaestra_trainer.simulators.process import ProcessLauncher  # noqa: PLC0415
 
-            launcher = ProcessLauncher(world_path)
+            launcher = self._own = ProcessLauncher(world_path)
         self.supervisor_node_name = supervisor_node_name
         self.world_path = world_path
         self.observer = Observer(supervisor_node_name)
@@ -166,12 +175,18 @@ class Webots:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if not isinstance(exc, SimulatorFault):
+        try:
             self.supervisor.set_mode(Mode.PAUSE)
+        except TrainerError:
+            # What went wrong inside is the news, not that the simulator is gone now.
+            if exc is None:
+                raise
 
     def close(self) -> None:
-        """Drop all connections; the simulator is left as it is."""
+        """Drop all connections, and end the process if it was started for this facade alone."""
         self._disconnect()
+        if self._own is not None:
+            self._own.close()
 
     def _disconnect(self) -> None:
         self._probe.close()

@@ -71,8 +71,6 @@ class Simulation:
             SimulatorDead, SimulatorHung: also when a sensor stays silent.
             WrongData: the simulator refused the period, or a reading cannot be right.
         """
-        for sensor in self._sensors:
-            sensor.forget_old()
         silent = self._advance_and_read()
         extra_steps = 0
         while silent is not None:
@@ -100,13 +98,20 @@ class Simulation:
             part.close()
 
     def _advance_and_read(self) -> Sensor | None:
-        self._advance()
-        # Asked before the sensors are read, so that the answers come while they are.
-        for name in self._tracked:
-            self._observer.begin_pose(name)
-        silent = self._read_sensors()
-        for name in self._tracked:
-            self._tracked[name] = self._observer.finish_pose(name)
+        for sensor in self._sensors:
+            sensor.forget_old()
+        try:
+            self._advance()
+            # Asked before the sensors are read, so that the answers come while they are.
+            for name in self._tracked:
+                self._observer.begin_pose(name)
+            silent = self._read_sensors()
+            for name in self._tracked:
+                self._tracked[name] = self._observer.finish_pose(name)
+        except BaseException:  # a Ctrl-C too: what arrives now belongs to this step
+            for sensor in self._sensors:
+                sensor.mistrust()
+            raise
         return silent
 
     def _read_sensors(self) -> Sensor | None:

@@ -1,0 +1,106 @@
+"""Simulators that a script starts: they may say what they like, and end with the script."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from palaestra_trainer.errors import SimulatorHung
+from palaestra_trainer.simulators.child import drain, end_child, first_line, start_child
+from palaestra_trainer.webots import Webots
+
+CHATTERBOX = """
+import sys
+print("hello", flush=True)
+for _ in range(20000):
+    print("x" * 99)
+print("done", file=sys.stderr, flush=True)
+sys.stdin.read()
+"""
+
+OWNER = """
+import sys
+from palaestra_trainer.webots import Webots
+webots = Webots("robotino", "arena")
+webots.start()
+print(webots._launcher.state().pid, flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_child_that_prints_without_end_is_not_stopped_by_a_full_pipe(tmp_path):
+    """Webots forwards its controllers' output; nobody reads it in a script."""
+    mark = tmp_path / "done"
+    program = CHATTERBOX.replace('print("done", file=sys.stderr, flush=True)', f"open({str(mark)!r}, 'w')")
+    child = start_child([sys.executable, "-c", program], stderr=subprocess.PIPE)
+    assert first_line(child) == "hello\n"
+
+    drain(child)
+
+    give_up = time.monotonic() + 20
+    while not mark.exists() and time.monotonic() < give_up:
+        time.sleep(0.02)
+    end_child(child)
+    assert mark.exists()
+
+
+def test_a_killed_script_leaves_no_simulator(master):
+    """The sidecar's standard input closes with its owner, however that ends."""
+    del master
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    simulator = Path(f"/proc/{int(owner.stdout.readline())}")
+    assert simulator.exists()
+
+    owner.kill()
+    owner.communicate()
+
+    give_up = time.monotonic() + 10
+    while simulator.exists() and time.monotonic() < give_up:
+        time.sleep(0.02)
+    assert not simulator.exists()
+
+
+def test_what_went_wrong_inside_is_told_and_not_that_the_simulator_is_gone(arena):
+    """The context manager cannot pause what is dead, and must not hide why."""
+
+    def fail():
+        with arena.webots:
+            arena.webots.stop()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+
+
+def test_after_an_interrupted_call_the_next_answer_is_its_own(arena, monkeypatch):
+    """Ctrl-C in a notebook cell must not shift every later answer by one."""
+    probe = arena.webots.observer
+    before = probe.time()
+    monkeypatch.setattr("palaestra_trainer.ros.wire.Wire.receive", _interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        probe.time()
+    monkeypatch.undo()
+
+    arena.robot.advance()
+
+    assert probe.time() == pytest.approx(before + 0.192)
+
+
+def _interrupted(_wire, ahead=0):
+    del ahead
+    raise KeyboardInterrupt
+
+
+def test_a_simulator_that_does_not_come_is_told_by_its_deadline(master):
+    """Another name than the world's is never answered."""
+    del master
+    webots = Webots("nobody", "arena", start_deadline_s=1.0)
+
+    with pytest.raises(SimulatorHung, match="did not start within 1 s"):
+        webots.start()
+
+    webots.close()
