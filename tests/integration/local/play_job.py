@@ -1,4 +1,4 @@
-"""Run a planned Job as `palaestra run` does: `python play_job.py JOB.json DIRECTORY`.
+"""Run a planned Job as `palaestra run` does: `python play_job.py JOB.json DIRECTORY [DEADLINE_S]`.
 
 A program of its own, because the tests kill it.
 """
@@ -14,6 +14,7 @@ from palaestra.plan import ReplicaPlan
 
 job = json.loads(Path(sys.argv[1]).read_text())
 planned = ReplicaPlan(config_map={"data": {}}, claim=None, job=job)
-setting = Setting(directory=Path(sys.argv[2]), backoff=BackOff(first_s=0.02))
+deadline_s = float(sys.argv[3]) if len(sys.argv) > 3 else None
+setting = Setting(directory=Path(sys.argv[2]), backoff=BackOff(first_s=0.02), deadline_s=deadline_s)
 outcome = asyncio.run(run_replica(planned, setting))
 sys.stdout.write(json.dumps({"code": outcome.exit_code, "pods": outcome.pods, "steps": outcome.steps}))

@@ -36,7 +36,9 @@ class Play:
         self.pids = folder / "pids"
         self.starts = folder / "starts"
 
-    def start(self, trainer: str, *, sidecar: str = "sleep 300", limit: int = 3) -> subprocess.Popen:
+    def start(
+        self, trainer: str, *, sidecar: str = "sleep 300", limit: int = 3, deadline: str = ""
+    ) -> subprocess.Popen:
         """Start the runner; every container writes its process ids to `pids`."""
         count = f"echo $$ >> {shlex.quote(str(self.pids))}\n"
         trainer = f"echo x >> {shlex.quote(str(self.starts))}\n{count}{trainer}"
@@ -59,7 +61,8 @@ class Play:
         job = {"spec": {"backoffLimit": limit, "podFailurePolicy": POLICY, "template": template}}
         file = self.folder / "job.json"
         file.write_text(json.dumps(job))
-        return subprocess.Popen([sys.executable, PLAY, file, self.folder], stdout=subprocess.PIPE, text=True)
+        command = [sys.executable, PLAY, file, self.folder, *deadline.split()]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
     def run(self, trainer: str, **options) -> dict:
         """Run a Job to its end and return its outcome and the number of pods that were seen."""
@@ -143,6 +146,40 @@ def test_the_first_ctrl_c_lets_the_trainer_save_and_ends_with_75(play, eventuall
     assert json.loads(out.splitlines()[-1])["code"] == 75
     assert (play.folder / "saved").exists()
     assert not play.running()
+
+
+@pytest.mark.parametrize("code", [1, 80, 81])
+def test_ctrl_c_does_not_hide_that_the_trainer_failed(play, eventually, code):
+    """75 promises a checkpoint, and a divergence must not be resumed."""
+    runner = play.start(f"trap 'exit {code}' TERM; while :; do sleep 0.02; done")
+    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+
+    os.kill(runner.pid, signal.SIGINT)
+    out, _ = runner.communicate(timeout=20)
+
+    assert json.loads(out.splitlines()[-1]) == {"code": code, "pods": 1, "steps": None}
+
+
+@pytest.mark.parametrize(
+    "trainer",
+    [
+        pytest.param("trap 'exit 75' TERM; while :; do sleep 0.02; done", id="trains"),
+        pytest.param("exit 82", id="is waited for between two pods"),
+    ],
+)
+def test_a_run_past_its_deadline_is_stopped_and_has_failed(play, trainer):
+    """Also in the middle of a back-off; Kubernetes does the same to a Job."""
+    runner = play.start(trainer, limit=100, deadline="1.5")
+
+    out, _ = runner.communicate(timeout=60)
+
+    assert json.loads(out.splitlines()[-1])["code"] == 1
+    assert not play.running()
+
+
+def test_a_run_that_is_done_before_its_deadline_is_not_held_up(play):
+    """The deadline is a bound, not a length."""
+    assert play.run("exit 0", deadline="300")["code"] == 0
 
 
 def test_the_second_ctrl_c_kills(play, eventually):

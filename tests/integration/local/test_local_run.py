@@ -137,6 +137,33 @@ def test_ctrl_c_ends_with_75_and_says_how_to_go_on(desk, eventually):
     assert "the same command goes on" in out
 
 
+def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(desk, eventually):
+    """Its checkpoint was not written, and the person has asked for an end."""
+    desk.write(WAIT.replace("sys.exit(75)", "sys.exit('no room to save')"), replicas=2)
+    process = desk.start()
+    eventually((desk.run_directory / "begun").exists)
+
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=PATIENCE_S)
+
+    assert process.returncode == 1
+    assert "interrupted, and failed: the trainer ended with exit code 1" in out
+    assert "no room to save" in out
+    assert not desk.run_directory.with_name("1").exists()
+
+
+def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
+    """Whoever set the deadline may raise it: the run itself is whole."""
+    desk.write(WAIT, activeDeadlineSeconds=1)
+
+    code, out = desk.run()
+    desk.write(ASK, activeDeadlineSeconds=300)
+    again, _ = desk.run()
+
+    assert (code, again) == (1, 0)
+    assert "failed: DeadlineExceeded: spec.activeDeadlineSeconds is over" in out
+
+
 def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
     """The master, the sidecars and their simulators die with the runner, and the run can go on."""
     desk.write(WAIT)

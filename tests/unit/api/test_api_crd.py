@@ -14,7 +14,7 @@ FORBIDDEN = {
     "$ref", "$defs", "allOf", "anyOf", "oneOf", "not", "title", "const", "examples", "propertyNames",
     "prefixItems", "patternProperties", "definitions", "uniqueItems", "nullable", "x-may-change",
 }  # fmt: skip
-FROZEN = "cannot be changed; make a new TrainingJob, which may go on with storage.resumeFrom"
+FROZEN = "cannot be changed; make a new TrainingJob"
 VERSION = crd()["spec"]["versions"][0]
 WHOLE = VERSION["schema"]["openAPIV3Schema"]
 

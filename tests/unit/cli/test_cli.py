@@ -120,6 +120,28 @@ def test_a_wrong_job_is_told_with_all_its_mistakes(command, tmp_path, fails, mon
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize(
+    ("spec", "line"),
+    [
+        ("storage: {existingClaim: a, resumeFrom: b}", "spec.storage.resumeFrom: is not carried out"),
+        ("suspend: true", "spec.suspend: is true"),
+        ("trainer: {env: [{name: A, secretKeyRef: {name: b, key: c}}]}", "env A of container trainer: "),
+    ],
+)
+def test_what_is_not_done_here_is_refused_before_anything_is_written(spec, line, tmp_path, fails, monkeypatch):
+    """No run directory, no lock, and with --fresh the old run stays where it is."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "job.yaml"
+    path.write_text(f"{JOB}  {spec}\n")
+    old = tmp_path / "runs" / "a" / "0"
+    old.mkdir(parents=True)
+
+    [told] = fails("run", path, "--fresh")
+
+    assert told.startswith(line)
+    assert sorted(tmp_path.rglob("*")) == [path, old.parents[1], old.parent, old]
+
+
 def test_a_file_that_is_not_there_is_one_line(tmp_path, fails):
     """No traceback for a typing error."""
     assert fails("run", tmp_path / "no.yaml") == [

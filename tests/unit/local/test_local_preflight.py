@@ -45,6 +45,13 @@ def test_a_missing_ros_is_told_with_what_to_install(request_for, monkeypatch, tm
     assert problems == [f"rosmaster: is not installed; {preflight.ROS}"]
 
 
+def test_a_suspended_job_is_refused(request_for):
+    """Nothing here would ever set it to false, and training that was put off must not begin."""
+    [problem] = preflight.nothing_is_put_off(request_for(suspend=True))
+
+    assert problem.startswith("spec.suspend: is true")
+
+
 @pytest.mark.parametrize(
     ("spec", "problem"),
     [

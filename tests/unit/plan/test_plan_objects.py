@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from palaestra.plan import ClusterLayout, Images, PlanError, plan
+from palaestra.plan import ClusterLayout, Images, LocalLayout, PlanError, plan
 
 LAYOUT = ClusterLayout(images=Images.of_release("1"))
 
@@ -118,6 +118,15 @@ def test_a_job_without_a_uid_has_no_plan(make_job):
 
     with pytest.raises(PlanError, match=r"^metadata.uid: "):
         plan(nobody, LAYOUT)
+
+
+@pytest.mark.parametrize("layout", [LAYOUT, LocalLayout(images=LAYOUT.images, job_directory="/runs/job")])
+def test_going_on_from_another_jobs_run_is_refused(make_job, layout):
+    """No trainer carries it out yet, and training that begins anew instead would be found out late."""
+    job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
+
+    with pytest.raises(PlanError, match=r"^spec\.storage\.resumeFrom: is not carried out .*; start .*$"):
+        plan(job, layout)
 
 
 def test_the_pod_is_restricted(in_cluster):

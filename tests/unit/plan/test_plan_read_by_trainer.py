@@ -11,17 +11,33 @@ from palaestra_trainer.configuration import parse
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "manifests" / "examples").glob("*.yaml"))
 
+LAYOUT = ClusterLayout(images=Images.of_release("1"))
+
+
+def read_back(job):
+    """Return what the trainer reads in the training.yaml of a job's first replica."""
+    planned = plan(identified(job, "uid"), LAYOUT).replicas[0]
+    return parse(yaml.safe_load(planned.config_map["data"]["training.yaml"]))
+
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_the_training_yaml_of_every_example_is_read_by_the_trainer(example):
     """A field that one side renames would be found by a run only, minutes later."""
-    job = identified(load(example.read_text()), "uid")
-    planned = plan(job, ClusterLayout(images=Images.of_release("1"))).replicas[0]
+    job = load(example.read_text())
 
-    read = parse(yaml.safe_load(planned.config_map["data"]["training.yaml"]))
+    read = read_back(job)
 
     assert read.steps == job.spec.trainer.steps
     assert [each.name for each in read.simulators] == [
         f"{group.name}-{i}" for group in job.spec.simulators for i in range(group.count)
     ]
     assert read.algorithm.hyperparameters == job.spec.trainer.algorithm.hyperparameters
+
+
+def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
+    """Where the section is absent the trainer has a default of its own, which evaluates."""
+    job = make_job(trainer={"evaluation": {"everySteps": 0}})
+
+    read = read_back(job)
+
+    assert read.evaluation.every_steps == 0

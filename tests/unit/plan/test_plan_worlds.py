@@ -111,12 +111,8 @@ def test_worlds_that_fit_nowhere_are_refused(make_job):
 
 
 def test_what_is_switched_off_is_absent(in_cluster):
-    """Zero means never, and the trainer reads absence as never."""
-    planned = in_cluster(
-        simulators=[group(recycle={"afterResets": 0})],
-        trainer={"evaluation": {"everySteps": 0}},
-    )
+    """Zero resets mean never, and the trainer reads absence as never."""
+    planned = in_cluster(simulators=[group(recycle={"afterResets": 0}), EVALUATE])
 
     assert "recycle" not in training(planned)["simulators"][0]
-    assert "evaluation" not in training(planned)
     assert "command" not in training(planned)

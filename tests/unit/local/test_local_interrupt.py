@@ -1,0 +1,72 @@
+"""What ends a run early: a person's signals, and the end of the time that it may take."""
+
+import asyncio
+import os
+import signal
+
+import pytest
+
+from palaestra.local.interrupt import Interrupt
+
+PATIENCE_S = 20.0
+
+
+class Target:
+    """What can be stopped and killed, and tells it."""
+
+    def __init__(self):
+        self.told = asyncio.Queue()
+
+    def stop(self):
+        """Begin to end."""
+        self.told.put_nowait("stop")
+
+    def kill(self):
+        """End at once."""
+        self.told.put_nowait("kill")
+
+    async def next(self):
+        """Return what it is asked next."""
+        return await asyncio.wait_for(self.told.get(), PATIENCE_S)
+
+
+def ended_by(signals, deadline_s=None):
+    """Return what a target is asked to do, and the interrupt, after a deadline and then signals."""
+
+    async def play():
+        interrupt, target, told = Interrupt(), Target(), []
+        interrupt.pass_to(target)
+        with interrupt.listening(deadline_s):
+            if deadline_s is not None:
+                told.append(await target.next())
+            for _ in range(signals):
+                os.kill(os.getpid(), signal.SIGINT)
+                told.append(await target.next())
+        return told, interrupt
+
+    return asyncio.run(play())
+
+
+def test_a_deadline_stops_as_a_first_signal_does():
+    """The trainer saves a checkpoint, but no person has asked for an end."""
+    told, interrupt = ended_by(0, deadline_s=0.01)
+
+    assert told == ["stop"]
+    assert (interrupt.expired, interrupt.signals, interrupt.killed) == (True, 0, False)
+
+
+def test_a_first_signal_after_the_deadline_does_not_kill():
+    """A person need not know that the run is ending already."""
+    told, interrupt = ended_by(2, deadline_s=0.01)
+
+    assert told == ["stop", "stop", "kill"]
+    assert interrupt.killed
+
+
+@pytest.mark.parametrize("signals", [1, 2])
+def test_a_run_that_a_person_ends_has_not_expired(signals):
+    """However long its end then takes."""
+    told, interrupt = ended_by(signals)
+
+    assert told == ["stop", "kill"][:signals]
+    assert not interrupt.expired
