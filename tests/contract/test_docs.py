@@ -1,0 +1,53 @@
+"""What the pages show can be typed."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import palaestra.api
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")])
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def blocks(language, pages=PAGES):
+    """Return every block of a language, with the page it stands on."""
+    return [
+        pytest.param(text, id=f"{page.stem}-{number}")
+        for page in pages
+        for number, (kind, text) in enumerate(BLOCK.findall(page.read_text()))
+        if kind == language
+    ]
+
+
+@pytest.mark.parametrize("text", blocks("python", [page for page in PAGES if page.name != "README.md"]))
+def test_python_runs(text):
+    """The README's own block is a file in examples/, with a test of its own."""
+    exec(compile(text, "<page>", "exec"), {})
+
+
+@pytest.mark.parametrize("text", blocks("yaml"))
+def test_whole_jobs_are_right(text):
+    """Parts of a job are checked where they are explained; whole ones load."""
+    if "kind: TrainingJob" in text:
+        palaestra.api.load(text, "page")
+
+
+@pytest.mark.parametrize("text", blocks("console"))
+def test_every_verb_that_is_typed_exists(text):
+    """`make help` and the pages tell the same."""
+    makefile = (ROOT / "Makefile").read_text()
+
+    verbs = re.findall(r"^make (\w+)", text, re.MULTILINE)
+
+    assert [verb for verb in verbs if f"\n{verb}:" not in makefile] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_link_leads_somewhere(page):
+    """Relative to the page it stands on."""
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text())
+
+    assert [target for target in targets if not (page.parent / target).exists()] == []
