@@ -2,11 +2,14 @@
 
 It runs where the built-in loop would: the simulators of the TrainingJob are there, and every
 environment that is made takes the next one, collecting ones first. A fault is not mended here.
+SIGTERM ends it after the step that is under way, with the model saved and an exit code that asks
+to be started again; started again, it goes on from there.
 """
 
 import os
 import signal
 import sys
+import threading
 from pathlib import Path
 
 import gymnasium
@@ -22,7 +25,9 @@ gymnasium.register_envs(environments)  # MoveToTargetEnv-v0
 
 job = load()  # what PALAESTRA_CONFIG names: the TrainingJob, resolved for this replica
 run = Path(os.environ["PALAESTRA_RUN"])  # what is written here outlives the pod
-signal.signal(signal.SIGTERM, lambda *_: sys.exit(75))  # 75: interrupted, start me again
+saved = run / "model.zip"
+interrupted = threading.Event()
+signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
 
 
 def make() -> gymnasium.Env:
@@ -32,19 +37,17 @@ def make() -> gymnasium.Env:
 
 
 envs = DummyVecEnv([make] * len(job.with_role("Collect")))
-model = PPO(
-    "MlpPolicy",
-    envs,
-    n_steps=512,
-    batch_size=128,
-    gamma=0.97,
-    seed=job.seed,
-    tensorboard_log=str(run / "tensorboard"),
-    device="cpu",
-)
-model.learn(job.steps)
-model.save(run / "model.zip")
+if saved.exists():
+    model = PPO.load(saved, envs, device="cpu")
+else:
+    settings = {"n_steps": 512, "batch_size": 128, "gamma": 0.97, "seed": job.seed, "device": "cpu"}
+    model = PPO("MlpPolicy", envs, tensorboard_log=str(run / "tensorboard"), **settings)
+missing = max(0, job.steps - model.num_timesteps)
+model.learn(missing, lambda *_: not interrupted.is_set(), reset_num_timesteps=False)
+model.save(saved)
 
+if interrupted.is_set():
+    sys.exit(75)  # interrupted, start me again
 if job.with_role("Evaluate"):
     mean_return, _ = evaluate_policy(model, make(), n_eval_episodes=job.evaluation.episodes)
     print(f"mean return {mean_return:.2f} over {job.evaluation.episodes} episodes")

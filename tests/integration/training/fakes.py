@@ -2,12 +2,14 @@
 
 The same program as `palaestra-train` but for where simulators come from, so
 that signals, exit codes and resuming are tried on a real process. DEATHS are
-the numbers of the steps, separated by commas, at which `collect-0` dies.
+the numbers of the steps, separated by commas, at which `collect-0` dies; at 0
+it does not even come up.
 """
 
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -39,6 +41,7 @@ class FakeSimulator:
     def __init__(self, name: str, configuration: Configuration, deaths: Collection[int]) -> None:
         self.name = name
         self.log: list[str] = []
+        self._hangs = 0 in deaths
         self.robot, self.scene = fake_arena(deaths)
         task = configuration.environment
         made = gymnasium.make(task.id, robot=self.robot, scene=self.scene, reward=task.reward, **task.options)
@@ -50,8 +53,11 @@ class FakeSimulator:
         return self.env.resets
 
     def start(self) -> None:
-        """Begin to live."""
+        """Begin to live, or never come up."""
         self.log.append("start")
+        if self._hangs:
+            sys.stderr.write("never comes up\n")
+            threading.Event().wait()
 
     def stop(self) -> None:
         """Note it."""

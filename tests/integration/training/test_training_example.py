@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import runpy
+import signal
 from pathlib import Path
 
 import pytest
@@ -14,21 +16,47 @@ from palaestra_trainer.environments import configured
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 
 
-@pytest.mark.filterwarnings("ignore:.*not wrapped.*")
-def test_a_script_of_one_s_own_trains_in_the_configured_simulators(
-    write_job, fakes, tmp_path, monkeypatch, capsys
-):
-    """It needs nothing but gymnasium, Stable-Baselines3 and the two variables."""
+@pytest.fixture
+def script(write_job, fakes, tmp_path, monkeypatch):
+    """Run the script in two simulators and one to evaluate in; return those that it left over."""
+    before = signal.getsignal(signal.SIGTERM)
     job = write_job(collectors=2, steps=100)
     (tmp_path / "run").mkdir()
     monkeypatch.setenv("PALAESTRA_CONFIG", str(job))
     monkeypatch.setenv("PALAESTRA_RUN", str(tmp_path / "run"))
-    handed_out = iter(fakes.make_members(load(job)))
-    monkeypatch.setattr(configured, "configured_simulators", lambda: handed_out)
-    monkeypatch.setattr("signal.signal", lambda *_: None)
 
-    runpy.run_path(str(SCRIPT), run_name="__main__")
+    def run(on_start=lambda: None):
+        members = fakes.make_members(load(job))
+        members[0].start = on_start
+        handed_out = iter(members)
+        monkeypatch.setattr(configured, "configured_simulators", lambda: handed_out)
+        runpy.run_path(str(SCRIPT), run_name="__main__")
+        return list(handed_out)
+
+    yield run
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.filterwarnings("ignore:.*not wrapped.*")
+def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_path, capsys):
+    """It needs nothing but gymnasium, Stable-Baselines3 and the two variables."""
+    left = script()
 
     assert PPO.load(tmp_path / "run" / "model.zip").num_timesteps == 1024
     assert "mean return" in capsys.readouterr().out
-    assert next(handed_out, None) is None
+    assert left == []
+
+
+@pytest.mark.filterwarnings("ignore:.*not wrapped.*")
+def test_a_script_that_is_interrupted_goes_on_from_its_model(script, tmp_path, capsys):
+    """Its exit code asks to be started again; that would be a lie if everything were lost."""
+    with pytest.raises(SystemExit) as ended:
+        script(on_start=lambda: os.kill(os.getpid(), signal.SIGTERM))
+    first = PPO.load(tmp_path / "run" / "model.zip").num_timesteps
+
+    script()
+
+    assert ended.value.code == 75
+    assert 0 < first < 1024
+    assert PPO.load(tmp_path / "run" / "model.zip").num_timesteps == first + 1024
+    assert "mean return" in capsys.readouterr().out

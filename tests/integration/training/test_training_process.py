@@ -93,6 +93,18 @@ def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, tmp_p
     assert summary(tmp_path)["steps"] == 800
 
 
+def test_ctrl_c_does_not_wait_for_a_simulator_that_starts(write_job, start):
+    """There is nothing to save yet, and the start may take minutes."""
+    process = start(write_job(), deaths="0")
+    await_line(process, "never comes up")
+    process.send_signal(signal.SIGINT)
+
+    code, log = end(process)
+
+    assert code == 75
+    assert "Interrupted" in log
+
+
 def test_a_second_signal_ends_the_process_at_once(write_job, start):
     """Somebody who presses Ctrl-C twice does not want to wait for a long rollout's learning."""
     endless = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 100_000}}

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from palaestra_trainer.environments.arena import (
     APART_M,
     CLEARANCE_M,
+    Task,
     chosen_task,
     draw_point,
     draw_task,
@@ -79,6 +80,16 @@ def test_what_is_chosen_stays_and_the_rest_is_drawn_around_it():
     assert all(math.dist((1.5, 0.0), task.target) >= APART_M for task in tasks)
 
 
+@pytest.mark.parametrize(
+    "form", [tuple, list, np.array, np.float32], ids=["tuple", "list", "array", "float32"]
+)
+def test_a_place_may_be_chosen_in_any_form_of_numbers(form):
+    """Observations are arrays, so places that somebody computes are too."""
+    task = chosen_task(np.random.default_rng(0), {"start": form((0.0, 0.5, 1.0)), "target": form((0.0, 0.0))})
+
+    assert task == Task(start=Pose(0.0, 0.5, 1.0), target=(0.0, 0.0))
+
+
 def test_both_may_be_chosen_even_if_they_are_near():
     """Whoever chooses both knows why, for instance to try the last centimetres."""
     task = chosen_task(np.random.default_rng(0), {"start": Pose(0.0, 0.0, 0.0), "target": (0.1, 0.0)})
@@ -93,8 +104,12 @@ def test_both_may_be_chosen_even_if_they_are_near():
         ({"target": (0.8, 0.8)}, r"target: \(0.8, 0.8\) is in a wall or a cylinder"),
         ({"start": (2.5, 0.0, 0.0)}, r"start: \(2.5, 0\) is in a wall"),
         ({"target": (math.nan, 0.0)}, r"target: \(nan, 0\) is in a wall"),
+        ({"start": (0.0, 0.0)}, r"start: \(0.0, 0.0\) is not 3 numbers; give x, y, heading"),
+        ({"target": np.zeros((1, 2))}, r"target: .* is not 2 numbers; give x, y"),
+        ({"target": "home"}, "target: 'home' is not 2 numbers"),
+        ({"target": 1.0}, "target: 1.0 is not 2 numbers"),
     ],
-    ids=["unknown", "cylinder", "wall", "nan"],
+    ids=["unknown", "cylinder", "wall", "nan", "too few", "matrix", "text", "number"],
 )
 def test_a_place_that_cannot_be_is_refused(chosen, message):
     """Rather than searched around for ever."""

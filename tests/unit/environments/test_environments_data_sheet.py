@@ -5,21 +5,27 @@ from __future__ import annotations
 import inspect
 import itertools
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from gymnasium import spaces
+from hypothesis import given
+from hypothesis import strategies as st
 
 from palaestra_trainer.environments import MoveToTargetEnv, Options
 from palaestra_trainer.environments.actions import SCALE
 from palaestra_trainer.environments.move_to_target import REACHED_M, STANDING_M_S
 from palaestra_trainer.environments.observation import PARTS
 from palaestra_trainer.environments.options import ACTIONS
-from palaestra_trainer.environments.rewards import TERMS, WEIGHTS
+from palaestra_trainer.environments.rewards import MARGIN_M, TERMS, WEIGHTS, Outcome, Transition
 from palaestra_trainer.robots import Movement
+from palaestra_trainer.robots.base import SENSOR_RANGE_M
 from palaestra_trainer.testing import fake_arena
 
 SHEET = inspect.getdoc(MoveToTargetEnv) or ""
+EXAMPLE = Path(__file__).parents[3] / "manifests" / "examples" / "move-to-target.yaml"
 Row = dict[str, str]
 
 
@@ -91,6 +97,38 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     assert [row["term"] for row in REWARD] == list(TERMS)
     for reward, weights in WEIGHTS.items():
         assert {row["term"]: float(row[reward]) for row in REWARD if row[reward]} == weights
+
+
+@given(
+    driven_m=st.floats(-0.1, 0.1),
+    nearest_m=st.floats(SENSOR_RANGE_M[0], SENSOR_RANGE_M[1]),
+    outcome=st.sampled_from(Outcome),
+)
+def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
+    """A weight is chosen by what a term can be; a step drives a tenth of a metre."""
+    step = Transition(before_m=1.0, after_m=1.0 - driven_m, nearest_m=nearest_m, outcome=outcome)
+
+    for row in REWARD:
+        worth = TERMS[row["term"]](step)
+
+        assert float(row["min"]) - 1e-9 <= worth <= float(row["max"]) + 1e-9
+
+
+@pytest.mark.parametrize("distance", [SENSOR_RANGE_M[0], MARGIN_M])
+def test_the_range_of_proximity_is_on_the_sheet(distance):
+    """From where on it costs, and where it costs most."""
+    (row,) = (row for row in REWARD if row["term"] == "proximity")
+
+    assert f"{distance:.2f}" in row["is"]
+
+
+def test_the_example_chooses_the_movements_that_the_sheet_says():
+    """The first five: a Robotino need not turn."""
+    job = yaml.safe_load(EXAMPLE.read_text())
+    chosen = job["spec"]["trainer"]["environment"]["options"]["movements"]
+
+    assert "move-to-target.yaml chooses the first five" in SHEET
+    assert chosen == [row["movement"] for row in MOVEMENTS[:5]]
 
 
 @pytest.mark.parametrize("constant", [f"{REACHED_M:.2f} m", f"{STANDING_M_S:.2f} m/s"])

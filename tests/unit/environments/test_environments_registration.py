@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import palaestra_trainer.environments
+from palaestra_trainer.configuration import parse
 from palaestra_trainer.environments import MoveToTargetEnv, configured
 from palaestra_trainer.environments.move_to_target import make
 from palaestra_trainer.environments.observation import PARTS
@@ -131,6 +132,26 @@ def test_each_environment_takes_the_next_simulator_and_starts_it():
 
     assert (robot, scene) == (simulators[0].robot, simulators[0].scene)
     assert [it.started for it in simulators] == [True, False]
+
+
+def test_simulators_that_collect_are_handed_out_first():
+    """A script makes environments to train in before one to evaluate in, however the job is written."""
+    roles = ["Evaluate", "Collect", "Evaluate", "Collect"]
+    configuration = parse(
+        {
+            "job": "mixed",
+            "environment": {"id": NAME},
+            "steps": 1,
+            "simulators": [
+                {"name": f"s-{index}", "group": "s", "index": index, "role": role}
+                for index, role in enumerate(roles)
+            ],
+        }
+    )
+
+    ordered = configured.collecting_first(configuration)
+
+    assert [it.name for it in ordered.simulators] == ["s-1", "s-3", "s-0", "s-2"]
 
 
 def test_more_environments_than_simulators_are_refused():

@@ -11,11 +11,21 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
+from palaestra_sim.protocol.status import Termination
+from palaestra_trainer import training
 from palaestra_trainer.configuration import Configuration, parse
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault
+from palaestra_trainer.run_directory import RunDirectory
 
 GOAL = 3
 MAX_STEPS = 8
+TINY = {"policy_kwargs": {"net_arch": [8]}}
+ALGORITHMS = {
+    "DQN": TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 500},
+    "PPO": TINY | {"n_steps": 16, "batch_size": 8, "n_epochs": 2},
+    "A2C": TINY,
+    "REINFORCE": TINY | {"episodes_per_update": 2},
+}
 
 
 class Corridor(gymnasium.Env[np.ndarray, Any]):
@@ -156,3 +166,56 @@ def make_configuration(tmp_path: Path) -> Callable[..., Configuration]:
         return parse(content | changes)
 
     return make
+
+
+@pytest.fixture
+def directory(tmp_path):
+    """Return a run directory."""
+    return RunDirectory(tmp_path / "run")
+
+
+@pytest.fixture
+def last_word(tmp_path, monkeypatch):
+    """Return a function that reads the termination message."""
+    path = tmp_path / "word"
+    monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(path))
+    return lambda: Termination.from_message(path.read_text())
+
+
+@pytest.fixture
+def job(make_configuration):
+    """Make a configuration of a short run of an algorithm."""
+
+    def make(name="DQN", **changes):
+        defaults = {
+            "algorithm": {"name": name, "hyperparameters": ALGORITHMS[name]},
+            "evaluation": {"everySteps": 40, "episodes": 4},
+            "checkpoint": {"everySteps": 50, "keep": 2},
+        }
+        return make_configuration(**(defaults | changes))
+
+    return make
+
+
+@pytest.fixture
+def play(directory, make_member):
+    """Train; return the exit code and the members by name. Faults are given by a member's name.
+
+    `on_step` is called after each step of one member, by default of `collect-0`.
+    """
+
+    def run(configuration, faults=(), on_step=None, step_reward=-0.1, of="collect-0", **options):
+        members = {}
+
+        def make_members(given):
+            for entry in given.simulators:
+                members[entry.name] = make_member(entry.name, **dict(faults).get(entry.name, {}))
+                members[entry.name].env.step_reward = step_reward
+            if on_step:
+                member = members[of]
+                member.take_step = lambda take=member.take_step: (take(), on_step())
+            return list(members.values())
+
+        return training.run(configuration, directory, make_members, **options), members
+
+    return run

@@ -9,6 +9,7 @@ import pytest
 
 from palaestra_sim.protocol.status import Termination
 from palaestra_trainer import cli
+from palaestra_trainer.errors import FaultBudgetSpent, MasterLost, SimulatorHung
 
 WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
 
@@ -20,16 +21,56 @@ def nothing_given(monkeypatch):
         monkeypatch.delenv(name, raising=False)
 
 
-@pytest.mark.parametrize("program", [cli.train, cli.evaluate])
-def test_help_says_what_is_read_and_written_and_the_exit_codes(program, capsys):
+@pytest.mark.parametrize(
+    ("program", "codes"),
+    [(cli.train, [0, 2, 75, 80, 81, 82, 1]), (cli.evaluate, [0, 2, 80, 130, 1])],
+    ids=["train", "eval"],
+)
+def test_help_says_what_is_read_and_written_and_the_exit_codes(program, codes, capsys):
     """Nobody should have to read the source for that."""
     with pytest.raises(SystemExit) as ended:
         program(["--help"])
 
     text = capsys.readouterr().out
     assert ended.value.code == 0
-    for word in ("reads:", "writes:", "exit codes:", "PALAESTRA_CONFIG", "75"):
+    for word in ("reads:", "writes:", "PALAESTRA_CONFIG"):
         assert word in text
+    _, _, listed = text.partition("exit codes:")
+    assert [int(line.split()[0]) for line in listed.split("\n") if line] == codes
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "many"])
+def test_an_evaluation_of_no_episodes_is_refused(number, capsys):
+    """Before a simulator is started for it."""
+    with pytest.raises(SystemExit) as ended:
+        cli.evaluate(["run", "--episodes", number])
+
+    assert ended.value.code == 2
+    assert "argument --episodes" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (KeyboardInterrupt(), 130),
+        (FaultBudgetSpent("evaluate-0: 10 restarts"), 80),
+        (MasterLost("no ROS master"), 1),
+        (SimulatorHung("evaluate-0", "slow"), 1),
+    ],
+    ids=lambda it: type(it).__name__,
+)
+def test_an_evaluation_that_is_cut_ends_with_a_line_and_its_own_code(error, code, capsys, monkeypatch):
+    """Nothing is saved that could go on, so training's codes would mislead."""
+
+    def cut(*_):
+        raise error
+
+    monkeypatch.setattr(cli, "_evaluate", cut)
+
+    ended = cli.evaluate(["run"])
+
+    assert ended == code
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 def test_a_wrong_configuration_ends_with_2_and_a_line_for_each_mistake(tmp_path, capsys, monkeypatch):

@@ -76,6 +76,19 @@ def test_an_evaluation_can_be_given_up_between_episodes(make_member):
         evaluate(Walker(), make_member(), [10, 20, 30], check)
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
+    """Whoever presses Ctrl-C does not want to see the other half of them."""
+    broken = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=0))
+    other = make_member("evaluate-1")
+    keepers = [broken, Keeper(other)] if first else [Keeper(other), broken]
+
+    with pytest.raises(FaultBudgetSpent):
+        evaluate_on_all(Walker(), keepers, range(10_000))
+
+    assert len(other.env.seeds) < 5_000
+
+
 def test_more_success_counts_before_more_return(make_member):
     """A policy that collects rewards beside the target is not the better one."""
     good, bad = (evaluate(Walker(), make_member(), [seed]) for seed in (10, 21))

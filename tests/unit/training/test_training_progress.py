@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
+import re
 import urllib.error
 import urllib.request
 
@@ -117,6 +119,23 @@ def test_counters_go_into_a_checkpoint_and_come_back(progress):
     again = Counters.from_json(json.loads(json.dumps(progress.counters.to_json())))
 
     assert again == progress.counters
+
+
+def test_time_is_counted_once(progress, clock):
+    """Each checkpoint adds what passed since the one before, and the end the rest."""
+    counted = []
+    for now in (2.0, 5.0, 5.0):
+        clock.now = now
+        counted.append(progress.count_time().seconds)
+
+    assert counted == [2.0, 5.0, 5.0]
+
+
+def test_what_the_docstring_promises_is_there(progress):
+    """And all that is there for others to read."""
+    promised = set(re.findall(r"^ {4}(\w+): ", inspect.getdoc(Progress), re.MULTILINE))
+
+    assert promised == {name for name in vars(progress) if not name.startswith("_")}
 
 
 def test_the_success_rate_is_that_of_the_last_evaluation(progress):

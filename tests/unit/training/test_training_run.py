@@ -3,88 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from palaestra_sim.protocol.status import Termination
 from palaestra_trainer import checkpoint, training
 from palaestra_trainer.errors import ConfigurationError, MasterLost
 from palaestra_trainer.measuring import measure
-from palaestra_trainer.run_directory import RunDirectory, read_lines
+from palaestra_trainer.run_directory import read_lines
 from palaestra_trainer.seeds import EVALUATE, episode_seeds
-
-TINY = {"policy_kwargs": {"net_arch": [8]}}
-ALGORITHMS = {
-    "DQN": TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 500},
-    "PPO": TINY | {"n_steps": 16, "batch_size": 8, "n_epochs": 2},
-    "A2C": TINY,
-    "REINFORCE": TINY | {"episodes_per_update": 2},
-}
-
-
-@pytest.fixture
-def directory(tmp_path):
-    """Return a run directory."""
-    return RunDirectory(tmp_path / "run")
-
-
-@pytest.fixture
-def last_word(tmp_path, monkeypatch):
-    """Return a function that reads the termination message."""
-    path = tmp_path / "word"
-    monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(path))
-    return lambda: Termination.from_message(path.read_text())
-
-
-@pytest.fixture
-def job(make_configuration):
-    """Make a configuration of a short run of an algorithm."""
-
-    def make(name="DQN", **changes):
-        defaults = {
-            "algorithm": {"name": name, "hyperparameters": ALGORITHMS[name]},
-            "evaluation": {"everySteps": 40, "episodes": 4},
-            "checkpoint": {"everySteps": 50, "keep": 2},
-        }
-        return make_configuration(**(defaults | changes))
-
-    return make
-
-
-@pytest.fixture
-def play(directory, make_member):
-    """Train; return the exit code and the members by name. Faults are given by a member's name."""
-
-    def run(configuration, faults=(), on_step=None, step_reward=-0.1, **options):
-        members = {}
-
-        def make_members(given):
-            for entry in given.simulators:
-                members[entry.name] = make_member(entry.name, **dict(faults).get(entry.name, {}))
-                members[entry.name].env.step_reward = step_reward
-            if on_step:
-                first = members["collect-0"]
-                first.take_step = lambda take=first.take_step: (take(), on_step())
-            return list(members.values())
-
-        return training.run(configuration, directory, make_members, **options), members
-
-    return run
-
-
-def signal_after(steps, number=signal.SIGTERM):
-    """Return a function that sends a signal to this process at its `steps`-th call."""
-    calls = iter(range(1, 10_000))
-
-    def step():
-        if next(calls) == steps:
-            os.kill(os.getpid(), number)
-
-    return step
 
 
 @pytest.mark.parametrize(("name", "collectors", "steps"), [("DQN", 1, 100), ("PPO", 2, 128), ("A2C", 1, 100)])
@@ -202,77 +130,6 @@ def test_a_lost_master_ends_the_run_with_75(play, job, directory, last_word):
     assert code == 75
     assert "MasterLost" in last_word().reason
     assert checkpoint.newest(directory.checkpoints)
-
-
-@pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last_word, name, number):
-    """At a rollout boundary: what was amid a rollout is played again."""
-    code, members = play(job(name), on_step=signal_after(42, number))
-
-    saved = checkpoint.newest(directory.checkpoints).manifest
-    assert code == 75
-    assert last_word().reason == f"Interrupted: {number.name} received"
-    assert 0 < saved.step <= 42 + 4
-    assert members["collect-0"].log[-1] == "stop"
-    assert not directory.summary.exists()
-
-
-@pytest.mark.parametrize("name", ["DQN", "PPO"])
-def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
-    """It ends at the same total, plays new episodes, and counts what was before."""
-    configuration = job(name)
-    _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
-    saved = checkpoint.newest(directory.checkpoints).manifest
-
-    code, after = play(configuration, must_resume=True)
-
-    summary = json.loads(directory.summary.read_text())
-    seeds_before, seeds_after = (set(it["collect-0"].env.seeds) for it in (before, after))
-    assert code == 0
-    assert summary["steps"] == (100 if name == "DQN" else 111)  # 15 valid rows, then 16 a rollout
-    assert (summary["attempts"], summary["faults"]) == (2, 1)
-    assert len(seeds_before & seeds_after) <= (0 if name == "DQN" else 4)
-    reasons = [line["reason"] for line in read_lines(directory.attempts)]
-    assert reasons == ["new run", f"resumed at step {saved.step}"]
-
-
-def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_word):
-    """A pod that is started once more must not cost anything."""
-    play(job())
-
-    code, members = play(job())
-
-    assert (code, members) == (0, {})
-    assert (last_word().step, last_word().reason) == (100, "Completed: before")
-    assert len(list(read_lines(directory.attempts))) == 1
-
-
-def test_a_run_is_prolonged_by_more_steps(play, job, directory):
-    """It goes on from its last checkpoint."""
-    play(job())
-
-    code, _ = play(job(steps=150))
-
-    assert code == 0
-    assert json.loads(directory.summary.read_text())["steps"] == 150
-
-
-def test_a_directory_of_another_run_is_refused(play, job, last_word):
-    """Before anything of it is overwritten."""
-    play(job("DQN"))
-
-    code, _ = play(job("PPO", steps=200))
-
-    assert code == 2
-    assert "use another run directory" in last_word().reason
-
-
-def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
-    """A person who types --resume expects something to be there."""
-    code, _ = play(job(), must_resume=True)
-
-    assert code == 2
 
 
 @pytest.mark.parametrize(

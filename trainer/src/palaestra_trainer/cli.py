@@ -18,7 +18,7 @@ from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.logs import configure_logs
 from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
-from palaestra_trainer.termination import end_of, write_last_word
+from palaestra_trainer.termination import UNEXPECTED, end_of, write_last_word
 
 log = structlog.get_logger(__name__)
 
@@ -55,9 +55,20 @@ writes:
 """
 
 
+EVAL_EXIT_CODES = """\
+exit codes:
+  0   done
+  2   the configuration or the run directory is wrong; trying again cannot help
+  80  a simulator failed more often than its restart limit allows
+  130 ended by Ctrl-C; nothing is written
+  1   anything else; trying again may help
+"""
+KEYBOARD_INTERRUPT = 130  # what shells make of an end by SIGINT
+
+
 def train(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-train`; return its exit code."""
-    parser = _parser("palaestra-train", TRAIN)
+    parser = _parser("palaestra-train", TRAIN, EXIT_CODES)
     parser.add_argument("--config", type=Path, help=f"training.yaml (default: ${CONFIG_VARIABLE})")
     parser.add_argument("--run", type=Path, help=f"run directory (default: ${RUN_VARIABLE})")
     parser.add_argument(
@@ -85,9 +96,9 @@ def train(arguments: Sequence[str] | None = None) -> int:
 
 def evaluate(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-eval`; return its exit code."""
-    parser = _parser("palaestra-eval", EVAL)
+    parser = _parser("palaestra-eval", EVAL, EVAL_EXIT_CODES)
     parser.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
-    parser.add_argument("--episodes", type=int, default=100, help="how many (default: 100)")
+    parser.add_argument("--episodes", type=_positive, default=100, help="how many (default: 100)")
     parser.add_argument(
         "--seeds",
         default="B",
@@ -97,8 +108,12 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     configure_logs()
     try:
         result = _evaluate(chosen.run, chosen.episodes, chosen.seeds)
+    except KeyboardInterrupt:
+        log.error("ended by Ctrl-C")  # noqa: TRY400 - a person's wish needs no traceback
+        return KEYBOARD_INTERRUPT
     except (TrainerError, OSError) as error:
-        return _refuse(error)
+        code = _refuse(error)
+        return code if code in {ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET} else UNEXPECTED
     sys.stdout.write(json.dumps(result) + "\n")
     return ExitCode.DONE
 
@@ -116,11 +131,18 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     return measure(configuration, directory.model, members, episodes=episodes, stream=stream)
 
 
-def _parser(name: str, description: str) -> argparse.ArgumentParser:
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} is refused; give 1 or more")
+    return number
+
+
+def _parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentParser:
     return argparse.ArgumentParser(
         prog=name,
         description=description,
-        epilog=EXIT_CODES,
+        epilog=exit_codes,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
 

@@ -75,7 +75,8 @@ class Conductor(BaseCallback):
         self._run = run
         self._env = env
         self._boundary = Boundary(step, env.episodes)
-        self._evaluated = self._saved = self._looked = step
+        self._saved = self._looked = step
+        self._evaluated = last_evaluated(run.directory, step)
         self._step = step
         self._terms: dict[int, Counter[str]] = defaultdict(Counter)
         self._learning_s = 0.0
@@ -101,7 +102,7 @@ class Conductor(BaseCallback):
             run.configuration,
             self._boundary.step,
             self._boundary.episodes,
-            run.progress.counters.to_json(),
+            run.progress.count_time().to_json(),
         )
         started = time.monotonic()
         if checkpoint.save(
@@ -216,6 +217,15 @@ def best_so_far(directory: RunDirectory) -> tuple[float, float] | None:
         for line in read_lines(directory.evaluations)
     )
     return max(scores, default=None)
+
+
+def last_evaluated(directory: RunDirectory, step: int) -> int:
+    """Return the step of the last evaluation up to `step`; 0 without one.
+
+    One that was due there but cut short is not among them, so that a resumed attempt makes up for it.
+    """
+    steps = (int(line["step"]) for line in read_lines(directory.evaluations))
+    return max((it for it in steps if it <= step), default=0)
 
 
 def _passed(before: int, now: int, every: int) -> bool:

@@ -7,9 +7,10 @@ all of its episodes and two policies are compared on the same ones.
 from __future__ import annotations
 
 import itertools
+import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from statistics import fmean
 from typing import Any, Protocol
@@ -143,8 +144,21 @@ def evaluate_on_all(
     if len(busy) == 1:
         return evaluate(policy, busy[0][0], wanted, check)
     started = time.monotonic()
+    over = threading.Event()
+
+    def go_on() -> None:
+        check()
+        if over.is_set():
+            raise CancelledError
+
     with ThreadPoolExecutor(len(busy), "evaluate") as pool:
-        futures = [pool.submit(evaluate, policy, keeper, share, check) for keeper, share in busy]
+        futures = [pool.submit(evaluate, policy, keeper, share, go_on) for keeper, share in busy]
+        try:
+            done, _ = wait(futures, return_when=FIRST_EXCEPTION)
+            for future in done:
+                future.result()
+        finally:
+            over.set()
     parts = [future.result() for future in futures]
     dealt = itertools.zip_longest(*(part.episodes for part in parts))
     return Evaluation(

@@ -2,7 +2,8 @@
 
 The first signal is noted, and the run ends at its next boundary with a
 checkpoint; while simulators start there is nothing to save, and it ends where
-it is. A second signal ends the process at once.
+it is, without waiting for one to come up. A second signal ends the process at
+once.
 """
 
 from __future__ import annotations
@@ -72,6 +73,7 @@ class Interruption:
         for later in SIGNALS:
             signal.signal(later, signal.SIG_DFL)
         # Not by a logger: this may run amid another line of it.
-        os.write(2, f"{self.requested.name}: ending with a checkpoint; {HURRY}\n".encode())
+        how = "ending" if self._at_once else "ending with a checkpoint"
+        os.write(2, f"{self.requested.name}: {how}; {HURRY}\n".encode())
         if self._at_once:
             self.check()

@@ -70,10 +70,10 @@ class Progress:
     Attributes:
         step: valid environment steps so far, over all attempts.
         target: steps at which the run ends.
-        phase: what it does now: starting, training, evaluating, saving, finished.
+        phase: what it does now: starting, training, evaluating, saving.
         counters: what is counted over all attempts.
-        evaluation: the last evaluation.
-        best: the best evaluation of this attempt or a summary of an earlier one.
+        success_rate: that of this attempt's last evaluation; None before it.
+        checkpoint: the newest checkpoint; None without one.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Progress:
         self._simulators = {name: _Simulator(role=role) for name, role in simulators}
         self._returns: deque[float] = deque(maxlen=EPISODES_IN_MEAN)
         self._samples: deque[tuple[float, int]] = deque()
-        self._moved = clock()
+        self._moved = self._counted = clock()
         self._moved_at: float | None = None
 
     def stepped(self, steps: int) -> None:
@@ -147,6 +147,14 @@ class Progress:
     def saved(self, step: int) -> None:
         """A checkpoint was written."""
         self.checkpoint = CheckpointStatus(step=step, time=timestamp(time.time()))
+
+    def count_time(self) -> Counters:
+        """Add the seconds since the last call, or since the start, to the counters; return them."""
+        with self._lock:
+            now = self._clock()
+            self.counters.seconds += now - self._counted
+            self._counted = now
+            return self.counters
 
     def idle_s(self) -> float:
         """Return the seconds since the last environment step of any simulator, or since the start."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -109,7 +108,6 @@ class Attempt:
         self._directory = directory
         self._progress = progress
         self._around = around
-        self._started = time.monotonic()
 
     def play(self) -> End:
         """Train; return how it ended. Nothing is left running, whatever happens."""
@@ -174,7 +172,7 @@ class Attempt:
         model = self._make_model(env, found)
         self._begin(found)
         self._learn(model, Conductor(run, env, model.num_timesteps))
-        stop_clock(self._progress, self._started)
+        self._progress.count_time()
         write_summary(self._directory, summarise(self._directory, self._progress))
 
     def _make_model(self, env: SimulatorsVecEnv, found: checkpoint.Checkpoint | None) -> BaseAlgorithm:
@@ -220,7 +218,6 @@ class Attempt:
         except Diverged:
             raise
         except TrainerError:
-            stop_clock(self._progress, self._started)
             conductor.save()
             raise
         except ValueError as error:
@@ -246,11 +243,6 @@ def use_threads(environment: Mapping[str, str] = os.environ) -> None:
     """
     threads = environment.get("OMP_NUM_THREADS", "1")
     torch.set_num_threads(int(threads) if threads.isdigit() and int(threads) else 1)
-
-
-def stop_clock(progress: Progress, started: float) -> None:
-    """Add the time since `started` to the seconds of the run."""
-    progress.counters.seconds += time.monotonic() - started
 
 
 def _write_text(path: os.PathLike[str], text: str) -> None:

@@ -7,7 +7,8 @@ things only: to draw starts and targets that are free, and to scale what it obse
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,21 +70,35 @@ def draw_task(random: np.random.Generator, start: Pose | None = None, target: Po
 
 
 def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
-    """Return a task whose `start` (x, y, heading) and `target` (x, y) may be chosen.
+    """Return a task whose `start` (x, y, heading; or a Pose) and `target` (x, y) may be chosen.
 
     Raises:
-        ConfigurationError: another name than these, or a place inside a wall or a cylinder.
+        ConfigurationError: another name than these, not so many numbers, or a place inside a
+            wall or a cylinder.
     """
     if unknown := sorted(set(chosen) - {"start", "target"}):
         raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
     start, target = chosen.get("start"), chosen.get("target")
-    if isinstance(start, Sequence):
-        start = Pose(*start)
     if start is not None:
+        if not isinstance(start, Pose):
+            start = Pose(*_numbers("start", start, ("x", "y", "heading")))
         _check_place("start", start.x_m, start.y_m)
     if target is not None:
-        _check_place("target", *target)
+        x_m, y_m = _numbers("target", target, ("x", "y"))
+        _check_place("target", x_m, y_m)
+        target = x_m, y_m
     return draw_task(random, start, target)
+
+
+def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
+    """Return the wanted numbers out of whatever numpy takes for a row of them."""
+    with suppress(TypeError, ValueError):
+        row = np.asarray(given, dtype=float)
+        if row.shape == (len(wanted),):
+            return [float(number) for number in row]
+    raise ConfigurationError(
+        f"reset option {name}: {given!r} is not {len(wanted)} numbers; give {', '.join(wanted)}"
+    )
 
 
 def _check_place(name: str, x_m: float, y_m: float) -> None:

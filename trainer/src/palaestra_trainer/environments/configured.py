@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Protocol
 
+from palaestra_trainer.configuration import Configuration, load
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
@@ -56,8 +57,17 @@ def take(simulators: Iterator[Startable]) -> tuple[RobotinoAbc, Scene]:
 
 @cache
 def configured_simulators() -> Iterator[Startable]:
-    """Return what is left of the simulators in PALAESTRA_CONFIG, the same iterator to everyone."""
+    """Return what is left of the simulators in PALAESTRA_CONFIG, the same iterator to everyone.
+
+    Those that collect come first, so that whoever trains before evaluating gets each in its role.
+    """
     # Only here do environments meet ROS, and only when nobody gave them a robot.
     from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
 
-    return iter(connect())
+    return iter(connect(collecting_first(load())))
+
+
+def collecting_first(configuration: Configuration) -> Configuration:
+    """Return the same configuration with its simulators by role, in the file's order within each."""
+    ordered = configuration.with_role("Collect") + configuration.with_role("Evaluate")
+    return configuration.model_copy(update={"simulators": ordered})

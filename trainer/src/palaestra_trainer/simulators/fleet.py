@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, wait
 from contextlib import contextmanager
 
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
@@ -35,23 +36,49 @@ class Fleet:
         }
         self.collecting = [keepers[wanted.name] for wanted in configuration.with_role("Collect")]
         self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role("Evaluate")]
+        self._all = [*self.collecting, *self.evaluating]
 
     def start(self) -> None:
         """Start all members at once.
 
+        Whatever is raised in the meantime, such as `Interrupted`, waits for no member: a try that
+        is under way may go on in its thread, and no other is begun.
+
         Raises:
             FaultBudgetSpent: one of them does not come up, however often it is tried.
         """
-        self._each(Keeper.start)
+        try:
+            self._each(Keeper.start)
+        except BaseException:
+            for keeper in self._all:
+                keeper.give_up()
+            raise
 
     def stop(self) -> None:
         """Stop all members at once, however they are."""
         self._each(Keeper.stop)
 
     def _each(self, work: Callable[[Keeper], None]) -> None:
-        keepers = [*self.collecting, *self.evaluating]
-        with ThreadPoolExecutor(len(keepers), "fleet") as pool:
-            list(pool.map(work, keepers))
+        futures = [in_background(work, keeper) for keeper in self._all]
+        wait(futures)
+        for future in futures:
+            future.result()
+
+
+def in_background(work: Callable[[Keeper], None], keeper: Keeper) -> Future[None]:
+    """Begin to work on one keeper in a thread that does not keep the process from ending."""
+    future: Future[None] = Future()
+
+    def run() -> None:
+        try:
+            work(keeper)
+        except BaseException as error:  # noqa: BLE001 - whoever asks for the result gets it
+            future.set_exception(error)
+        else:
+            future.set_result(None)
+
+    threading.Thread(target=run, name=f"fleet-{keeper.name}", daemon=True).start()
+    return future
 
 
 @contextmanager

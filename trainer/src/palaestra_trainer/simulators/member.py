@@ -152,6 +152,7 @@ class Keeper:
         self.watcher: Watcher = watcher or Nobody()
         self._care = care or Care()
         self._budget = RestartBudget(self._care, clock)
+        self._given_up = False
 
     @property
     def name(self) -> str:
@@ -194,11 +195,13 @@ class Keeper:
         """Restart the broken member until it is up.
 
         Raises:
-            FaultBudgetSpent: the member's budget of restarts is used up.
+            FaultBudgetSpent: the member's budget of restarts is used up, or it was given up.
         """
         while True:
             self.watcher.fault(self.name, fault)
             log.warning("simulator fault", simulator=self.name, kind=fault.kind, fact=str(fault))
+            if self._given_up:
+                raise FaultBudgetSpent(f"{self.name}: was given up ({fault}); start the run again") from fault
             self._budget.spend(fault)
             try:
                 self.member.restart()
@@ -207,6 +210,10 @@ class Keeper:
             else:
                 self.watcher.restarted(self.name, recycled=False)
                 return
+
+    def give_up(self) -> None:
+        """Begin no further try to mend the member; may be called from any thread."""
+        self._given_up = True
 
     def pause(self) -> None:
         """Let the member rest; a broken one is found by the next step that needs it."""

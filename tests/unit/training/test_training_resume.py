@@ -1,0 +1,128 @@
+"""Runs that are interrupted, go on, or are over: what an attempt finds of the one before."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+
+import pytest
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.run_directory import read_lines
+
+
+def signal_after(steps, number=signal.SIGTERM):
+    """Return a function that sends a signal to this process at its `steps`-th call."""
+    calls = iter(range(1, 10_000))
+
+    def step():
+        if next(calls) == steps:
+            os.kill(os.getpid(), number)
+
+    return step
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO", "REINFORCE"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last_word, name, number):
+    """At a rollout boundary: what was amid a rollout is played again."""
+    code, members = play(job(name), on_step=signal_after(42, number))
+
+    saved = checkpoint.newest(directory.checkpoints).manifest
+    assert code == 75
+    assert last_word().reason == f"Interrupted: {number.name} received"
+    assert 0 < saved.step <= 42 + 4
+    assert members["collect-0"].log[-1] == "stop"
+    assert not directory.summary.exists()
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO"])
+def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
+    """It ends at the same total, plays new episodes, and counts what was before."""
+    configuration = job(name)
+    _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
+    saved = checkpoint.newest(directory.checkpoints).manifest
+
+    code, after = play(configuration, must_resume=True)
+
+    summary = json.loads(directory.summary.read_text())
+    seeds_before, seeds_after = (set(it["collect-0"].env.seeds) for it in (before, after))
+    assert code == 0
+    assert summary["steps"] == (100 if name == "DQN" else 111)  # 15 valid rows, then 16 a rollout
+    assert (summary["attempts"], summary["faults"]) == (2, 1)
+    assert len(seeds_before & seeds_after) <= (0 if name == "DQN" else 4)
+    reasons = [line["reason"] for line in read_lines(directory.attempts)]
+    assert reasons == ["new run", f"resumed at step {saved.step}"]
+
+
+def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_word):
+    """A pod that is started once more must not cost anything."""
+    play(job())
+
+    code, members = play(job())
+
+    assert (code, members) == (0, {})
+    assert (last_word().step, last_word().reason) == (100, "Completed: before")
+    assert len(list(read_lines(directory.attempts))) == 1
+
+
+def test_a_run_is_prolonged_by_more_steps(play, job, directory):
+    """It goes on from its last checkpoint."""
+    play(job())
+
+    code, _ = play(job(steps=150))
+
+    assert code == 0
+    assert json.loads(directory.summary.read_text())["steps"] == 150
+
+
+def test_a_directory_of_another_run_is_refused(play, job, last_word):
+    """Before anything of it is overwritten."""
+    play(job("DQN"))
+
+    code, _ = play(job("PPO", steps=200))
+
+    assert code == 2
+    assert "use another run directory" in last_word().reason
+
+
+def test_resuming_nothing_is_refused_if_it_was_asked_for(play, job):
+    """A person who types --resume expects something to be there."""
+    code, _ = play(job(), must_resume=True)
+
+    assert code == 2
+
+
+@pytest.mark.parametrize(("every", "steps"), [(40, [40, 80, 100]), (1000, [100])], ids=["amid", "final"])
+def test_an_evaluation_that_was_cut_is_made_up_for(play, job, directory, every, steps):
+    """The best policy may be the one that was being measured."""
+    configuration = job(evaluation={"everySteps": every, "episodes": 4})
+    code, _ = play(configuration, on_step=signal_after(1), of="evaluate-0")
+    cut = list(read_lines(directory.evaluations))
+
+    play(configuration)
+
+    assert (code, cut) == (75, [])
+    assert [line["step"] for line in read_lines(directory.evaluations)] == steps
+
+
+def test_no_evaluation_is_made_twice(play, job, directory):
+    """Those of the attempt before are on record."""
+    play(job(), on_step=signal_after(70))
+
+    play(job())
+
+    assert [line["step"] for line in read_lines(directory.evaluations)] == [40, 80, 100]
+
+
+def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
+    """Up to its last checkpoint, as its steps are; else a run would look faster the more it is killed."""
+    play(job(), {"collect-0": {"steps": {70: ZeroDivisionError("as good as a kill")}}})
+    saved = checkpoint.newest(directory.checkpoints).manifest
+
+    play(job())
+
+    ended = checkpoint.newest(directory.checkpoints).manifest
+    assert 0 < saved.step < 70
+    assert 0.0 < saved.counters["seconds"] < ended.counters["seconds"]
