@@ -21,10 +21,10 @@ setup: .venv/ready ## install ROS from the distribution and everything else into
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy
 	@$(BIN)/palaestra run $(JOB)
 
-test: setup ## run every test
+test: setup ## run every test; also that generated files are current
 	@$(BIN)/pytest
 
-check: setup ## lint, types, the allowed imports, and that generated files are current
+check: setup ## lint, format, types and the allowed imports
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/mypy

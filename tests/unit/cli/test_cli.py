@@ -128,7 +128,9 @@ def test_a_wrong_job_is_told_with_all_its_mistakes(command, tmp_path, fails, mon
         ("trainer: {env: [{name: A, secretKeyRef: {name: b, key: c}}]}", "env A of container trainer: "),
     ],
 )
-def test_what_is_not_done_here_is_refused_before_anything_is_written(spec, line, tmp_path, fails, monkeypatch):
+def test_what_is_not_done_here_is_refused_before_anything_is_written(
+    spec, line, tmp_path, fails, monkeypatch
+):
     """No run directory, no lock, and with --fresh the old run stays where it is."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "job.yaml"

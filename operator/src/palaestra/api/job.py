@@ -101,14 +101,15 @@ class Spec(ApiModel):
 
     suspend: bool = Field(default=False, json_schema_extra={MAY_CHANGE: True})
     """True: the pods are deleted after a checkpoint, and training goes on when it is false
-    again. Not used by `palaestra run`."""
+    again. Refused by `palaestra run`."""
 
     backoff_limit: Annotated[int, Field(ge=0, le=100)] = 3
     """Failures of a replica's pod that are tried again: n failures, n + 1 pods. Disruptions by the
     cluster are not counted."""
 
     active_deadline_seconds: Seconds | None = Field(default=None, json_schema_extra={MAY_CHANGE: True})
-    """Seconds that the job may run, suspended time not counted; absent: no bound."""
+    """Seconds that the job may run, suspended time not counted; absent: no bound. `palaestra run`
+    counts them for each replica, anew each time it is started."""
 
     stall_deadline_seconds: Seconds = Field(default=600, json_schema_extra={MAY_CHANGE: True})
     """Seconds without an environment step after which a replica counts as stalled and is tried

@@ -40,7 +40,8 @@ class Storage(ApiModel):
 
     resume_from: Annotated[str, Field(min_length=1, max_length=63, pattern=FOLDER)] | None = None
     """Folder of another job's run on the existing claim, the UID of that job: each replica goes on
-    from the newest checkpoint of the replica with its number. Absent: training starts anew."""
+    from the newest checkpoint of the replica with its number. Absent: training starts anew.
+    Not carried out by this release, which refuses a job that has it."""
 
     rules = (
         Rule(

@@ -10,7 +10,7 @@ from palaestra.api.fields import MAY_CHANGE
 
 Schema = dict[str, Any]
 
-FROZEN = "cannot be changed; make a new TrainingJob, which may go on with storage.resumeFrom"
+FROZEN = "cannot be changed; make a new TrainingJob"
 
 # Keywords that mean the same in both, and are taken over as they are.
 _KEPT = (

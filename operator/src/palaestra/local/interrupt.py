@@ -1,4 +1,4 @@
-"""Ctrl-C: once asks the run to end with a checkpoint, twice ends it at once."""
+"""What ends a run early: Ctrl-C, once with a checkpoint and twice at once, and its deadline."""
 
 import asyncio
 import signal
@@ -20,12 +20,21 @@ class Stoppable(Protocol):
 
 
 class Interrupt:
-    """Counts the signals of a run and passes them to what runs now."""
+    """Counts the signals of a run and passes them to what runs now.
+
+    `expired` claims that the deadline came before any signal.
+    """
 
     def __init__(self) -> None:
         self.asked = asyncio.Event()
-        self.killed = False
+        self.expired = False
+        self.signals = 0
         self._target: Stoppable | None = None
+
+    @property
+    def killed(self) -> bool:
+        """Return whether a person did not want to wait for the end."""
+        return self.signals > 1
 
     def pass_to(self, target: Stoppable) -> None:
         """Choose what the next signals are for; one that came before is passed on now."""
@@ -34,9 +43,10 @@ class Interrupt:
             target.stop()
 
     @contextmanager
-    def listening(self) -> Iterator[None]:
-        """Take SIGINT, SIGTERM and SIGHUP while the block runs."""
+    def listening(self, deadline_s: float | None = None) -> Iterator[None]:
+        """Take SIGINT, SIGTERM and SIGHUP while the block runs, and end it when that takes too long."""
         loop = asyncio.get_running_loop()
+        timer = None if deadline_s is None else loop.call_later(deadline_s, self._expire)
         for number in SIGNALS:
             loop.add_signal_handler(number, self._came)
         try:
@@ -44,10 +54,19 @@ class Interrupt:
         finally:
             for number in SIGNALS:
                 loop.remove_signal_handler(number)
+            if timer is not None:
+                timer.cancel()
 
     def _came(self) -> None:
-        again = self.asked.is_set()
+        self.signals += 1
+        self._end()
+
+    def _expire(self) -> None:
+        if not self.asked.is_set():
+            self.expired = True
+            self._end()
+
+    def _end(self) -> None:
         self.asked.set()
-        self.killed = self.killed or again
         if self._target is not None:
-            (self._target.kill if again else self._target.stop)()
+            (self._target.kill if self.killed else self._target.stop)()

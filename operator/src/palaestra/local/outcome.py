@@ -16,7 +16,8 @@ FILE = "outcome.json"
 class Outcome:
     """The end of a replica's run; what nobody measured is None.
 
-    `exit_code` is the last trainer's, `faults` counts those of all simulators and pods.
+    `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted` claims
+    that a person ended it. `faults` counts those of all simulators and pods.
     """
 
     exit_code: int
@@ -26,6 +27,7 @@ class Outcome:
     steps_per_second: float | None = None
     faults: int | None = None
     pods: int = 1
+    interrupted: bool = False
 
     @property
     def finished(self) -> bool:

@@ -48,6 +48,12 @@ def ros_is_installed(request: Request) -> Iterator[str]:
         yield f"rospy: cannot be imported by {sys.executable}; {ROS}"
 
 
+def nothing_is_put_off(request: Request) -> Iterator[str]:
+    """A suspended job waits for its field to be changed, which nobody watches here."""
+    if request.job.spec.suspend:
+        yield "spec.suspend: is true, which puts the training off; set it to false to train now"
+
+
 def programs_exist(request: Request) -> Iterator[str]:
     """Every program that a container begins with can be found."""
     spec = request.job.spec
@@ -81,7 +87,13 @@ def space_is_left(request: Request) -> Iterator[str]:
         )
 
 
-CHECKS: tuple[Check, ...] = (ros_is_installed, programs_exist, worlds_are_right, space_is_left)
+CHECKS: tuple[Check, ...] = (
+    ros_is_installed,
+    nothing_is_put_off,
+    programs_exist,
+    worlds_are_right,
+    space_is_left,
+)
 
 
 def _simulator_program(group: SimulatorGroup) -> str:

@@ -6,7 +6,7 @@ import json
 import signal
 import uuid
 from collections.abc import Container
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,8 @@ from palaestra.plan import ReplicaPlan
 from palaestra_sim.protocol.status import ExitCode
 
 KILLED = 128 + signal.SIGINT
+FAILED = 1
+DEADLINE_EXCEEDED = "DeadlineExceeded"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,7 +31,7 @@ class Setting:
     """Where a replica runs, and who sees its output.
 
     `shown` are the containers whose output is shown. `terminal` is the descriptor of a terminal that the
-    trainer may draw on, None without one.
+    trainer may draw on, None without one. `deadline_s` bounds all pods together; None: no bound.
     """
 
     directory: Path
@@ -37,10 +39,11 @@ class Setting:
     shown: Container[str] = ()
     terminal: int | None = None
     backoff: BackOff = field(default_factory=BackOff)
+    deadline_s: float | None = None
 
 
 async def run_replica(planned: ReplicaPlan, setting: Setting) -> Outcome:
-    """Run pods until the Job is complete, given up or interrupted; return how it ended.
+    """Run pods until the Job is complete, given up, interrupted or too late; return how it ended.
 
     Raises:
         LocalError: a pod could not be started, or its files could not be written.
@@ -48,13 +51,13 @@ async def run_replica(planned: ReplicaPlan, setting: Setting) -> Outcome:
     interrupt = Interrupt()
     tries = Tries(limit=planned.job["spec"]["backoffLimit"])
     pods = 0
-    with interrupt.listening():
+    with interrupt.listening(setting.deadline_s):
         while True:
             pods += 1
             code = await _run_pod(planned, setting, interrupt)
             outcome = _outcome(setting.directory, code, pods)
             if interrupt.asked.is_set():
-                return _interrupted(outcome, killed=interrupt.killed)
+                return _ended_early(outcome, interrupt)
             if not tries.another(verdict(planned.job, outcome.exit_code), outcome.steps or 0):
                 return outcome
             say(f"trainer ended with {meaning(outcome.exit_code)}; again in {tries.wait_s:g} s")
@@ -96,12 +99,20 @@ def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str,
     return logs
 
 
-def _interrupted(outcome: Outcome, *, killed: bool) -> Outcome:
-    """Return the outcome of a run that a person ended; one that was done anyway stays done."""
+def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
+    """Return the outcome of a run that was not left to its own end; one that was done anyway stays done.
+
+    A trainer that was asked to end says itself, with 75, that it has saved: no other end is made to look
+    like that one.
+    """
     if outcome.finished:
         return outcome
-    code = KILLED if killed else int(ExitCode.INTERRUPTED)
-    return Outcome(exit_code=code, steps=outcome.steps, pods=outcome.pods)
+    outcome = replace(outcome, interrupted=interrupt.signals > 0)
+    if interrupt.killed:
+        return replace(outcome, exit_code=KILLED)
+    if interrupt.expired:
+        return replace(outcome, exit_code=FAILED, reason=DEADLINE_EXCEEDED)
+    return outcome
 
 
 def _outcome(directory: Path, code: int | None, pods: int) -> Outcome:

@@ -17,7 +17,8 @@ from palaestra.local.errors import Refused
 from palaestra.local.outcome import Outcome, summary
 from palaestra.local.output import say
 from palaestra.local.ports import HeldPorts
-from palaestra.local.replica import KILLED, Setting, meaning, run_replica
+from palaestra.local.replica import DEADLINE_EXCEEDED, KILLED, Setting, meaning, run_replica
+from palaestra.local.spec import read_pod
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
 from palaestra.plan.replica import TRAINER
 from palaestra_sim.protocol.status import ExitCode
@@ -48,18 +49,20 @@ def run(job: TrainingJob, options: Options) -> int:
     directory = rundir.job_directory(options.runs, job.metadata.name)
     job = identified(job, rundir.uid_of(directory))
     chosen = _chosen(job, options.replica)
-    check(job, directory, options)
-    codes = []
+    check(job, directory, chosen, options)
+    outcomes = []
     for replica in chosen:
-        codes.append(_run_one(job, directory / str(replica), replica, options))
-        if codes[-1] in (ExitCode.INTERRUPTED, KILLED):
+        outcomes.append(_run_one(job, directory / str(replica), replica, options))
+        if outcomes[-1].interrupted or outcomes[-1].exit_code == ExitCode.INTERRUPTED:
             break
-    return next((code for code in codes if code), 0)
+    return next((each.exit_code for each in outcomes if not each.finished), 0)
 
 
-def check(job: TrainingJob, directory: Path, options: Options) -> None:
-    """Find what can be known to be wrong before anything is started; raises as `run` does."""
-    plan(job, layout(directory, options, Ports()))
+def check(job: TrainingJob, directory: Path, chosen: range, options: Options) -> None:
+    """Find what can be known to be wrong before anything is written; raises as `run` does."""
+    planned = plan(job, layout(directory, options, Ports()))
+    for replica in chosen:
+        read_pod(planned.replicas[replica].job["spec"]["template"], uid="")
     preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
 
 
@@ -95,7 +98,7 @@ def _chosen(job: TrainingJob, replica: int | None) -> range:
     return range(replica, replica + 1)
 
 
-def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> int:
+def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Outcome:
     record = {field: value for field, value in as_data(job).items() if field != "status"}
     with rundir.locked(path), HeldPorts() as held:
         ports = chosen_ports(held, job, options)
@@ -106,26 +109,27 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> in
         if before is not None and before.finished:
             say(f"{job.metadata.name}-{replica}: finished already; --fresh begins anew")
             _tell(before, path)
-            return 0
+            return before
         rundir.prepare(path, record)
         planned = plan(job, layout(path.parent, options, ports)).replicas[replica]
-        return _trained(planned, path, ports, options)
+        say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")
+        say(f"ROS_MASTER_URI=http://127.0.0.1:{ports.ros_master}")
+        return _trained(planned, path, options, job.spec.active_deadline_seconds)
 
 
-def _trained(planned: ReplicaPlan, path: Path, ports: Ports, options: Options) -> int:
-    say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")
-    say(f"ROS_MASTER_URI=http://127.0.0.1:{ports.ros_master}")
+def _trained(planned: ReplicaPlan, path: Path, options: Options, deadline_s: float | None) -> Outcome:
     on_terminal = sys.stdout.isatty() and not options.verbose
     setting = Setting(
         directory=path,
         show=say,
         shown=_shown(planned, options, on_terminal=on_terminal),
         terminal=sys.stdout.fileno() if on_terminal else None,
+        deadline_s=deadline_s,
     )
     outcome = asyncio.run(run_replica(planned, setting))
     outcome.keep(path)
     _tell(outcome, path)
-    return outcome.exit_code
+    return outcome
 
 
 def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tuple[str, ...]:
@@ -138,13 +142,17 @@ def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tupl
 
 def _tell(outcome: Outcome, path: Path) -> None:
     if outcome.exit_code == ExitCode.INTERRUPTED:
-        say(f"interrupted at step {outcome.steps or 0}; the same command goes on from there")
+        place = "before a step was counted" if outcome.steps is None else f"at step {outcome.steps}"
+        say(f"interrupted {place}; the same command goes on from there")
     elif outcome.exit_code == KILLED:
         say("killed; the same command goes on from the newest checkpoint")
+    elif outcome.reason == DEADLINE_EXCEEDED:
+        say(f"failed: {DEADLINE_EXCEEDED}: spec.activeDeadlineSeconds is over; raise it to go on")
     elif not outcome.finished:
+        what = "interrupted, and failed" if outcome.interrupted else "failed"
         log = path / "logs" / "trainer.log"
         last = log.read_text(errors="replace").splitlines()[-SHOWN_LINES:]
         said = outcome.reason or "\n".join(last)
-        say(f"failed: the trainer ended with {meaning(outcome.exit_code)}: {said}; more in {log}")
+        say(f"{what}: the trainer ended with {meaning(outcome.exit_code)}: {said}; more in {log}")
     for line in summary(outcome, path):
         say(line)

@@ -1,7 +1,8 @@
 """Read a planned pod as a kubelet would: containers in order, commands, environment, probes, volumes.
 
-Only what a process on this machine can have is read; images, resources and security contexts are the
-cluster's business. What a container asks for and a laptop cannot give is refused, not left out.
+Only what a process on this machine can have is read. Images, resources, security contexts and what is
+asked of a scheduler are the cluster's business and left out. What a program would miss is refused: a value
+that lies in a cluster, and a second main container.
 """
 
 from collections.abc import Mapping, Sequence

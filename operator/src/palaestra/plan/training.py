@@ -34,7 +34,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "environment": trainer["environment"],
         "algorithm": trainer["algorithm"],
         "steps": spec.trainer.steps,
-        "evaluation": trainer["evaluation"] if spec.trainer.evaluation.every_steps else None,
+        "evaluation": trainer["evaluation"],
         "checkpoint": trainer["checkpoint"],
         "stallDeadlineSeconds": spec.stall_deadline_seconds,
         "command": list(spec.trainer.command) or None,
