@@ -35,6 +35,7 @@ from palaestra_trainer.watchdog import Watchdog
         (SimulatorHung("x", "slow"), 82, "Stalled"),
         (SimulatorDead("x", "gone"), 1, "SimulatorUnavailable"),
         (OSError(errno.ENOSPC, "full", "run/x"), 1, "DiskFull"),
+        (OSError(errno.ENOSPC, "full"), 1, "DiskFull"),
         (RuntimeError("bug"), 1, "Unexpected"),
     ],
 )
@@ -146,3 +147,10 @@ def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
 
     assert ended.returncode == 82
     assert "in hang" in ended.stderr
+
+
+def test_a_full_disk_is_told_also_when_the_system_names_no_file():
+    """A write that fails knows its descriptor only."""
+    end = end_of(OSError(errno.ENOSPC, "full"))
+
+    assert end.message == "the run directory: disk full; free some space"

@@ -68,7 +68,8 @@ def end_of(error: BaseException) -> End:
         if isinstance(error, kind):
             return End(code, reason, str(error))
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
-        return End(UNEXPECTED, "DiskFull", f"{error.filename}: disk full; free some space")
+        where = error.filename or "the run directory"
+        return End(UNEXPECTED, "DiskFull", f"{where}: disk full; free some space")
     return End(UNEXPECTED, "Unexpected", f"{type(error).__name__}: {error}")
 
 
