@@ -7,11 +7,11 @@ import tempfile
 from pathlib import Path
 
 import yaml
-from tests.bench.arena import running
-from tests.bench.runs import JOB, PALAESTRA
 
 from palaestra_trainer.environments import baselines
 from palaestra_trainer.environments.move_to_target import make
+from tests.bench.arena import running
+from tests.bench.runs import JOB, PALAESTRA
 
 SEEDS = (1, 2, 3, 4, 5)
 EPISODES = 100

@@ -5,12 +5,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
-from tests.bench.arena import running
-from tests.bench.stepping import rate
 
 from palaestra_trainer.environments.move_to_target import make
 from palaestra_trainer.simulators.member import Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from tests.bench.arena import running
+from tests.bench.stepping import rate
 
 STEPS = 300
 SLEEP_MS = 3

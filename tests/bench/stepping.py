@@ -9,9 +9,9 @@ import time
 
 import genpy
 import rospy
-from tests.bench.arena import running
 
 from palaestra_sim.protocol.rostypes import service_type
+from tests.bench.arena import running
 
 ROUNDS = 5
 OURS = 1000

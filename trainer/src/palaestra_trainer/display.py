@@ -8,9 +8,10 @@ from types import TracebackType
 from typing import Protocol, Self, TextIO
 
 import structlog
-from palaestra_sim.protocol.status import TrainerStatus
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from palaestra_sim.protocol.status import TrainerStatus
 
 log = structlog.get_logger(__name__)
 

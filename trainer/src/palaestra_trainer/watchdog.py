@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Self
 
 import structlog
+
 from palaestra_sim.protocol.status import ExitCode
 
 log = structlog.get_logger(__name__)

@@ -6,9 +6,8 @@ LocalError              one line for a person, and the exit code of `palaestra r
 └── StorageFailed       exit 1: the run directory cannot be written (full disk, no permission)
 """
 
-from palaestra_sim.protocol.status import ExitCode
-
 from palaestra.errors import PalaestraError
+from palaestra_sim.protocol.status import ExitCode
 
 
 class LocalError(PalaestraError):

@@ -3,9 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from palaestra_sim.protocol.status import ExitCode
-
 from palaestra.plan.replica import TRAINER, Replica
+from palaestra_sim.protocol.status import ExitCode
 
 QUEUE_LABEL = "kueue.x-k8s.io/queue-name"
 GIVEN_UP = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET, ExitCode.DIVERGED)
