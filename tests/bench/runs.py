@@ -98,7 +98,7 @@ def programs(ancestor, name):
     return [
         (pid, command)
         for pid, command in processes(ancestor)
-        if any(word.endswith(name) for word in command.split()[:3])
+        if any(word.endswith(name) for word in command.split()[:4])
         and not any(word.endswith("keeper.py") for word in command.split() if name != "keeper.py")
     ]
 

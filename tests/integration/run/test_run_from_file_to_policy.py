@@ -92,7 +92,8 @@ def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(run, example, s
 
     assert code == 0, output
     assert f"resumed at step {saved}" in training.log()
-    rollout = 2 * 1024 if example == "two-collectors" else 1
+    # Two simulators with 512 steps each, as the example says.
+    rollout = 2 * 512 if example == "two-collectors" else 1
     assert training.summary()["steps"] == -(-steps // rollout) * rollout
 
 
