@@ -90,8 +90,7 @@ class Wire:
                 return self._receive_in_parts(ahead)
             end = self._frame_end(ahead)
             if end and end == self._filled:
-                self._filled = 0
-                return self._view[:end] if ahead else self._view[LENGTH.size : end]
+                return self._take(ahead, end)
         return self._receive_in_parts(ahead)
 
     def _receive_in_parts(self, ahead: int) -> memoryview:

@@ -15,7 +15,6 @@ from palaestra_trainer.configuration import Configuration, SimulatorConfiguratio
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.ros import ensure_node
-from palaestra_trainer.simulators.master import ensure_master
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
@@ -40,7 +39,6 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
     Raises:
         ConfigurationError: the run directory lacks a world, or a simulator cannot be started here.
     """
-    ensure_master()
     return [
         _simulator(configuration, entry, _process(configuration, entry, run))
         for entry in configuration.simulators
