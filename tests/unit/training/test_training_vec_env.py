@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 import numpy as np
 import pytest
 from gymnasium import Wrapper, spaces
@@ -13,6 +11,7 @@ from palaestra_trainer.errors import FaultBudgetSpent, MasterLost, SimulatorHung
 from palaestra_trainer.seeds import COLLECT, episode_seed
 from palaestra_trainer.simulators.member import Care, Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.turns import let_others
 
 RIGHT, LEFT = 1, 0
 
@@ -22,9 +21,9 @@ def make_env():
     """Make a VecEnv of members and close it in the end."""
     made = []
 
-    def make(*members, care=None, run_seed=1, episodes=None, deadline_s=10.0):
+    def make(*members, care=None, run_seed=1, episodes=None):
         keepers = [Keeper(member, care) for member in members]
-        env = SimulatorsVecEnv(keepers, run_seed, episodes=episodes, deadline_s=deadline_s)
+        env = SimulatorsVecEnv(keepers, run_seed, episodes=episodes)
         made.append(env)
         return env
 
@@ -40,7 +39,7 @@ def walk(env, steps, action=RIGHT):
 
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
-    """One member is stepped without a thread; it must not look different."""
+    """However many there are."""
     env = make_env(*(make_member(f"collect-{index}") for index in range(members)))
 
     first = env.reset()
@@ -195,7 +194,7 @@ def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member)
 
 
 def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, make_member):
-    """Nothing is restarted when the ROS master is gone, and no thread is left amid a step."""
+    """Nothing is restarted when the ROS master is gone, and no member is left amid a step."""
     lost = MasterLost("gone")
     env = make_env(make_member("collect-0", steps={1: lost}), make_member("collect-1"))
     env.reset()
@@ -205,30 +204,24 @@ def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, ma
 
 
 def test_members_step_at_the_same_time(make_env, make_member):
-    """Four simulators must not take four times as long: here each waits for all others."""
-    meeting = threading.Barrier(4)
+    """Four simulators must not take four times as long: all are asked before one is awaited."""
     members = [make_member(f"collect-{index}") for index in range(4)]
+    told = []
     for member in members:
-        member.take_step = lambda: meeting.wait(5.0)
+
+        def step(name=member.name):
+            told.append(("asked", name))
+            let_others()
+            told.append(("awaited", name))
+
+        member.take_step = step
     env = make_env(*members)
     env.reset()
 
-    _, _, _, infos = walk(env, 1)[0]
+    walk(env, 1)
 
-    assert all(info["valid"] for info in infos)
-
-
-def test_a_thread_that_does_not_come_back_is_not_awaited_for_ever(make_env, make_member):
-    """A facade without a deadline is a bug, and must not look like a long step."""
-    over = threading.Event()
-    members = [make_member("collect-0"), make_member("collect-1")]
-    members[1].take_step = lambda: over.wait(30.0)
-    env = make_env(*members, deadline_s=0.05)
-    env.reset()
-
-    with pytest.raises(SimulatorHung, match="collect-1: its thread gave no answer"):
-        walk(env, 1)
-    over.set()
+    names = [member.name for member in members]
+    assert told == [("asked", name) for name in names] + [("awaited", name) for name in names]
 
 
 @pytest.mark.parametrize("members", [1, 2])

@@ -166,7 +166,6 @@ class Attempt:
             run.fleet.collecting,
             self._configuration.seed,
             episodes=found.manifest.episodes if found else None,
-            deadline_s=self._configuration.stall_deadline_seconds,
         )
         stack.callback(env.close)
         model = self._make_model(env, found)

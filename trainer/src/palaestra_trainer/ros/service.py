@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from palaestra_sim.protocol.rostypes import service_type
@@ -106,8 +106,14 @@ class RosService:
         return self._wire
 
 
-def call_together(calls: Iterable[tuple[RosService, dict[str, Any]]]) -> list[Any]:
+def call_together(
+    calls: Iterable[tuple[RosService, dict[str, Any]]], meanwhile: Callable[[], None] | None = None
+) -> list[Any]:
     """Return the responses of calls that are all sent before the first answer is awaited.
+
+    Args:
+        calls: services and the fields of their requests.
+        meanwhile: what can be done before the answers are awaited.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the others' connections are
@@ -118,6 +124,8 @@ def call_together(calls: Iterable[tuple[RosService, dict[str, Any]]]) -> list[An
         for service, fields in calls:
             service.begin(**fields)
             sent.append(service)
+        if meanwhile is not None:
+            meanwhile()
         return [service.finish() for service in sent]
     except BaseException:  # a Ctrl-C too
         for service in sent:

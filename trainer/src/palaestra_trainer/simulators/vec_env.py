@@ -1,17 +1,14 @@
 """Many simulators as one Stable-Baselines3 VecEnv, in which faults are ordinary.
 
-All members step at the same time, each in a thread of its own; a single member
-steps in the caller's. A member that breaks is restarted alone and its row is
-marked invalid, see `palaestra_trainer.simulators.collector`. Threads, not
-processes: a step waits for a simulator's answer and uses next to no
-processor, and what is shared needs no pickling.
+All members step at the same time, in turns of the caller's thread: each asks
+its simulator for the step before the first answer is awaited. A member that
+breaks is restarted alone and its row is marked invalid, see
+`palaestra_trainer.simulators.collector`.
 """
 
 from __future__ import annotations
 
-import queue
-import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, cast
 
@@ -22,45 +19,9 @@ from stable_baselines3.common.env_util import is_wrapped
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from palaestra_trainer.errors import SimulatorHung
 from palaestra_trainer.simulators.collector import Collector, Row
 from palaestra_trainer.simulators.member import Environment, Keeper
-
-Work = Callable[[], Any]
-Answer = tuple[Any, BaseException | None]
-
-
-class _Worker:
-    """One thread that does one thing at a time for one member."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._work: queue.SimpleQueue[Work | None] = queue.SimpleQueue()
-        self._answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._serve, name=name, daemon=True)
-        self._thread.start()
-
-    def begin(self, work: Work) -> None:
-        self._work.put(work)
-
-    def result(self, deadline_s: float) -> Any:
-        try:
-            value, error = self._answers.get(timeout=deadline_s)
-        except queue.Empty:
-            raise SimulatorHung(self._name, f"its thread gave no answer for {deadline_s:g} s") from None
-        if error is not None:
-            raise error
-        return value
-
-    def end(self) -> None:
-        self._work.put(None)
-
-    def _serve(self) -> None:
-        while (work := self._work.get()) is not None:
-            try:
-                self._answers.put((work(), None))
-            except BaseException as error:  # noqa: BLE001 - raised again by result(), in the caller's thread
-                self._answers.put((None, error))
+from palaestra_trainer.turns import take_turns
 
 
 class SimulatorsVecEnv(VecEnv):
@@ -70,16 +31,10 @@ class SimulatorsVecEnv(VecEnv):
         keepers: one for each member; rows are in their order.
         run_seed: the replica's seed; each episode's own follows from it.
         episodes: for each member the number of its next episode, to continue a run.
-        deadline_s: longest wait for one step of all members, restarts included.
     """
 
     def __init__(
-        self,
-        keepers: Sequence[Keeper],
-        run_seed: int,
-        *,
-        episodes: Sequence[int] | None = None,
-        deadline_s: float = 600.0,
+        self, keepers: Sequence[Keeper], run_seed: int, *, episodes: Sequence[int] | None = None
     ) -> None:
         numbers = list(episodes or [])
         numbers += [0] * (len(keepers) - len(numbers))
@@ -87,13 +42,11 @@ class SimulatorsVecEnv(VecEnv):
             Collector(keeper, run_seed, index, number)
             for index, (keeper, number) in enumerate(zip(keepers, numbers, strict=True))
         ]
-        self._deadline_s = deadline_s
         self._watcher = keepers[0].watcher
         env = keepers[0].member.env
         super().__init__(len(keepers), env.observation_space, env.action_space)
         self._seeds = [None] * self.num_envs
         self._actions = np.empty(0)
-        self._workers = [_Worker(keeper.name) for keeper in keepers] if self.num_envs > 1 else []
 
     @property
     def episodes(self) -> list[int]:
@@ -102,11 +55,13 @@ class SimulatorsVecEnv(VecEnv):
 
     def pause(self) -> None:
         """Let all members rest until `run`."""
-        self._all(collector.keeper.pause for collector in self._collectors)
+        for collector in self._collectors:
+            collector.keeper.pause()
 
     def run(self) -> None:
         """End the rest of all members."""
-        self._all(collector.keeper.run for collector in self._collectors)
+        for collector in self._collectors:
+            collector.keeper.run()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Make `seed` the run's seed, if one is given; return the seeds of the next episodes."""
@@ -116,7 +71,7 @@ class SimulatorsVecEnv(VecEnv):
 
     def reset(self) -> VecEnvObs:
         """Return the first observations of new episodes, begun in all members at once."""
-        observations = self._all(
+        observations = take_turns(
             partial(collector.begin, options or None)
             for collector, options in zip(self._collectors, self._options, strict=True)
         )
@@ -125,21 +80,19 @@ class SimulatorsVecEnv(VecEnv):
         return self._stack(observations)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Begin a step with `actions`, one for each member, in all members at once."""
+        """Keep `actions`, one for each member, for `step_wait`."""
         self._actions = actions
-        for worker, collector, action in zip(
-            self._workers, self._collectors, actions, strict=bool(self._workers)
-        ):
-            worker.begin(partial(collector.step, action))
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Return observations, rewards, dones and infos of the step that was begun.
+        """Step all members at once; return observations, rewards, dones and infos.
 
         Raises:
-            SimulatorHung: a member's thread did not come back in time; the run cannot go on.
             FaultBudgetSpent: a member broke more often than its budget allows.
         """
-        rows: list[Row] = self._results() if self._workers else [self._collectors[0].step(self._actions[0])]
+        rows: list[Row] = take_turns(
+            partial(collector.step, action)
+            for collector, action in zip(self._collectors, self._actions, strict=True)
+        )
         self._watcher.stepped(len(rows))
         dones = np.array([row.done for row in rows])
         if dones.any():
@@ -152,9 +105,7 @@ class SimulatorsVecEnv(VecEnv):
         )
 
     def close(self) -> None:
-        """End the threads and close the environments; the simulators are their owner's."""
-        for worker in self._workers:
-            worker.end()
+        """Close the environments; the simulators are their owner's."""
         for env in self._targets(None):
             env.close()
 
@@ -190,27 +141,6 @@ class SimulatorsVecEnv(VecEnv):
 
     def _keep_reset_infos(self) -> None:
         self.reset_infos = [collector.reset_info for collector in self._collectors]
-
-    def _all(self, works: Iterable[Work]) -> list[Any]:
-        if not self._workers:
-            return [work() for work in works]
-        for worker, work in zip(self._workers, works, strict=True):
-            worker.begin(work)
-        return self._results()
-
-    def _results(self) -> list[Any]:
-        # All of them are awaited before an error is raised: no thread may still be in a
-        # step when the caller cleans up.
-        answers: list[Any] = []
-        errors: list[BaseException] = []
-        for worker in self._workers:
-            try:
-                answers.append(worker.result(self._deadline_s))
-            except Exception as error:  # noqa: BLE001 - the first one is raised below
-                errors.append(error)
-        if errors:
-            raise errors[0]
-        return answers
 
     def _stack(self, observations: list[Any]) -> VecEnvObs:
         if isinstance(self.observation_space, spaces.Dict):

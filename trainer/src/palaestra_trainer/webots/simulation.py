@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
+from palaestra_trainer.turns import let_others
 from palaestra_trainer.webots.devices import Motor, Sensor
 from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.supervisor import Supervisor
@@ -102,9 +103,10 @@ class Simulation:
             sensor.forget_old()
         try:
             self._advance()
-            # Asked before the sensors are read, so that the answers come while they are.
+            # Asked before the sensors are read, so that answers and messages come in others' turns.
             for name in self._tracked:
                 self._observer.begin_pose(name)
+            let_others()
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
@@ -125,7 +127,8 @@ class Simulation:
         return silent
 
     def _advance(self) -> None:
-        answers = call_together([(step, {"value": self.period_ms}) for step in self._steps])
+        wanted = [(step, {"value": self.period_ms}) for step in self._steps]
+        answers = call_together(wanted, meanwhile=let_others)
         if not all(answer.success for answer in answers):
             raise WrongData(self._supervisor.node_name, f"refused a step of {self.period_ms} ms")
 
