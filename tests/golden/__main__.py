@@ -2,6 +2,7 @@
 
     tests/golden/<example>.<layout>.yaml    the whole plan of each manifests/examples/*.yaml
     manifests/crd.yaml, docs/trainingjob.md what the API is made of
+    manifests/install.yaml                  the whole installation of this release
 
 A new example needs no new test: its plans are recorded here and compared by test_golden.py.
 """
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from palaestra.api import load
 from palaestra.api.generated import generated_files
+from palaestra.manifests import install_text
 from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
 from palaestra.plan.text import as_yaml
 
@@ -34,6 +36,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
             yield path, as_yaml(plan(job, layout).objects)
     for name, text in generated_files(ROOT).items():
         yield ROOT / name, text
+    yield ROOT / "manifests" / "install.yaml", install_text()
 
 
 def main() -> int:

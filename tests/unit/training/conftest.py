@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,12 @@ ALGORITHMS = {
     "A2C": TINY,
     "REINFORCE": TINY | {"episodes_per_update": 2},
 }
+
+
+@pytest.fixture(autouse=True)
+def scratch(monkeypatch, tmp_path):
+    """Keep here what Stable-Baselines3 writes when it has no logger: it makes a folder a `learn`."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 class Corridor(gymnasium.Env[np.ndarray, Any]):
