@@ -8,10 +8,10 @@ PACKAGES := operator trainer sim_image
 SOURCES := operator/src trainer/src sim_image/src
 JOB := manifests/examples/move-to-target.yaml
 
-.PHONY: help setup run test check format bench golden lock
+.PHONY: help setup run test check e2e images cluster cluster-down format bench golden lock
 
 help: ## list the verbs
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/\1\t\2/' | expand -t 10
+	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
 
 setup: .venv/ready ## install ROS from the distribution and everything else into .venv
 
@@ -30,6 +30,19 @@ check: setup ## lint, format, types and the allowed imports
 	@$(BIN)/mypy
 	@$(BIN)/pyright --warnings
 	@$(BIN)/lint-imports
+
+e2e: setup ## test the operator on a real cluster, which is made for it and taken away again
+	@tests/cluster/e2e.sh
+
+images: setup ## build the container images, with docker or with buildah
+	@tools/images.sh
+
+cluster: setup ## make a cluster on this machine, with the images in it
+	@tests/cluster/up.sh >/dev/null
+	@archives=$$(tools/images.sh --archives) && tests/cluster/load.sh $$(cut -d= -f2 <<<"$$archives")
+
+cluster-down: ## take that cluster away
+	@tests/cluster/down.sh
 
 format: setup ## rewrite the sources in the common format
 	@$(BIN)/ruff check --fix --quiet || true

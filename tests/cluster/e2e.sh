@@ -1,0 +1,71 @@
+#!/usr/bin/env bash
+# Bring a cluster up, install Palaestra in it, run the end-to-end tests, and remove all that was started: after success, after
+# failure and after Ctrl-C. A cluster that stood before is used and left, unless a killed run of this script left it behind.
+#   e2e.sh [PYTEST ARGUMENT…]     such as -k suspend
+# KEEP=1 leaves the cluster standing. PALAESTRA_CLUSTER chooses the way to it, see up.sh.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR source=settings.sh
+. "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
+cd "$HERE/../.."
+
+INSTALLATION=manifests/install.yaml
+MARK=$STATE/by-e2e # this cluster was brought up here, and is to go with us
+tests=
+installed=
+
+finish() {
+  local status=$?
+  trap '' INT TERM HUP
+  trap - EXIT
+  if [[ ${KEEP:-} == 1 ]]; then
+    rm -f "$MARK"
+    say "KEEP=1: the cluster stands, KUBECONFIG=${KUBECONFIG:-$KUBECONFIG_FILE}; remove it with: make cluster-down"
+  elif [[ ${PALAESTRA_CLUSTER:-} == existing ]]; then
+    [[ -z $installed ]] || kubectl delete --ignore-not-found --timeout 120s -f "$INSTALLATION" >/dev/null || true
+  elif [[ -f $MARK || ! -f $STATE/way ]]; then
+    say "removing the cluster"
+    "$HERE/down.sh"
+  fi
+  exit "$status"
+}
+
+# Let the tests clean up after themselves, and end. Ctrl-C has reached them already: a second signal would cut that short.
+stop() {
+  [[ -z $tests ]] || { kill -s "$1" "$tests" && wait "$tests"; } || true
+  exit 130
+}
+
+bring_up() {
+  [[ ! -f $MARK ]] || { say "removing what a killed run left behind" && "$HERE/down.sh"; }
+  local stood=
+  [[ ! -f $STATE/way ]] || stood=yes
+  KUBECONFIG=$("$HERE/up.sh")
+  export KUBECONFIG
+  [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || touch "$MARK"
+}
+
+install_palaestra() {
+  local archives
+  # Through a file, as the exit status of a process substitution is lost.
+  { tools/images.sh --archives && tools/images.sh --archives --tag next operator; } >"$CACHE/e2e-images"
+  mapfile -t archives < <(cut -d= -f2 "$CACHE/e2e-images")
+  "$HERE/load.sh" "${archives[@]}"
+  kubectl get namespace palaestra-system >/dev/null 2>&1 || installed=yes
+  kubectl apply -f "$INSTALLATION" >/dev/null
+  kubectl -n palaestra-system rollout status deployment/palaestra-operator --timeout 120s >/dev/null ||
+    die "the operator does not become ready: kubectl -n palaestra-system describe pods"
+}
+
+trap finish EXIT
+trap 'stop 0' INT
+trap 'stop INT' TERM HUP
+programs=$("$HERE/programs.sh" etcd kube-apiserver kube-controller-manager kubectl kind cyclonus)
+PATH=$programs:$PATH
+bring_up
+say "installing Palaestra"
+install_palaestra
+say "running the end-to-end tests"
+# In the background, so that a signal is acted on at once; a shell makes such a process deaf to Ctrl-C, env mends that.
+PALAESTRA_E2E=1 env --default-signal=INT .venv/bin/python -m pytest tests/e2e --durations=15 "$@" &
+tests=$!
+wait "$tests"

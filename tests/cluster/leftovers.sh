@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Print what a removed cluster left on this machine: processes, mounts, links, routes, firewall rules, control groups, files.
+# Succeeds when there is nothing. Bridges, rules and routes of a Docker Engine that this machine runs anyway are none.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR source=settings.sh
+. "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
+
+# Those that name our folder, and those inside the engine's control groups.
+processes() {
+  local folder
+  for folder in /proc/[0-9]*; do
+    if [[ ${folder#/proc/} != "$$" ]] &&
+      { tr '\0' ' ' <"$folder/cmdline" | grep -F "$STATE/" || grep -F ":/$CONTROL_GROUP/" "$folder/cgroup"; } >/dev/null 2>&1; then
+      echo "process ${folder#/proc/}: $(tr '\0' ' ' <"$folder/cmdline" 2>/dev/null)"
+    fi
+  done
+}
+
+network() {
+  ip -o link show palaestra0 2>/dev/null | sed 's/^/link /' || true
+  ip route show | grep -E '(^| )198\.1[89]\.' | grep -E 'unreachable|palaestra0' | sed 's/^/route /' || true
+  ip netns list | grep -i palaestra | sed 's/^/network namespace /' || true
+}
+
+# What an engine of ours would make if it didn't keep to its own network namespace, and nodes in an engine that isn't ours.
+containers() {
+  if docker_at_hand; then
+    docker ps --all --filter "label=io.x-k8s.kind.cluster=$CLUSTER" --format 'container {{.Names}}'
+    return
+  fi
+  ip -o link show | grep -oE '(docker0|br-[0-9a-f]{12})[@:]' | sed 's/.$//; s/^/link /' || true
+  for table in filter nat mangle; do
+    iptables -t "$table" -S 2>/dev/null | grep -E 'DOCKER|KUBE-|198\.1[89]\.|palaestra' | sed "s/^/rule in $table: /" || true
+  done
+}
+
+files() {
+  awk '{print "mount " $5}' /proc/self/mountinfo | grep -F -e " $STATE/" -e " $CACHE/node/" -e " $CACHE/base/" || true
+  find /sys/fs/cgroup -maxdepth 2 -type d -name "$CONTROL_GROUP" -printf 'control group %p\n'
+  [[ ! -e $STATE ]] || echo "folder $STATE"
+}
+
+found=$(processes; network; containers; files)
+[[ -z $found ]] || { echo "$found"; exit 1; }

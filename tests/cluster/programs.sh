@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Build the programs of a cluster from Go modules (programs/*/go.mod) and print the folder that holds them.
+#   programs.sh [PROGRAM…]             all of programs/list when none is named
+#   programs.sh --built [PROGRAM…]     build nothing: exit 3, without a word, unless they are there
+# Each is kept in the cache under the content of its module, and put in place by renaming.
+set -euo pipefail
+# shellcheck source-path=SCRIPTDIR source=settings.sh
+. "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
+
+KEPT_DAYS=14 # what earlier versions left in the cache
+
+build() {
+  local program=$1 module=$2 package=$3 target=$4 part="$4.part"
+  [[ ! -x $target ]] || return 0
+  command -v go >/dev/null || die "$program can't be built: Go is missing. Install Go 1.26 (https://go.dev/dl) and repeat."
+  say "building $program"
+  mkdir -p "$(dirname "$target")"
+  "$HERE/programs/build.sh" "$module" "$package" "$part" ||
+    die "$program could not be built from $HERE/programs/$module: Go's message is above."
+  mv "$part" "$target"
+}
+
+# Make sure that a program is in the folder of this version.
+provide() {
+  local program=$1 module package kept
+  [[ ! -x $folder/$program ]] || return 0
+  [[ $build == yes ]] || exit 3
+  read -r _ module package < <(grep -E "^$program " "$HERE/programs/list") || die "$program is not in $HERE/programs/list."
+  kept="$CACHE/programs/$module-$(content_key programs/build.sh "programs/$module")/$program"
+  locked "program-$program" build "$program" "$module" "$package" "$kept"
+  mkdir -p "$folder"
+  ln -f "$kept" "$folder/$program"
+}
+
+remove_old_versions() {
+  find "$CACHE/programs" -mindepth 1 -maxdepth 1 -mtime "+$KEPT_DAYS" ! -samefile "$folder" -exec rm -rf {} +
+}
+
+build=yes
+if [[ ${1:-} == --built ]]; then
+  build=no
+  shift
+fi
+folder="$CACHE/programs/$(content_key programs)"
+programs=("$@")
+[[ $# -gt 0 ]] || mapfile -t programs < <(awk '!/^#/ {print $1}' "$HERE/programs/list")
+for program in "${programs[@]}"; do
+  provide "$program"
+done
+[[ $build == no ]] || remove_old_versions
+echo "$folder"

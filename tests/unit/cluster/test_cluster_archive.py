@@ -1,0 +1,86 @@
+"""The images that a node brings along are archives which any engine can read."""
+
+import hashlib
+import json
+import tarfile
+from pathlib import PurePosixPath
+
+import pytest
+
+from tests.cluster.archive import Image, write_archive
+
+
+@pytest.fixture
+def image(tmp_path):
+    """Return an image of one program, with a link to it and a library two folders deep."""
+    program = tmp_path / "program"
+    program.write_bytes(b"\x7fELF")
+    library = tmp_path / "library"
+    library.write_bytes(b"code")
+    return Image(
+        name="example.org/tools/program:v1",
+        entrypoint="/bin/program",
+        files={PurePosixPath("bin/program"): program, PurePosixPath("usr/lib/library.so"): library},
+        links={PurePosixPath("bin/other"): "program"},
+    )
+
+
+def contents(path):
+    """Return every file of an archive by its name."""
+    with tarfile.open(path) as archive:
+        return {member.name: archive.extractfile(member).read() for member in archive if member.isfile()}
+
+
+def blob(files, descriptor):
+    """Return what a descriptor points to."""
+    return files["blobs/sha256/" + descriptor["digest"].removeprefix("sha256:")]
+
+
+def test_every_digest_is_that_of_the_content(image, tmp_path):
+    """An engine refuses an image whose digests are wrong."""
+    write_archive(image, tmp_path / "image.tar")
+
+    blobs = {name: data for name, data in contents(tmp_path / "image.tar").items() if "/sha256/" in name}
+    assert len(blobs) == 3
+    for name, data in blobs.items():
+        assert name.rpartition("/")[2] == hashlib.sha256(data).hexdigest()
+
+
+def test_the_descriptors_lead_from_the_index_to_the_layer(image, tmp_path):
+    """Index, manifest, configuration and layer name each other, with the right sizes."""
+    write_archive(image, tmp_path / "image.tar")
+    files = contents(tmp_path / "image.tar")
+
+    entry = json.loads(files["index.json"])["manifests"][0]
+    manifest = json.loads(blob(files, entry))
+    configuration = json.loads(blob(files, manifest["config"]))
+
+    assert entry["annotations"]["io.containerd.image.name"] == "example.org/tools/program:v1"
+    assert configuration["config"]["Entrypoint"] == ["/bin/program"]
+    assert configuration["rootfs"]["diff_ids"] == [manifest["layers"][0]["digest"]]
+    for descriptor in (entry, manifest["config"], manifest["layers"][0]):
+        assert descriptor["size"] == len(blob(files, descriptor))
+
+
+def test_the_layer_holds_files_links_and_each_folder_once(image, tmp_path):
+    """A folder that is missing or doubled makes some engines refuse the layer."""
+    write_archive(image, tmp_path / "image.tar")
+    files = contents(tmp_path / "image.tar")
+    manifest = json.loads(blob(files, json.loads(files["index.json"])["manifests"][0]))
+    layer_file = tmp_path / "layer.tar"
+    layer_file.write_bytes(blob(files, manifest["layers"][0]))
+
+    with tarfile.open(layer_file) as layer:
+        names = layer.getnames()
+        link = layer.getmember("bin/other")
+
+    assert names == ["bin", "bin/other", "bin/program", "usr", "usr/lib", "usr/lib/library.so"]
+    assert (link.issym(), link.linkname) == (True, "program")
+
+
+def test_same_files_give_the_same_bytes(image, tmp_path):
+    """So an archive can be kept under the key of its content: no clock and no owner enters."""
+    write_archive(image, tmp_path / "first.tar")
+    write_archive(image, tmp_path / "second.tar")
+
+    assert (tmp_path / "first.tar").read_bytes() == (tmp_path / "second.tar").read_bytes()

@@ -1,0 +1,159 @@
+"""The scripts of the cluster find what a killed run left behind, and say what is missing."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+CLUSTER = Path(__file__).parents[2] / "cluster"
+SCRIPTS = sorted([*CLUSTER.rglob("*.sh"), CLUSTER / "node/entrypoint"])
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Return a function that runs a command in the cluster's folder, with an empty cache."""
+    environment = {**os.environ, "PALAESTRA_CACHE": str(tmp_path / "cache")}
+    environment.pop("KUBECONFIG", None)
+
+    def run_command(*command, **more):
+        return subprocess.run(
+            [str(word) for word in command],
+            cwd=CLUSTER,
+            env=environment | more,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+
+    return run_command
+
+
+@pytest.fixture
+def shell(run):
+    """Return a function that runs a line of bash with the functions of settings.sh and processes.sh."""
+    return lambda line: run("bash", "-c", f"set -euo pipefail; . ./settings.sh; . ./processes.sh; {line}")
+
+
+@pytest.mark.skipif(shutil.which("shellcheck") is None, reason="shellcheck is not installed")
+def test_shellcheck_finds_nothing(run):
+    """It knows the traps of quoting better than people do."""
+    result = run("shellcheck", "-x", *SCRIPTS)
+
+    assert result.stdout == ""
+
+
+def test_a_recorded_process_is_found_while_it_runs(shell):
+    """The record keeps its truth over exec: that is how the engine is found again."""
+    result = shell("""
+        (record_process "$CACHE.pid"; exec sleep 60) & started=$!
+        wait_until 10 test -f "$CACHE.pid"
+        [[ $(recorded_process "$CACHE.pid") == "$started" ]] && echo found
+        kill $started; wait $started || true
+        recorded_process "$CACHE.pid" || echo gone
+    """)
+
+    assert result.stdout.split() == ["found", "gone"]
+
+
+def test_another_process_with_the_recorded_id_is_left_alone(shell):
+    """Ids are given again: without the start time a stranger would be killed."""
+    result = shell("""
+        echo "$$ 1 $(cat /proc/sys/kernel/random/boot_id)" >"$CACHE.pid"
+        recorded_process "$CACHE.pid" || echo stranger
+    """)
+
+    assert result.stdout.strip() == "stranger"
+
+
+def test_waiting_ends_at_its_deadline(shell):
+    """A cluster that hangs is an error, not an endless wait."""
+    assert shell("wait_until 1 false || echo late").stdout.strip() == "late"
+
+
+def test_a_lock_is_not_passed_on_to_what_is_started(shell):
+    """A daemon that inherited it would block the next call for ever."""
+    result = shell("""
+        start() { sleep 60 & echo $! >"$CACHE.pid"; }
+        locked name start
+        timeout 5 bash -c ". ./settings.sh; locked name echo free"
+        kill "$(cat "$CACHE.pid")"
+    """)
+
+    assert result.stdout.strip() == "free"
+
+
+def test_what_is_left_of_a_cluster_is_told(run, tmp_path):
+    """Removing a cluster ends with this check: a process or a folder that stays is an error."""
+    state = tmp_path / "cache/kind"
+    state.mkdir(parents=True)
+    (state / "way").touch()
+
+    with subprocess.Popen(
+        ["/usr/bin/env", "--", "tail", "-f", state / "way"], stdout=subprocess.DEVNULL
+    ) as left:
+        result = run("./leftovers.sh")
+        left.kill()
+
+    assert result.returncode == 1
+    assert f"folder {state}" in result.stdout
+    assert f"process {left.pid}: " in result.stdout
+
+
+def test_the_key_of_a_folder_changes_with_its_content_only(shell):
+    """Else a stale node image would be used, or a good one made again."""
+    result = shell(
+        """
+        mkdir -p "$CACHE"; HERE=$CACHE; mkdir a; echo 1 >a/x; echo 2 >a/y
+        content_key a; touch a/x; content_key a; echo 3 >a/y; content_key a
+    """.replace("mkdir a;", 'cd "$CACHE"; mkdir a;')
+    )
+
+    first, touched, changed = result.stdout.split()
+    assert first == touched != changed
+
+
+def test_asking_for_built_programs_builds_nothing(run):
+    """Tests that need them are skipped where they were never built."""
+    result = run("./programs.sh", "--built", "etcd")
+
+    assert (result.returncode, result.stdout, result.stderr) == (3, "", "")
+
+
+@pytest.mark.parametrize(
+    ("command", "environment", "message"),
+    [
+        (["./programs.sh", "emacs"], {}, "emacs is not in"),
+        (["./up.sh"], {"PALAESTRA_CLUSTER": "cloud"}, 'PALAESTRA_CLUSTER is "cloud", but it is one of'),
+        (["./up.sh"], {"PALAESTRA_CLUSTER": "existing"}, "PALAESTRA_CLUSTER=existing needs KUBECONFIG"),
+        (["./load.sh", "image.tar"], {}, "no cluster stands: make cluster"),
+        (["./programs.sh", "etcd"], {"PATH": "/usr/bin:/bin"}, "Go is missing. Install Go"),
+    ],
+)
+def test_a_mistake_is_told_with_its_remedy(run, command, environment, message):
+    """The thing, the fact, the remedy."""
+    if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
+        pytest.skip("Go is installed beside the system's programs")
+
+    result = run(*command, **environment)
+
+    assert result.returncode == 1
+    assert message in result.stderr
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+def test_missing_packages_are_one_line_to_type_for_who_is_not_root(run):
+    """Nothing is installed behind the back of a person, and nothing is half done."""
+    nobody = ("setpriv", "--reuid", "65534", "--clear-groups")
+    if run(*nobody, "test", "-r", CLUSTER / "settings.sh").returncode:
+        pytest.skip("another user can't read this checkout")
+
+    result = run(*nobody, "./packages.sh", "no-such-package", HOME="/nonexistent")
+
+    assert result.returncode == 1
+    assert (
+        "sudo apt-get update && sudo apt-get install -y --no-install-recommends no-such-package"
+        in result.stderr
+    )
