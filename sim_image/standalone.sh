@@ -1,0 +1,41 @@
+#!/bin/sh
+# Make a folder that holds the sidecar and everything it needs but a shell: Python, its libraries, the C library.
+# It runs where it is copied to, in any Linux image of this machine's processor, whatever that image holds.
+# Run inside the stub's image, when the packages are installed. Argument: the folder.
+set -eu
+target=$1
+python=$(readlink -f /usr/bin/python3)
+name=$(basename "$python")
+installed=/usr/local/lib/$name/dist-packages
+own=$target/lib/python3/dist-packages # where Debian's Python looks below its own prefix
+
+mkdir -p "$target/bin" "$own"
+cp "$python" "$target/lib/$name.program"
+cp -a "/usr/lib/$name" "$target/lib/"
+cd "$target/lib/$name"
+rm -rf EXTERNALLY-MANAGED config-* ensurepip idlelib lib2to3 pydoc_data sitecustomize.py tkinter turtledemo test unittest
+rm -f lib-dynload/_curses* lib-dynload/_dbm* lib-dynload/_sqlite3* lib-dynload/readline*
+
+cp -a "$installed"/prometheus_client* "$installed"/palaestra_sim* "$own/"
+rm -rf "$own/palaestra_sim/stub"
+
+for program in "$target/lib/$name.program" lib-dynload/*.so; do
+  ldd "$program"
+done | grep -o '/[^ ]*' | sort -u | while read -r library; do
+  cp -L "$library" "$target/lib/"
+done
+loader=$(basename "$(ldd "$target/lib/$name.program" | grep -o '/[^ ]*/ld-linux[^ ]*')")
+
+# The loader is named by its path, since the image's own may be older, or not be there. Nothing of this goes
+# into the environment: the simulator inherits that.
+cat >"$target/bin/python3" <<SCRIPT
+#!/bin/sh
+root=\$(cd "\${0%/*}/.." && pwd)
+exec "\$root/lib/$loader" --argv0 "\$root/bin/python3" --library-path "\$root/lib" "\$root/lib/$name.program" "\$@"
+SCRIPT
+cat >"$target/palaestra-sidecar" <<'SCRIPT'
+#!/bin/sh
+exec "${0%/*}/bin/python3" -I -B -u -m palaestra_sim.sidecar.cli "$@"
+SCRIPT
+chmod 755 "$target/bin/python3" "$target/palaestra-sidecar"
+"$target/palaestra-sidecar" --help >/dev/null

@@ -1,0 +1,101 @@
+"""What every Dockerfile keeps to; the linters for them are no Python packages."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tools.images.lock import PYTHON
+from tools.images.recipes import recipes
+
+ROOT = Path(__file__).parents[3]
+RECIPES = tuple(recipes("debian").values())
+
+
+@pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.name)
+def recipe(request):
+    """Return each image."""
+    return request.param
+
+
+@pytest.fixture
+def instructions(recipe):
+    """Return the Dockerfile as pairs of an instruction and its argument, comments and line ends removed."""
+    text = re.sub(r"^\s*#.*\n", "", (ROOT / recipe.dockerfile).read_text(), flags=re.MULTILINE)
+    lines = re.sub(r"\\\n\s*", "", text).splitlines()
+    return [tuple(line.split(maxsplit=1)) for line in lines if line.strip()]
+
+
+def values(instructions, wanted):
+    """Return the arguments of all instructions of one kind."""
+    return [value for instruction, value in instructions if instruction == wanted]
+
+
+def test_an_image_runs_as_a_user_without_rights(instructions):
+    """By number: a cluster that refuses root can't look up a name."""
+    assert values(instructions, "USER") == ["65532:65532"]
+    assert [each for each, _ in instructions].index("USER") > [each for each, _ in instructions].index("RUN")
+
+
+def test_an_image_has_debian_trixie_as_its_base_unless_another_is_named(instructions):
+    """A base that is called `latest` is another one tomorrow."""
+    assert values(instructions, "FROM") == ["${BASE}"]
+    assert "BASE=docker.io/library/debian:trixie-slim" in values(instructions, "ARG")
+
+
+def test_every_use_of_apt_is_without_recommendations_and_cleans_up(instructions):
+    """What is left in a layer stays in the image, also when a later one deletes it."""
+    runs = [run for run in values(instructions, "RUN") if "apt-get" in run]
+
+    assert runs
+    for run in runs:
+        assert "apt-get -qy install --no-install-recommends" in run
+        assert run.index("apt-get -q update") < run.index("install")
+        assert "apt-get -q clean" in run
+        assert "rm -rf /var/lib/apt/lists/*" in run
+
+
+def test_packages_are_installed_by_hash_from_the_context_alone(instructions):
+    """No index is asked in a build, so none has to be reachable, trusted or up to date."""
+    locked, ours = (run for run in values(instructions, "RUN") if "uv pip install" in run)
+
+    assert all("--no-index" in run and "--no-cache" in run and "--no-deps" in run for run in (locked, ours))
+    assert "--require-hashes" in locked
+    assert "--requirements /context/requirements.txt" in locked
+    assert "/context/packages/*.whl" in ours
+
+
+def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
+    """The root file system is read-only in a pod."""
+    assert "PYTHONDONTWRITEBYTECODE=1" in values(instructions, "ENV")
+    assert all("--compile-bytecode" in run for run in values(instructions, "RUN") if "uv pip" in run)
+
+
+def test_what_changes_most_comes_last(instructions):
+    """A changed source builds one layer anew, not PyTorch."""
+    order = [f"{instruction} {value}" for instruction, value in instructions]
+
+    assert order.index("ARG REQUIREMENTS") < order.index("ARG PACKAGES") < order.index("ARG VERSION")
+
+
+def test_the_labels_say_what_is_inside(instructions, recipe):
+    """`inspect` answers without running anything."""
+    (labels,) = values(instructions, "LABEL")
+    found = dict(re.findall(r'org\.opencontainers\.image\.(\w+)="([^"]*)"', labels))
+
+    assert found["title"] == f"palaestra-{recipe.name}"
+    assert found["version"] == "${VERSION}"
+    assert found["revision"] == "${REVISION}"
+    assert found["licenses"] == "Apache-2.0"
+
+
+def test_no_dockerfile_copies_or_adds(instructions):
+    """What is mounted leaves no layer; what were copied would stay in one."""
+    assert not {"COPY", "ADD"} & {instruction for instruction, _ in instructions}
+
+
+def test_folders_with_the_version_of_python_are_those_of_the_lock():
+    """The Python of the base decides both."""
+    for recipe in RECIPES:
+        found = re.findall(r"/python(3\.\d+)/", (ROOT / recipe.dockerfile).read_text())
+        assert set(found) <= {PYTHON}

@@ -1,0 +1,115 @@
+"""Docker builds where it can; else the reason to do without it is found before anything is built."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tools.images import programs
+from tools.images.engines import Docker, Order
+from tools.images.errors import ImagesError
+
+# Answers what is asked of it by the words in DOCKER_KNOWS; notes every call; saves "saved".
+DOCKER = """#!/bin/bash
+echo "$@" >>"$DOCKER_CALLS"
+for word in $DOCKER_KNOWS; do [[ $word == "$1" || $word == "$1-$2" ]] && known=yes; done
+[[ ${known:-} ]] || exit 1
+case "$1-$2" in
+  image-inspect) echo sha256:abc ;;
+  save-*) echo saved >"${2#--output=}" ;;
+esac
+"""
+EVERYTHING = "version buildx-version buildx-build image-inspect pull save"
+
+
+@pytest.fixture
+def docker(tmp_path, monkeypatch):
+    """Return a function that sets what the `docker` on the PATH can do, and the file of its calls."""
+    program, calls = tmp_path / "bin" / "docker", tmp_path / "calls"
+    program.parent.mkdir()
+    program.write_text(DOCKER)
+    program.chmod(0o755)
+    calls.touch()
+    monkeypatch.setenv("PATH", f"{program.parent}:{os.environ['PATH']}")
+    monkeypatch.setenv("DOCKER_CALLS", str(calls))
+
+    def knows(words):
+        monkeypatch.setenv("DOCKER_KNOWS", words)
+        return calls
+
+    return knows
+
+
+@pytest.fixture
+def order(tmp_path):
+    """Return an order for an image."""
+    return Order(
+        reference="docker.io/library/palaestra-stub:1.2.3",
+        dockerfile=Path("/context/Dockerfile"),
+        context=Path("/context"),
+        arguments={"VERSION": "1.2.3"},
+        archive=tmp_path / "stub.tar",
+        log=tmp_path / "stub.log",
+    )
+
+
+@pytest.mark.parametrize("lacking", ["version", "buildx-version"])
+def test_without_an_engine_or_buildx_there_is_no_docker(docker, lacking):
+    """The client alone is installed on many machines, and an old engine knows no mounts in a build."""
+    docker(" ".join(word for word in EVERYTHING.split() if word != lacking))
+
+    assert Docker.here() is None
+
+
+def test_without_a_base_image_to_be_had_there_is_no_docker(docker):
+    """No registry may be reachable; buildah makes a base of its own."""
+    calls = docker("version buildx-version")
+
+    assert Docker.here() is None
+    assert "pull --quiet docker.io/library/debian:trixie-slim" in calls.read_text()
+
+
+def test_a_base_image_that_is_there_is_not_pulled(docker):
+    """Building works without a network, and pulling is counted by registries."""
+    calls = docker(EVERYTHING)
+    found = Docker.here()
+
+    assert found is not None
+    assert found.base().digest == "sha256:abc"
+    assert "pull" not in calls.read_text()
+
+
+def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
+    """The Dockerfile says what they mean."""
+    calls = docker(EVERYTHING)
+    Docker.here().build(order)
+
+    assert order.archive.read_text() == "saved\n"
+    assert "--build-arg=VERSION=1.2.3 /context" in calls.read_text()
+
+
+def test_a_failed_build_leaves_no_archive(docker, order):
+    """An archive that is there is whole."""
+    docker(EVERYTHING)
+    engine = Docker.here()
+    docker("save")
+
+    with pytest.raises(ImagesError, match=r"docker: ended with 1; its whole output is in .*stub\.log"):
+        engine.build(order)
+    assert not order.archive.exists()
+
+
+def test_a_failure_shows_the_last_lines(tmp_path):
+    """The cause is read where the command was typed."""
+    with pytest.raises(ImagesError, match=r"(?s)sh: ended with 3; .*\nline 99$"):
+        programs.run(
+            ["sh", "-c", "for i in $(seq 99); do echo line $i; done; exit 3"],
+            log=tmp_path / "log",
+            deadline_s=30,
+        )
+
+
+def test_a_program_that_takes_too_long_is_ended(tmp_path):
+    """A build that hangs is a failed one."""
+    with pytest.raises(ImagesError, match=r"sleep: was not done after 0 s"):
+        programs.run(["sleep", "60"], log=tmp_path / "log", deadline_s=0.2)

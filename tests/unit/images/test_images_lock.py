@@ -1,0 +1,113 @@
+"""An image holds the locked versions of what its packages need, and nothing else."""
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tools.images.lock import parse, share
+from tools.images.recipes import project, recipes
+
+ROOT = Path(__file__).parents[3]
+LOCK = parse((ROOT / "requirements.lock").read_text())
+SMALL = """\
+child==1.0 \\
+    --hash=sha256:aa \\
+    --hash=sha256:bb
+    # via parent
+new-python-only==2.0 ; python_full_version >= '3.12' \\
+    --hash=sha256:cc
+    # via parent
+old-python-only==2.0 ; python_full_version < '3.12' \\
+    --hash=sha256:dd
+    # via parent
+parent==3.1 \\
+    --hash=sha256:ee
+    # via
+    #   palaestra (operator/pyproject.toml)
+    #   stranger
+stranger==4.0 \\
+    --hash=sha256:ff
+
+# The following packages were excluded from the output:
+# palaestra-sim
+"""
+
+
+def names(requirements):
+    """Return the names in a requirements file."""
+    return set(re.findall(r"^([a-z0-9-]+)==", requirements, re.MULTILINE))
+
+
+def test_a_share_holds_what_is_needed_also_by_way_of_others():
+    """`child` is wanted by `parent` alone, and `parent` by us."""
+    assert {"parent", "child"} <= names(share(parse(SMALL), ["palaestra"], "x86_64"))
+
+
+def test_a_share_holds_nothing_that_only_others_need():
+    """Linters and test tools have no place in an image."""
+    assert "stranger" not in names(share(parse(SMALL), ["palaestra"], "x86_64"))
+
+
+def test_markers_are_decided_for_the_python_of_the_image():
+    """The machine that builds may have an older one."""
+    chosen = names(share(parse(SMALL), ["palaestra"], "x86_64"))
+
+    assert "new-python-only" in chosen
+    assert "old-python-only" not in chosen
+
+
+def test_what_is_left_out_takes_along_what_only_it_needs():
+    """Debian's PyTorch stands in for the locked one, and brings libraries of its own."""
+    assert names(share(parse(SMALL), ["palaestra"], "x86_64", without=["parent"])) == set()
+
+
+def test_a_share_keeps_every_hash():
+    """A wheel that is not the locked one is refused by the installer."""
+    requirements = share(parse(SMALL), ["palaestra"], "x86_64")
+
+    assert "child==1.0 \\\n    --hash=sha256:aa \\\n    --hash=sha256:bb\n" in requirements
+
+
+def test_a_lock_of_another_form_is_refused_with_the_line():
+    """Leaving out what is not understood would make an image that lacks it."""
+    with pytest.raises(ValueError, match=r"'child @ file:///child' has no version with hashes"):
+        parse("child @ file:///child\n    # via palaestra\n")
+
+
+@given(st.lists(st.sampled_from(["palaestra", "palaestra-sim", "palaestra-trainer"]), unique=True))
+def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages):
+    """What is written can be read, so nothing is lost or invented on the way."""
+    pins = {pin.name: pin for pin in LOCK if "python_full_version <" not in (pin.marker or "")}
+    for pin in parse(share(LOCK, packages, "x86_64")):
+        assert pin.hashes == pins[pin.name].hashes
+        assert pin.version == pins[pin.name].version
+
+
+@pytest.mark.parametrize(
+    ("image", "holds", "lacks"),
+    [
+        ("stub", {"prometheus-client"}, {"numpy", "pydantic", "torch", "pytest"}),
+        ("operator", {"pydantic", "structlog", "prometheus-client"}, {"numpy", "torch", "pytest"}),
+        ("trainer", {"numpy", "stable-baselines3", "gymnasium", "pydantic"}, {"torch", "triton", "pytest"}),
+    ],
+)
+def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
+    """A sidecar stays small, and the trainer for the processor is without 5 GB of CUDA."""
+    recipe = recipes("debian")[image]
+    ours = [project(ROOT, package)["name"] for package in recipe.packages]
+    chosen = names(share(LOCK, ours, "x86_64", recipe.without))
+
+    assert holds <= chosen
+    assert not lacks & chosen
+
+
+def test_the_trainer_for_cuda_has_the_locked_torch_and_its_libraries():
+    """Debian's is built for the processor alone."""
+    recipe = recipes("cuda")["trainer"]
+
+    assert {"torch", "triton", "nvidia-cudnn-cu12"} <= names(
+        share(LOCK, ["palaestra-trainer"], "x86_64", recipe.without)
+    )

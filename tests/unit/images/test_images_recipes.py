@@ -1,0 +1,79 @@
+"""The digest that names an archive says everything that goes into it."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tools.images.recipes import digest, digest_of_files, recipes, sources
+
+ROOT = Path(__file__).parents[3]
+
+
+@given(st.lists(st.binary(max_size=4)), st.lists(st.binary(max_size=4)))
+def test_different_parts_have_different_digests(one, other):
+    """Where one part ends and the next begins counts: a, bc is not ab, c."""
+    assert (digest(one) == digest(other)) == (one == other)
+
+
+def test_a_changed_file_changes_the_digest(tmp_path):
+    """Nothing stale is used."""
+    file = tmp_path / "module.py"
+    file.write_text("1")
+    before = digest_of_files(tmp_path, [file])
+    file.write_text("2")
+
+    assert digest_of_files(tmp_path, [file]) != before
+
+
+def test_a_renamed_file_changes_the_digest(tmp_path):
+    """A module is known by its name."""
+    one, other = tmp_path / "one.py", tmp_path / "other.py"
+    one.write_text("1")
+    before = digest_of_files(tmp_path, [one])
+    one.rename(other)
+
+    assert digest_of_files(tmp_path, [other]) != before
+
+
+def test_the_place_of_the_checkout_does_not_change_the_digest(tmp_path):
+    """Two checkouts share what is built."""
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "module.py").write_text("1")
+
+    assert digest_of_files(tmp_path / "one", [tmp_path / "one" / "module.py"]) == digest_of_files(
+        tmp_path / "other", [tmp_path / "other" / "module.py"]
+    )
+
+
+def test_what_python_leaves_behind_changes_nothing(tmp_path):
+    """Running the tests must not make every image be built again."""
+    source = tmp_path / "package" / "src" / "module.py"
+    source.parent.mkdir(parents=True)
+    source.write_text("1")
+    cached = source.parent / "__pycache__" / "module.cpython-313.pyc"
+    cached.parent.mkdir()
+    cached.write_bytes(b"\0")
+
+    assert cached not in set(sources(tmp_path, "package"))
+    assert source in set(sources(tmp_path, "package"))
+
+
+@pytest.mark.parametrize("recipe", recipes("debian").values(), ids=lambda recipe: recipe.name)
+def test_a_recipe_names_what_is_there(recipe):
+    """A recipe is checked before anybody waits for a build."""
+    assert (ROOT / recipe.dockerfile).is_file()
+    assert all((ROOT / file).is_file() for file in recipe.files)
+    assert all((ROOT / package / "pyproject.toml").is_file() for package in recipe.packages)
+
+
+def test_an_image_has_the_name_that_the_plan_asks_for():
+    """A cluster adds the registry to a name without a host."""
+    from palaestra.plan import Images  # noqa: PLC0415 - read here as what the name is compared with
+
+    images = Images.of_release("1.2.3")
+
+    assert recipes("debian")["stub"].reference("1.2.3") == f"docker.io/library/{images.stub}"
+    assert recipes("debian")["trainer"].reference("1.2.3") == f"docker.io/library/{images.trainer}"

@@ -1,0 +1,5 @@
+#!/usr/bin/env bash
+# Build the container images that have changed; --help says more.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+exec .venv/bin/python -m tools.images "$@"

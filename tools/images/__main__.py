@@ -1,0 +1,65 @@
+"""`make images`: build what has changed, and say where the archives are."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tools.images import cache
+from tools.images.building import Built, Workshop, say
+from tools.images.engines import Buildah, Docker
+from tools.images.errors import ImagesError
+from tools.images.recipes import recipes
+
+ROOT = Path(__file__).parents[2]
+LOCK_DEADLINE_S = 3600  # of another call, which may be building everything
+INTERRUPTED = 130
+EPILOG = "Archives are kept in $PALAESTRA_CACHE/images (default: ~/.cache/palaestra), the last three of each."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Build the images that were named; return 0, 1 when one could not be built, or 130 after Ctrl-C."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    known = recipes(options.torch)
+    if unknown := [name for name in options.names if name not in known]:
+        parser.error(f"{unknown[0]} is no image; choose from {', '.join(known)}")
+    folder = cache.folder() / "images"
+    try:
+        with cache.locked(cache.folder() / "locks" / "images", LOCK_DEADLINE_S):
+            engine = Docker.here() or Buildah.here(folder, ROOT)
+            workshop = Workshop(root=ROOT, engine=engine, folder=folder)
+            built = {name: workshop.build(known[name], options.tag) for name in options.names or known}
+    except ImagesError as error:
+        say(str(error))
+        return 1
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    for name, image in built.items():
+        sys.stdout.write(f"{name}={image.archive}\n" if options.archives else _row(image))
+    return 0
+
+
+def _row(image: Built) -> str:
+    return f"{image.reference}  {image.archive.stat().st_size / 1e6:,.0f} MB  {image.archive}\n"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tools/images.sh", description="Build the container images that have changed.", epilog=EPILOG
+    )
+    add = parser.add_argument
+    add("names", nargs="*", metavar="NAME", help="of stub, trainer, operator; default: all")
+    add(
+        "--torch",
+        choices=("debian", "cuda"),
+        default="debian",
+        help="the trainer's PyTorch (default: %(default)s)",
+    )
+    add("--tag", help="tag of the images; default: the version")
+    add("--archives", action="store_true", help="print lines of NAME=ARCHIVE, for scripts")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""The project's cache, outside of the checkout: where it lies, whose turn it is, what is removed."""
+
+import fcntl
+import os
+import shutil
+import signal
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+from tools.images.errors import ImagesError
+
+
+def folder(environment: Mapping[str, str] = os.environ) -> Path:
+    """Return the cache's folder, absolute."""
+    if chosen := environment.get("PALAESTRA_CACHE"):
+        return Path(chosen).absolute()
+    users = environment.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(users).absolute() / "palaestra"
+
+
+@contextmanager
+def locked(file: Path, deadline_s: int) -> Iterator[None]:
+    """Hold a lock, so that two calls never make the same; the system lets go of it, however we end.
+
+    For the main thread, as the wait for the other call is ended by SIGALRM.
+
+    Raises:
+        ImagesError: another call has held it for `deadline_s`.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("w") as handle:
+        signal.signal(signal.SIGALRM, partial(_give_up, file))
+        signal.alarm(deadline_s)
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        signal.alarm(0)
+        yield
+
+
+def use(path: Path) -> None:
+    """Note that a file or folder is in use. It stays as old as its content is, by which others know it."""
+    os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))
+
+
+def prune(paths: Iterable[Path], kept: int) -> None:
+    """Remove all of these files and folders but those that were used last."""
+    for path in sorted(paths, key=lambda path: path.stat().st_atime_ns, reverse=True)[kept:]:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
+
+
+def _give_up(file: Path, *_: object) -> None:
+    raise ImagesError(f"{file}: another call holds it for too long; end that one (`fuser {file}` names it)")

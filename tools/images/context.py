@@ -1,0 +1,118 @@
+"""The folder that an image is built from: what goes into the image, and nothing else.
+
+Wheels are fetched and made here, where the index, its proxy and its certificates are known to pip; the
+build itself asks no index. They stay in the cache, so that only a changed lock fetches again.
+"""
+
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tools.images import cache, lock, programs
+from tools.images.errors import ImagesError
+from tools.images.recipes import Recipe, digest, digest_of_files, project, sources
+
+_FETCH_OPTIONS = (
+    *("--disable-pip-version-check", "--progress-bar=off"),
+    *("--no-deps", "--require-hashes", "--only-binary=:all:"),
+    *(f"--python-version={lock.PYTHON}", "--implementation=cp", f"--abi=cp{lock.PYTHON.replace('.', '')}"),
+)
+_FETCH_DEADLINE_S = 1800  # PyTorch with CUDA is 3 GB
+_MAKE_DEADLINE_S = 120
+_OLDEST_GLIBC, _NEWEST_GLIBC = 5, 41  # 2.41 is Debian trixie's
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What goes into one image: the locked share of other packages, and digests of that and of ours."""
+
+    requirements: str
+    requirements_digest: str
+    packages_digest: str
+
+
+def contents(root: Path, recipe: Recipe, machine: str) -> Contents:
+    """Return what goes into an image for a `machine` (x86_64).
+
+    Raises:
+        ImagesError: the lock is not as `make lock` writes it.
+    """
+    names = [project(root, package)["name"] for package in recipe.packages]
+    try:
+        pins = lock.parse((root / "requirements.lock").read_text())
+    except ValueError as error:
+        raise ImagesError(str(error)) from error
+    requirements = lock.share(pins, names, machine, recipe.without)
+    ours = [path for package in recipe.packages for path in sources(root, package)]
+    files = [root / file for file in recipe.files]
+    return Contents(
+        requirements=requirements,
+        requirements_digest=digest((requirements, machine)),
+        packages_digest=digest_of_files(root, (*ours, *files)),
+    )
+
+
+def fill(folder: Path, root: Path, recipe: Recipe, inside: Contents, *, wheels: Path, machine: str) -> None:
+    """Make `folder` the context of an image; wheels of others are kept in the folder `wheels`.
+
+    Raises:
+        ImagesError: a wheel cannot be fetched or made.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "requirements.txt").write_text(inside.requirements)
+    fetched = _fetched(wheels / inside.requirements_digest, inside, machine)
+    shutil.copytree(fetched, folder / "wheels", copy_function=os.link)
+    shutil.copy(_uv(), folder / "uv")
+    for file in recipe.files:
+        shutil.copy(root / file, folder)
+    for package in recipe.packages:
+        _make_wheel(root / package, folder / "packages")
+
+
+def _fetched(kept: Path, inside: Contents, machine: str) -> Path:
+    """Return the folder of the locked wheels, fetched whole or not at all."""
+    if kept.exists():
+        cache.use(kept)
+        return kept
+    part = kept.with_name(f"{kept.name}.part")
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    listed, log = part / "requirements.txt", part / "pip.log"
+    listed.write_text(inside.requirements)
+    fetch = [sys.executable, "-m", "pip", "download", *_FETCH_OPTIONS, f"--dest={part}"]
+    platforms = (f"--platform={platform}" for platform in _platforms(machine))
+    programs.run([*fetch, *platforms, f"--requirement={listed}"], log=log, deadline_s=_FETCH_DEADLINE_S)
+    listed.unlink()
+    log.unlink()
+    part.rename(kept)
+    return kept
+
+
+def _platforms(machine: str) -> Iterator[str]:
+    """Yield the tags of wheels that run on trixie, the best first."""
+    for minor in range(_NEWEST_GLIBC, _OLDEST_GLIBC - 1, -1):
+        yield f"manylinux_2_{minor}_{machine}"
+    yield from (f"manylinux2014_{machine}", f"manylinux1_{machine}", f"linux_{machine}")
+
+
+def _make_wheel(package: Path, target: Path) -> None:
+    programs.run(
+        [
+            *(_uv(), "build", "--quiet", "--wheel", "--no-build-isolation", "--offline"),
+            *("--python", sys.executable, "--out-dir", str(target), str(package)),
+        ],
+        log=target.with_suffix(".log"),
+        deadline_s=_MAKE_DEADLINE_S,
+    )
+
+
+def _uv() -> str:
+    """Return the path of uv, in the version that the lock names."""
+    beside = Path(sys.executable).with_name("uv")
+    if not beside.exists():
+        raise ImagesError(f"{beside}: is missing; run `make setup`")
+    return str(beside)

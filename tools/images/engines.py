@@ -1,0 +1,180 @@
+"""What builds an image: Docker where its engine answers and has the base image, else buildah.
+
+Both build the same Dockerfiles, and leave a docker archive, which `kind load image-archive` takes.
+"""
+
+import hashlib
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, Self
+
+from tools.images import programs
+from tools.images.errors import ImagesError
+
+DEBIAN = "docker.io/library/debian:trixie-slim"
+# Neither the mounts nor the processes of a build outlive it, also when it is killed.
+_ISOLATED = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--")
+_ASK_DEADLINE_S = 20
+_PULL_DEADLINE_S = 180
+_STEP_DEADLINE_S = 600
+_BUILD_DEADLINE_S = 3600
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Base:
+    """The base image: its name, and a digest that says its content."""
+
+    name: str
+    digest: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """One image to be built: its full name, what from, and the archive to be written."""
+
+    reference: str
+    dockerfile: Path
+    context: Path
+    arguments: Mapping[str, str]
+    archive: Path
+    log: Path
+
+
+class Engine(Protocol):
+    """Builds images."""
+
+    def base(self) -> Base:
+        """Return the base image.
+
+        Raises:
+            ImagesError: there is none to be had.
+        """
+        ...
+
+    def build(self, order: Order) -> None:
+        """Build an image and write its archive, whole or not at all.
+
+        Raises:
+            ImagesError: a step failed.
+        """
+        ...
+
+
+class Docker:
+    """Docker Engine, with its own cache of layers."""
+
+    def __init__(self, base: Base) -> None:
+        self._base = base
+
+    @classmethod
+    def here(cls, image: str = DEBIAN) -> Self | None:
+        """Return Docker if its engine answers, can build, and has the base image or can pull it."""
+        for question in (["docker", "version"], ["docker", "buildx", "version"]):
+            if programs.answer(question, deadline_s=_ASK_DEADLINE_S) is None:
+                return None
+        inspect = ["docker", "image", "inspect", "--format={{.Id}}", image]
+        found = programs.answer(inspect, deadline_s=_ASK_DEADLINE_S)
+        if found is None:
+            programs.answer(["docker", "pull", "--quiet", image], deadline_s=_PULL_DEADLINE_S)
+            found = programs.answer(inspect, deadline_s=_ASK_DEADLINE_S)
+        return cls(Base(name=image, digest=found)) if found is not None else None
+
+    def base(self) -> Base:
+        """Return Debian's own image."""
+        return self._base
+
+    def build(self, order: Order) -> None:
+        """Build by `docker buildx build`, and write the archive by `docker save`."""
+        build = ["docker", "buildx", "build", "--load", "--progress=plain"]
+        programs.run([*build, *_what(order)], log=order.log, deadline_s=_BUILD_DEADLINE_S)
+        part = order.archive.with_suffix(".part")
+        save = ["docker", "save", f"--output={part}", order.reference]
+        programs.run(save, log=_beside(order.log, "archive"), deadline_s=_STEP_DEADLINE_S)
+        part.rename(order.archive)
+
+
+class Buildah:
+    """buildah with a store of its own in the cache; its base image is a tree made by debootstrap.
+
+    Steps run in a chroot, as builds inside a container must, and use this machine's network.
+    """
+
+    def __init__(self, folder: Path, tree: Path) -> None:
+        self._tree = tree
+        self._logs = folder / "logs"
+        self._base = Base(name=f"localhost/{tree.stem}", digest=tree.stem)
+        # What is mounted is remembered where a restart of the machine forgets it, as the mounts are.
+        mounted = Path("/run") / f"palaestra-{hashlib.sha256(os.fsencode(folder)).hexdigest()[:12]}"
+        self._store = (f"--root={folder / 'store'}", f"--runroot={mounted}", "--storage-driver=overlay")
+
+    @classmethod
+    def here(cls, folder: Path, root: Path) -> Self:
+        """Return buildah, installed if it is missing, with the tree that tests/cluster/base.sh makes.
+
+        The caller holds the lock of `folder`: containers that a killed build left in it are removed.
+
+        Raises:
+            ImagesError: this is not root, or a part cannot be had.
+        """
+        if os.geteuid() != 0:
+            raise ImagesError(
+                "no Docker Engine with buildx and debian:trixie-slim answers, and without one the images are "
+                "built by root; start Docker, or repeat this with sudo"
+            )
+        logs = folder / "logs"
+        if shutil.which("buildah") is None:
+            install = "apt-get update && apt-get install -y --no-install-recommends buildah"
+            programs.run(["sh", "-c", install], log=logs / "apt.log", deadline_s=_STEP_DEADLINE_S)
+        tree = programs.answer([str(root / "tests" / "cluster" / "base.sh")], deadline_s=_STEP_DEADLINE_S)
+        if tree is None:
+            raise ImagesError("tests/cluster/base.sh: made no Debian tree; run it to see why")
+        found = cls(folder, Path(tree))
+        found._answer("rm", "--all")
+        if found._answer("inspect", "--type=image", found._base.name) is None:
+            found._import_tree()
+        return found
+
+    def base(self) -> Base:
+        """Return the tree's image; the tree's file is named by what it was made from."""
+        return self._base
+
+    def build(self, order: Order) -> None:
+        """Build by `buildah build`, and write the archive by `buildah push`."""
+        build = ("build", "--layers", "--pull-never", "--isolation=chroot")
+        self._run([*build, *_what(order)], log=order.log, deadline_s=_BUILD_DEADLINE_S)
+        part = order.archive.with_suffix(".part")
+        part.unlink(missing_ok=True)  # buildah would add to it
+        push = ("push", "--quiet", order.reference, f"docker-archive:{part}:{order.reference}")
+        self._run(push, log=_beside(order.log, "archive"), deadline_s=_STEP_DEADLINE_S)
+        part.rename(order.archive)
+        self._answer("rmi", "--prune")
+
+    def _import_tree(self) -> None:
+        dockerfile = self._logs / "Dockerfile.base"
+        dockerfile.parent.mkdir(parents=True, exist_ok=True)
+        dockerfile.write_text(f'FROM scratch\nADD {self._tree.name} /\nCMD ["bash"]\n')
+        build = ("build", "--isolation=chroot", f"--tag={self._base.name}", f"--file={dockerfile}")
+        self._run([*build, str(self._tree.parent)], log=self._logs / "base.log", deadline_s=_STEP_DEADLINE_S)
+
+    def _run(self, arguments: Sequence[str], *, log: Path, deadline_s: float) -> None:
+        programs.run([*_ISOLATED, "buildah", *self._store, *arguments], log=log, deadline_s=deadline_s)
+
+    def _answer(self, *arguments: str) -> str | None:
+        return programs.answer([*_ISOLATED, "buildah", *self._store, *arguments], deadline_s=_STEP_DEADLINE_S)
+
+
+def _what(order: Order) -> list[str]:
+    """Return the arguments that say what is built; the same for both."""
+    return [
+        f"--tag={order.reference}",
+        f"--file={order.dockerfile}",
+        *(f"--build-arg={name}={value}" for name, value in order.arguments.items()),
+        str(order.context),
+    ]
+
+
+def _beside(log: Path, what: str) -> Path:
+    return log.with_name(f"{log.stem}-{what}.log")

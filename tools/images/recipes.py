@@ -1,0 +1,87 @@
+"""The images: what each is made of."""
+
+import hashlib
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+REGISTRY = "docker.io/library"  # what a cluster adds to a name without a host
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """One image.
+
+    `packages` are folders of ours, `files` what the Dockerfile runs besides. `without` names locked
+    packages that the image does without, and `arguments` are those of the Dockerfile.
+    """
+
+    name: str
+    dockerfile: str
+    packages: tuple[str, ...]
+    files: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    arguments: Mapping[str, str] = field(default_factory=dict)
+
+    def reference(self, tag: str) -> str:
+        """Return the image's full name."""
+        return f"{REGISTRY}/palaestra-{self.name}:{tag}"
+
+
+def recipes(torch: str) -> Mapping[str, Recipe]:
+    """Return all images by name, the trainer with PyTorch of `debian` or with `cuda`."""
+    return {
+        "stub": Recipe(
+            name="stub",
+            dockerfile="sim_image/Dockerfile.stub",
+            packages=("sim_image",),
+            files=("sim_image/standalone.sh",),
+        ),
+        "trainer": Recipe(
+            name="trainer",
+            dockerfile="trainer/Dockerfile",
+            packages=("sim_image", "trainer"),
+            without=("torch",) if torch == "debian" else (),  # the distribution's stands in
+            arguments={"TORCH": torch},
+        ),
+        "operator": Recipe(
+            name="operator",
+            dockerfile="operator/Dockerfile",
+            packages=("sim_image", "operator"),
+            without=("aiohttp", "aiohttp-retry"),  # of the client's asynchronous half, which is left out
+        ),
+    }
+
+
+def project(root: Path, package: str) -> Mapping[str, str]:
+    """Return name and version of one of our packages."""
+    found: Mapping[str, str] = tomllib.loads((root / package / "pyproject.toml").read_text())["project"]
+    return found
+
+
+def sources(root: Path, package: str) -> Iterator[Path]:
+    """Yield the files that a package's wheel is made of, in a fixed order."""
+    yield root / package / "pyproject.toml"
+    for path in sorted((root / package / "src").rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path
+
+
+def digest(parts: Iterable[bytes | str]) -> str:
+    """Return 12 hexadecimal digits that stand for these parts, in this order and so divided."""
+    total = hashlib.sha256()
+    for part in parts:
+        data = part.encode() if isinstance(part, str) else part
+        total.update(b"%d:" % len(data))
+        total.update(data)
+    return total.hexdigest()[:12]
+
+
+def digest_of_files(root: Path, paths: Iterable[Path]) -> str:
+    """Return the digest of files below `root`: of their names, contents and whether they can be run."""
+    return digest(
+        part
+        for path in paths
+        for part in (str(path.relative_to(root)), str(path.stat().st_mode & 0o100), path.read_bytes())
+    )
