@@ -4,7 +4,9 @@
     ├── TrainingJobError         a TrainingJob cannot be used as it stands
     │   ├── SpecErrors           what its author wrote is wrong: never retried
     │   └── PlanError            no plan can be made of it (palaestra.plan.errors)
-    └── LocalError               the local runner cannot go on (palaestra.local.errors)
+    ├── LocalError               the local runner cannot go on (palaestra.local.errors)
+    ├── ApiError                 an API server answers otherwise, or not at all (palaestra.cluster.errors)
+    └── NotConfigured            no API server is named (palaestra.cluster.errors)
 
 A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.
 """

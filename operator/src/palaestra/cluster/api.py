@@ -1,0 +1,276 @@
+"""Requests to an API server: plain JSON in and out, a deadline on each, one typed error for each refusal.
+
+Nothing is retried but what certainly was not done: a request that a busy server turned away (429), within the
+deadline of the call, and a read on a connection that broke. Everything else is for the caller's queue.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from palaestra.cluster.errors import Gone, NotFound
+from palaestra.cluster.resources import Resource, of
+from palaestra.cluster.transport import JSON, Call, OnRequest, Transport
+from palaestra.cluster.watching import Watch
+
+Object = dict[str, Any]
+Objects = list[Object]
+PAGE = 500
+MANAGER = "palaestra-operator"
+MERGE_PATCH = "application/merge-patch+json"
+APPLY_PATCH = "application/apply-patch+yaml"  # JSON is YAML
+LISTS_FROM_THE_START = 3
+METADATA = "application/json;as={kind};g=meta.k8s.io;v=v1"
+READS = {
+    "get": "PartialObjectMetadata",
+    "list": "PartialObjectMetadataList",
+    "watch": "PartialObjectMetadata",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """A part of a list.
+
+    Attributes:
+        items: the objects, with apiVersion and kind, which lists leave out.
+        version: the resourceVersion of the whole list, from which a watch goes on.
+    """
+
+    items: tuple[Object, ...]
+    version: str
+
+
+class Api:
+    """An API server, as one identity; safe to use from several threads.
+
+    Attributes:
+        limits: how long anything may take.
+    """
+
+    def __init__(self, transport: Transport, call_s: float | None = None) -> None:
+        self._transport = transport
+        self.limits = transport.limits
+        self._call_s = self.limits.call_s if call_s is None else call_s
+
+    def within(self, call_s: float) -> "Api":
+        """Return the same API server with another deadline for each call, in seconds."""
+        return Api(self._transport, call_s)
+
+    @property
+    def on_request(self) -> OnRequest:
+        """Called after every request, also of `within`: verb, plural, HTTP status (0: no answer), seconds.
+
+        A watch is reported when it ends.
+        """
+        return self._transport.on_request
+
+    @on_request.setter
+    def on_request(self, hook: OnRequest) -> None:
+        self._transport.on_request = hook
+
+    def version(self) -> str:
+        """Return the API server's version: `v1.36.4`."""
+        return str(self._object(Call(verb="get", plural="version", path="/version")).get("gitVersion", ""))
+
+    def serves(self, group_version: str) -> bool:
+        """Whether the API server knows a group and version, such as `kueue.x-k8s.io/v1beta1`."""
+        try:
+            self._object(Call(verb="get", plural="groups", path=f"/apis/{group_version}"))
+        except NotFound:
+            return False
+        return True
+
+    def list(
+        self,
+        resource: Resource,
+        namespace: str | None = None,
+        *,
+        labels: str | None = None,
+        fields: str | None = None,
+        limit: int = PAGE,
+    ) -> Objects:
+        """Return all objects that match, of one moment, read in pages of `limit`.
+
+        Namespace None means all of them. `labels` and `fields` are selectors as kubectl takes them:
+        `palaestra.dev/job=x,palaestra.dev/replica` and `involvedObject.uid=…`.
+        """
+        for attempt in range(LISTS_FROM_THE_START):
+            try:
+                pages = self.pages(resource, namespace, labels=labels, fields=fields, limit=limit)
+                return [item for page in pages for item in page.items]
+            except Gone:  # the list changed for so long that its next page is forgotten
+                if attempt == LISTS_FROM_THE_START - 1:
+                    raise
+        raise AssertionError("unreachable: the last attempt returns or raises")
+
+    def pages(
+        self,
+        resource: Resource,
+        namespace: str | None = None,
+        *,
+        labels: str | None = None,
+        fields: str | None = None,
+        limit: int = PAGE,
+    ) -> Iterator[Page]:
+        """Yield a list page by page, so that no more than one is in memory.
+
+        Raises:
+            Gone: the rest of the list is forgotten; start again.
+        """
+        query = {"limit": str(limit), "labelSelector": labels, "fieldSelector": fields, "continue": None}
+        while True:
+            answer = self._object(_call("list", resource, namespace, query=query))
+            metadata = answer.get("metadata") or {}
+            yield Page(
+                items=tuple(_complete(resource, item) for item in answer.get("items") or ()),
+                version=str(metadata.get("resourceVersion", "")),
+            )
+            query["continue"] = metadata.get("continue")
+            if not query["continue"]:
+                return
+
+    def get(self, resource: Resource, namespace: str | None, name: str) -> Object:
+        """Return one object.
+
+        Raises:
+            NotFound: there is none of that name.
+        """
+        return _complete(resource, self._object(_call("get", resource, namespace, name)))
+
+    def create(self, resource: Resource, obj: Mapping[str, Any]) -> Object:
+        """Create an object in the namespace that it names, and return it as stored.
+
+        Raises:
+            AlreadyExists: the name is taken.
+            Invalid: the API server names the wrong field.
+        """
+        return self._object(_call("create", resource, _namespace(obj)).sending(obj, method="POST"))
+
+    def merge(
+        self,
+        resource: Resource,
+        namespace: str | None,
+        name: str,
+        patch: Mapping[str, Any],
+        *,
+        subresource: str | None = None,
+        resource_version: str | None = None,
+    ) -> Object:
+        """Change the fields in `patch` (RFC 7386: null removes, lists are replaced), and return the object.
+
+        `subresource` is `status`, for instance. With a `resource_version` the change is refused where the
+        object is not this version any more.
+
+        Raises:
+            Conflict: the object is another version.
+        """
+        if resource_version is not None:
+            metadata = {**patch.get("metadata", {}), "resourceVersion": resource_version}
+            patch = {**patch, "metadata": metadata}
+        call = _call("patch", resource, namespace, name, subresource=subresource)
+        return self._object(call.sending(patch, method="PATCH", media_type=MERGE_PATCH))
+
+    def apply(
+        self,
+        obj: Mapping[str, Any],
+        *,
+        manager: str = MANAGER,
+        subresource: str | None = None,
+        force: bool = True,
+    ) -> Object:
+        """Make the fields in `obj` so (server-side apply), and return the object as stored.
+
+        Fields that the same manager applied before and leaves out now are removed.
+
+        Raises:
+            Conflict: another manager owns a field, and `force` is false.
+        """
+        query = {"fieldManager": manager, "force": "true" if force else "false"}
+        name = str(obj["metadata"]["name"])
+        call = _call("apply", of(obj), _namespace(obj), name, subresource=subresource, query=query)
+        return self._object(call.sending(obj, method="PATCH", media_type=APPLY_PATCH))
+
+    def delete(
+        self,
+        resource: Resource,
+        namespace: str | None,
+        name: str,
+        *,
+        uid: str | None = None,
+        propagation: str = "Background",
+        grace_s: int | None = None,
+    ) -> None:
+        """Delete one object, and what it owns by `propagation`: `Background`, `Foreground` or `Orphan`.
+
+        With a `uid` this object only, not a later one of the same name. `grace_s` are the seconds given to a
+        pod to end; None for its own.
+
+        Raises:
+            NotFound: there is none.
+            Conflict: the object of this name has another uid.
+        """
+        options: Object = {"kind": "DeleteOptions", "apiVersion": "v1", "propagationPolicy": propagation}
+        if uid is not None:
+            options["preconditions"] = {"uid": uid}
+        if grace_s is not None:
+            options["gracePeriodSeconds"] = grace_s
+        self._object(_call("delete", resource, namespace, name).sending(options, method="DELETE"))
+
+    def watch(
+        self,
+        resource: Resource,
+        namespace: str | None = None,
+        *,
+        version: str,
+        labels: str | None = None,
+        seconds: float,
+    ) -> Watch:
+        """Return the changes after `version`, where a list or an earlier watch ended.
+
+        The API server ends the watch after so many `seconds`; iterate over it once, to its end or to `close`.
+
+        Raises:
+            Gone: the version is forgotten; here, or from the iterator.
+        """
+        query = {
+            "watch": "true",
+            "allowWatchBookmarks": "true",
+            "resourceVersion": version,
+            "timeoutSeconds": str(max(1, round(seconds))),
+            "labelSelector": labels,
+        }
+        call = _call("watch", resource, namespace, query=query)
+        return Watch(self._transport.open(call, silence_s=self.limits.silence_s), call, self.on_request)
+
+    def close(self) -> None:
+        """Close all idle connections."""
+        self._transport.close()
+
+    def _object(self, call: Call) -> Object:
+        return self._transport.call(call, self._call_s)
+
+
+def _call(
+    verb: str,
+    resource: Resource,
+    namespace: str | None,
+    name: str | None = None,
+    *,
+    subresource: str | None = None,
+    query: Mapping[str, str | None] | None = None,
+) -> Call:
+    path = resource.address(namespace, name) + (f"/{subresource}" if subresource else "")
+    accept = JSON
+    if resource.metadata_only and verb in READS:
+        accept = METADATA.format(kind=READS[verb])
+    return Call(verb=verb, plural=resource.plural, path=path, query=query or {}, accept=accept)
+
+
+def _namespace(obj: Mapping[str, Any]) -> str | None:
+    namespace: str | None = obj["metadata"].get("namespace")
+    return namespace
+
+
+def _complete(resource: Resource, item: Object) -> Object:
+    return {**item, "apiVersion": resource.api_version, "kind": resource.kind}

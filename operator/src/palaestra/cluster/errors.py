@@ -1,0 +1,143 @@
+"""What an API server can answer instead of what was asked for.
+
+ApiError                    any answer but success; `retryable` says whether it may succeed later
+├── NotFound                404
+├── AlreadyExists           409, the name is taken
+├── Conflict                409, somebody else wrote first: read again
+├── Forbidden               403, RBAC, quota or admission says no
+├── Invalid                 400 and 422, the object is wrong: never retried
+├── Gone                    410, the version to continue from is forgotten: list again
+├── TooManyRequests         429, with the wait that the server asks for
+├── ServerError             5xx, the API server or its store is in trouble
+└── Unreachable             no answer, or none that can be read
+NotConfigured               no API server is named, or its credentials cannot be read
+
+A message is the API server's own: it names the object and, for an invalid one, the field.
+"""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from palaestra.errors import PalaestraError
+
+NOT_FOUND = 404
+CONFLICT = 409
+GONE = 410
+TOO_MANY_REQUESTS = 429
+SERVER_ERROR = 500
+DEFAULT_RETRY_AFTER_S = 1.0
+
+
+class NotConfigured(PalaestraError, ValueError):
+    """No API server is named, or its credentials cannot be read; retrying cannot help."""
+
+
+class ApiError(PalaestraError, OSError):
+    """An answer other than success.
+
+    Attributes:
+        code: the HTTP status; 0 when there was no answer.
+        reason: the API server's word for it, such as `AlreadyExists`; a test for equality is safe.
+        message: the API server's sentence.
+    """
+
+    retryable: ClassVar[bool] = False
+
+    def __init__(self, code: int, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+        self.reason = reason
+        self.message = message
+
+    def __str__(self) -> str:
+        return f"{self.reason} ({self.code}): {self.message}" if self.code else self.message
+
+
+class NotFound(ApiError):
+    """There is no such object, or no such kind of objects."""
+
+
+class AlreadyExists(ApiError):
+    """The name is taken; whose it is, its owner reference says."""
+
+
+class Conflict(ApiError):
+    """The object was changed by somebody else, or has another uid, since it was read."""
+
+    retryable = True
+
+
+class Forbidden(ApiError):
+    """RBAC, a quota, Pod Security or a webhook refuses; a person has to act."""
+
+
+class Invalid(ApiError):
+    """The object is wrong; the message names the field."""
+
+
+class Gone(ApiError):
+    """The version or the page to continue from is forgotten: list again."""
+
+    retryable = True
+
+
+class TooManyRequests(ApiError):
+    """The API server is busy.
+
+    Attributes:
+        retry_after_s: seconds that it asks to wait.
+    """
+
+    retryable = True
+
+    def __init__(self, code: int, reason: str, message: str) -> None:
+        super().__init__(code, reason, message)
+        self.retry_after_s = DEFAULT_RETRY_AFTER_S
+
+
+class ServerError(ApiError):
+    """The API server or its store is in trouble (5xx)."""
+
+    retryable = True
+
+
+class Unreachable(ApiError):
+    """No answer in time, or none that can be read; whether a write took place is not known."""
+
+    retryable = True
+
+
+BY_REASON: dict[str, type[ApiError]] = {"AlreadyExists": AlreadyExists, "Expired": Gone, "Gone": Gone}
+BY_CODE: dict[int, type[ApiError]] = {
+    400: Invalid,
+    403: Forbidden,
+    NOT_FOUND: NotFound,
+    CONFLICT: Conflict,
+    GONE: Gone,
+    422: Invalid,
+    TOO_MANY_REQUESTS: TooManyRequests,
+}
+
+
+def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = None) -> ApiError:
+    """Return the error for an HTTP status and the `Status` object that came with it.
+
+    Args:
+        code: the HTTP status, or the code in the Status of an ERROR event.
+        status: the body; anything may be missing in it.
+        retry_after: the Retry-After header, in seconds.
+    """
+    reason = str(status.get("reason") or f"HTTP{code}")
+    message = str(status.get("message") or "the API server gave no message")
+    fallback = ServerError if code >= SERVER_ERROR else ApiError
+    error = BY_REASON.get(reason, BY_CODE.get(code, fallback))(code, reason, message)
+    if isinstance(error, TooManyRequests):
+        error.retry_after_s = _seconds(retry_after)
+    return error
+
+
+def _seconds(text: str | None) -> float:
+    try:
+        return max(float(text), 0.0) if text is not None else DEFAULT_RETRY_AFTER_S
+    except ValueError:  # a date: allowed by HTTP, never sent by Kubernetes
+        return DEFAULT_RETRY_AFTER_S

@@ -1,0 +1,184 @@
+"""Leader election: of several operators, one works.
+
+One Lease object, taken and renewed with its resourceVersion, so that of two that write at once one is
+refused. `leads()` is a question to the clock, not a memory: a process that was stopped for a minute gets the
+answer no before it does anything else (see tenure.py). Correctness does not hang on this: children have
+names, and the API server refuses the second of a name. Election saves work.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Any
+
+import structlog
+
+from palaestra.cluster.api import Api
+from palaestra.cluster.errors import AlreadyExists, ApiError, Conflict, NotFound
+from palaestra.cluster.resources import LEASES
+from palaestra.cluster.tenure import Claim, Sighting, Tenure
+
+log = structlog.get_logger("palaestra.cluster")
+
+DURATION_S = 15.0
+RENEW_S = 3.0  # three renewals may fail before the leader has to stop
+
+
+def _nothing() -> None:
+    """Do nothing."""
+
+
+class Leadership:
+    """A candidate for one lease, and its leader while `leads()` says so."""
+
+    def __init__(
+        self,
+        api: Api,
+        namespace: str,
+        name: str,
+        identity: str,
+        *,
+        duration_s: float = DURATION_S,
+        renew_s: float = RENEW_S,
+    ) -> None:
+        """Prepare; nothing is sent before `start`.
+
+        Args:
+            api: where the Lease stands.
+            namespace: of the Lease.
+            name: of the Lease.
+            identity: of this process, different from that of any other.
+            duration_s: whole seconds until others may follow a leader that has died.
+            renew_s: seconds between renewals, and between looks at another's lease; a third of it or less.
+        """
+        self._api = api.within(renew_s)
+        self._namespace, self._name, self._identity = namespace, name, identity
+        self._duration_s = duration_s
+        self._renew_s = renew_s
+        self._sighting = Sighting()
+        self._tenure: Tenure | None = None
+        self._version = ""
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="leadership", daemon=True)
+        self._started: Callable[[], None] = _nothing
+        self._stopped: Callable[[], None] = _nothing
+
+    def start(self, started: Callable[[], None] = _nothing, stopped: Callable[[], None] = _nothing) -> None:
+        """Stand for election; once.
+
+        Args:
+            started: called when this process becomes the leader; has to return soon.
+            stopped: called when it is not the leader any more; may come later than `leads()` says no.
+        """
+        self._started, self._stopped = started, stopped
+        self._thread.start()
+
+    def stop(self, deadline_s: float = 2.0) -> None:
+        """Lead no more, and give the lease back so that another can follow at once.
+
+        `leads()` is false from here on; end what writes before. After `deadline_s` the lease is left to run
+        out.
+        """
+        self._stopping.set()
+        if self._thread.ident is not None:
+            self._thread.join(deadline_s)
+
+    def leads(self) -> bool:
+        """Whether this process may act as the leader at this moment."""
+        tenure = self._tenure
+        return tenure is not None and not self._stopping.is_set() and tenure.holds(time.monotonic())
+
+    def _run(self) -> None:
+        while True:
+            try:
+                self._turn()
+            except ApiError as error:
+                log.warning("lease not renewed", lease=self._name, reason=error.reason, error=str(error))
+            if self._tenure is not None and not self._tenure.holds(time.monotonic()):
+                self._lose()
+            if self._stopping.wait(self._renew_s):
+                self._release()
+                return
+
+    def _turn(self) -> None:
+        """Renew, or see whether the lease is free and take it."""
+        sent = time.monotonic()
+        try:
+            if self._tenure is not None:
+                self._write(sent, {})
+                return
+            found = self._api.get(LEASES, self._namespace, self._name)
+        except NotFound:
+            self._create(sent)
+            return
+        except Conflict:  # written by another, or by a request of ours whose answer was lost
+            found = self._api.get(LEASES, self._namespace, self._name)
+        claim = Claim.read(found)
+        self._version = str(found["metadata"]["resourceVersion"])
+        self._sighting.see(claim, time.monotonic())
+        ours = claim.holder == self._identity
+        if self._tenure is not None and not ours:
+            self._lose()
+        elif ours or self._sighting.free(time.monotonic()):
+            self._take(claim, ours=ours)
+
+    def _take(self, claim: Claim, *, ours: bool) -> None:
+        change: dict[str, Any] = {}
+        if not ours:
+            change = {"acquireTime": _now(), "leaseTransitions": claim.transitions + 1}
+        try:
+            self._write(time.monotonic(), change)
+        except Conflict:
+            log.info("lease taken by another", lease=self._name)
+
+    def _create(self, sent: float) -> None:
+        lease = {
+            "apiVersion": LEASES.api_version,
+            "kind": LEASES.kind,
+            "metadata": {"name": self._name, "namespace": self._namespace},
+            "spec": {**self._spec(), "acquireTime": _now(), "leaseTransitions": 0},
+        }
+        try:
+            self._hold(sent, self._api.create(LEASES, lease))
+        except AlreadyExists:
+            log.info("lease taken by another", lease=self._name)
+
+    def _write(self, sent: float, change: dict[str, Any]) -> None:
+        patch = {"spec": {**self._spec(), **change}}
+        written = self._api.merge(LEASES, self._namespace, self._name, patch, resource_version=self._version)
+        self._hold(sent, written)
+
+    def _spec(self) -> dict[str, Any]:
+        return {
+            "holderIdentity": self._identity,
+            "leaseDurationSeconds": max(1, round(self._duration_s)),
+            "renewTime": _now(),
+        }
+
+    def _hold(self, sent: float, written: dict[str, Any]) -> None:
+        first = self._tenure is None
+        self._version = str(written["metadata"]["resourceVersion"])
+        self._tenure = Tenure(sent=sent, duration_s=self._duration_s)
+        if first:
+            log.info("leads", lease=self._name, identity=self._identity)
+            self._started()
+
+    def _lose(self) -> None:
+        self._tenure = None
+        log.warning("leads no more", lease=self._name, identity=self._identity)
+        self._stopped()
+
+    def _release(self) -> None:
+        if self._tenure is None:
+            return
+        self._lose()
+        patch = {"spec": {"holderIdentity": "", "leaseDurationSeconds": 1, "renewTime": _now()}}
+        try:
+            self._api.merge(LEASES, self._namespace, self._name, patch, resource_version=self._version)
+        except ApiError as error:
+            log.warning("lease left to run out", lease=self._name, error=str(error))
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")

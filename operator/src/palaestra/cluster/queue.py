@@ -1,0 +1,141 @@
+"""Work for the controller: names of objects, each once, each with one worker at a time.
+
+A name that is added while a worker has it is handed out again when that worker is done: what happened in
+between is never lost, and two workers never meet at one object. The queue holds names, not events: whoever
+gets one reads what is there now.
+"""
+
+import heapq
+import itertools
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+from palaestra.cluster.backoff import Backoff
+
+Key = TypeVar("Key", bound=Hashable)
+RETRY = Backoff(first_s=0.1, cap_s=60.0)  # with its jitter: 0.05 s to 60 s
+
+
+def _nobody(seconds: float) -> None:
+    del seconds
+
+
+class WorkQueue(Generic[Key]):
+    """A deduplicating queue with delays; safe to use from several threads.
+
+    Args:
+        again: how long a name that failed waits.
+        waited: called with the seconds that a name was ready before a worker took it.
+        clock: seconds that never go back.
+    """
+
+    def __init__(
+        self,
+        *,
+        again: Backoff = RETRY,
+        waited: Callable[[float], None] = _nobody,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._again = again
+        self._waited = waited
+        self._clock = clock
+        self._changed = threading.Condition()
+        self._ready: deque[Key] = deque()
+        self._since: dict[Key, float] = {}  # all that wait for a worker, also those that have one now
+        self._working: set[Key] = set()
+        self._later: list[tuple[float, int, Key]] = []
+        self._due: dict[Key, float] = {}
+        self._failures: dict[Key, int] = {}
+        self._order = itertools.count()  # makes entries of one moment comparable
+        self._closed = False
+
+    @property
+    def depth(self) -> int:
+        """How many names are ready for a worker."""
+        with self._changed:
+            self._promote(self._clock())
+            return len(self._ready)
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called; nothing is handed out any more."""
+        return self._closed
+
+    def add(self, key: Key) -> None:
+        """Ask for work on a name as soon as a worker is free."""
+        with self._changed:
+            self._add(key, self._clock())
+            self._changed.notify_all()
+
+    def add_after(self, key: Key, seconds: float) -> None:
+        """Ask for work on a name after some time; of several such requests the earliest counts."""
+        with self._changed:
+            due = self._clock() + seconds
+            if due < self._due.get(key, float("inf")):
+                self._due[key] = due
+                heapq.heappush(self._later, (due, next(self._order), key))
+                self._changed.notify_all()
+
+    def retry(self, key: Key) -> float:
+        """Ask for work on a name that failed, later each time; return the seconds until then."""
+        with self._changed:
+            self._failures[key] = self._failures.get(key, 0) + 1
+            wait_s = self._again.wait_s(self._failures[key])
+        self.add_after(key, wait_s)
+        return wait_s
+
+    def forget(self, key: Key) -> None:
+        """A name's work succeeded: its next failure is its first."""
+        with self._changed:
+            self._failures.pop(key, None)
+
+    def get(self, deadline_s: float) -> Key | None:
+        """Return a name to work on, which `done` has to follow; None after `deadline_s`, or when closed."""
+        with self._changed:
+            ends = self._clock() + deadline_s
+            while not self._closed:
+                now = self._clock()
+                self._promote(now)
+                if self._ready:
+                    return self._take(now)
+                if now >= ends:
+                    return None
+                self._changed.wait(min([ends, *(due for due, _, _ in self._later[:1])]) - now)
+            return None
+
+    def done(self, key: Key) -> None:
+        """A worker has finished with a name; it is handed out again if it was added meanwhile."""
+        with self._changed:
+            self._working.discard(key)
+            if key in self._since:
+                self._ready.append(key)
+                self._changed.notify_all()
+
+    def close(self) -> None:
+        """Hand out nothing more; workers that wait return at once."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+
+    def _add(self, key: Key, now: float) -> None:
+        if key in self._since:
+            return
+        self._since[key] = now
+        if key not in self._working:
+            self._ready.append(key)
+
+    def _take(self, now: float) -> Key:
+        key = self._ready.popleft()
+        self._waited(now - self._since.pop(key))
+        self._working.add(key)
+        return key
+
+    def _promote(self, now: float) -> None:
+        while self._later and self._later[0][0] <= now:
+            due, _, key = heapq.heappop(self._later)
+            if self._due.get(key) == due:  # else an earlier request has taken its place
+                del self._due[key]
+                self._add(key, due)

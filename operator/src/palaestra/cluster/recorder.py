@@ -1,0 +1,118 @@
+"""Events: what `kubectl describe` shows below an object.
+
+One Event for each (object, reason, message), whose count and last time go up when it happens again. Its name
+is made of these three, so that an operator that was started anew goes on counting instead of repeating.
+An event that cannot be written is logged and given up: nothing may wait for it.
+"""
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+import structlog
+
+from palaestra.cluster.api import Api
+from palaestra.cluster.errors import AlreadyExists, ApiError, NotFound
+from palaestra.cluster.resources import EVENTS
+
+log = structlog.get_logger("palaestra.cluster")
+
+LONGEST_MESSAGE = 1024  # characters that an API server takes
+LONGEST_NAME = 253
+REMEMBERED = 2048
+COMPONENT = "palaestra-operator"
+
+
+class Recorder:
+    """Writes events; safe to use from several threads."""
+
+    def __init__(self, api: Api, component: str = COMPONENT, instance: str = "") -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            api: where events are written.
+            component: who reports, as `kubectl describe` shows it.
+            instance: which one of its processes.
+        """
+        self._api = api
+        self._component = component
+        self._instance = instance
+        self._lock = threading.Lock()
+        self._counts: OrderedDict[str, int] = OrderedDict()
+
+    def record(self, obj: Mapping[str, Any], kind: str, reason: str, message: str) -> None:
+        """Say what happened to an object.
+
+        Args:
+            obj: with apiVersion, kind, and name, namespace and uid in its metadata.
+            kind: `Normal` or `Warning`.
+            reason: one word.
+            message: a sentence; cut at 1024 characters.
+        """
+        event = self._event(obj, kind, reason, message)
+        try:
+            self._write(event)
+        except ApiError as error:
+            log.warning("event not written", reason=reason, name=event["metadata"]["name"], error=str(error))
+
+    def _write(self, event: dict[str, Any]) -> None:
+        namespace, name = event["metadata"]["namespace"], event["metadata"]["name"]
+        with self._lock:
+            count = self._counts.get(name)
+        try:
+            if count is None:
+                self._api.create(EVENTS, event)
+                self._remember(name, 1)
+            else:
+                self._again(event, count + 1)
+        except AlreadyExists:  # an operator before this one has written it
+            found = self._api.get(EVENTS, namespace, name)
+            self._again(event, int(found.get("count") or 1) + 1)
+        except NotFound:  # the API server forgets events after an hour
+            self._api.create(EVENTS, event)
+            self._remember(name, 1)
+
+    def _again(self, event: dict[str, Any], count: int) -> None:
+        metadata = event["metadata"]
+        patch = {"count": count, "lastTimestamp": event["lastTimestamp"]}
+        self._api.merge(EVENTS, metadata["namespace"], metadata["name"], patch)
+        self._remember(metadata["name"], count)
+
+    def _remember(self, name: str, count: int) -> None:
+        with self._lock:
+            self._counts[name] = count
+            self._counts.move_to_end(name)
+            while len(self._counts) > REMEMBERED:
+                self._counts.popitem(last=False)
+
+    def _event(self, obj: Mapping[str, Any], kind: str, reason: str, message: str) -> dict[str, Any]:
+        metadata = obj["metadata"]
+        name, uid = str(metadata["name"]), str(metadata.get("uid", ""))
+        namespace = str(metadata.get("namespace") or "default")  # where events on nodes stand
+        text = message if len(message) <= LONGEST_MESSAGE else message[: LONGEST_MESSAGE - 1] + "…"
+        digest = hashlib.sha256(f"{uid}\0{kind}\0{reason}\0{text}".encode()).hexdigest()[:16]
+        now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        return {
+            "apiVersion": EVENTS.api_version,
+            "kind": EVENTS.kind,
+            "metadata": {"name": f"{name[: LONGEST_NAME - 17]}.{digest}", "namespace": namespace},
+            "involvedObject": {
+                "apiVersion": obj["apiVersion"],
+                "kind": obj["kind"],
+                "namespace": str(metadata.get("namespace") or ""),
+                "name": name,
+                "uid": uid,
+            },
+            "type": kind,
+            "reason": reason,
+            "message": text,
+            "source": {"component": self._component},
+            "reportingComponent": self._component,
+            "reportingInstance": self._instance,
+            "firstTimestamp": now,
+            "lastTimestamp": now,
+            "count": 1,
+        }

@@ -1,0 +1,97 @@
+"""The kinds of objects that the operator reads or writes, and their addresses at the API server."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+from urllib.parse import quote
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resource:
+    """One kind of object.
+
+    Attributes:
+        api_version: group and version as objects carry them: `batch/v1`; `v1` for the core group.
+        kind: as objects carry it: `Job`.
+        plural: as addresses and RBAC rules have it: `jobs`.
+        namespaced: false for kinds that stand outside of namespaces.
+        metadata_only: read no more of the objects than their metadata; what they hold stays with the API
+            server (the contents of ConfigMaps and Secrets, for instance).
+    """
+
+    api_version: str
+    kind: str
+    plural: str
+    namespaced: bool = True
+    metadata_only: bool = False
+
+    def address(self, namespace: str | None = None, name: str | None = None) -> str:
+        """Return the path of one object, or of all of them.
+
+        Args:
+            namespace: None for all namespaces, and for kinds outside of namespaces.
+            name: None for the collection.
+        """
+        root = "/api/" if "/" not in self.api_version else "/apis/"
+        parts = [root + self.api_version]
+        if namespace is not None and self.namespaced:
+            parts += ["namespaces", quote(namespace, safe="")]
+        parts.append(self.plural)
+        if name is not None:
+            parts.append(quote(name, safe=""))
+        return "/".join(parts)
+
+    def only_metadata(self) -> "Resource":
+        """Return the same kind, read without what its objects hold."""
+        return replace(self, metadata_only=True)
+
+
+TRAINING_JOBS = Resource(api_version="palaestra.dev/v1alpha1", kind="TrainingJob", plural="trainingjobs")
+JOBS = Resource(api_version="batch/v1", kind="Job", plural="jobs")
+PODS = Resource(api_version="v1", kind="Pod", plural="pods")
+CONFIG_MAPS = Resource(api_version="v1", kind="ConfigMap", plural="configmaps")
+CLAIMS = Resource(api_version="v1", kind="PersistentVolumeClaim", plural="persistentvolumeclaims")
+SECRETS = Resource(api_version="v1", kind="Secret", plural="secrets")
+EVENTS = Resource(
+    api_version="v1", kind="Event", plural="events"
+)  # the core one: `kubectl describe` shows it
+NETWORK_POLICIES = Resource(
+    api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
+)
+LEASES = Resource(api_version="coordination.k8s.io/v1", kind="Lease", plural="leases")
+NODES = Resource(api_version="v1", kind="Node", plural="nodes", namespaced=False)
+NAMESPACES = Resource(api_version="v1", kind="Namespace", plural="namespaces", namespaced=False)
+DEFINITIONS = Resource(
+    api_version="apiextensions.k8s.io/v1",
+    kind="CustomResourceDefinition",
+    plural="customresourcedefinitions",
+    namespaced=False,
+)
+
+ALL: tuple[Resource, ...] = (
+    TRAINING_JOBS,
+    JOBS,
+    PODS,
+    CONFIG_MAPS,
+    CLAIMS,
+    SECRETS,
+    EVENTS,
+    NETWORK_POLICIES,
+    LEASES,
+    NODES,
+    NAMESPACES,
+    DEFINITIONS,
+)
+_BY_KIND = {(resource.api_version, resource.kind): resource for resource in ALL}
+
+
+def of(obj: Mapping[str, Any]) -> Resource:
+    """Return the resource of an object, by its apiVersion and kind.
+
+    Raises:
+        KeyError: the object is of a kind that the operator has nothing to do with.
+    """
+    key = (obj.get("apiVersion", ""), obj.get("kind", ""))
+    if key not in _BY_KIND:
+        raise KeyError(f"apiVersion, kind: {key[0]} {key[1]} is not one of palaestra.cluster.resources")
+    return _BY_KIND[key]

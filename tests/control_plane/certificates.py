@@ -1,0 +1,67 @@
+"""Keys and certificates of one control plane, made by openssl, good for a day."""
+
+import subprocess
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-noenc")
+DAY = ("-days", "1")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pair:
+    """A certificate and its key, as files."""
+
+    certificate: Path
+    key: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Authority:
+    """Who vouches for the server and its clients; its files stand in `folder`."""
+
+    folder: Path
+
+    @classmethod
+    def create(cls, folder: Path) -> "Authority":
+        """Make the authority's own key and certificate in a folder that exists."""
+        authority = cls(folder)
+        _openssl("req", "-x509", "-new", *CURVE, *DAY, "-subj", "/CN=control-plane", *_files(authority.pair))
+        return authority
+
+    @property
+    def pair(self) -> Pair:
+        """The authority's own."""
+        return Pair(certificate=self.folder / "ca.crt", key=self.folder / "ca.key")
+
+    def server(self, addresses: Iterable[str]) -> Pair:
+        """Make the certificate of a server with these IP addresses."""
+        names = ",".join(["DNS:localhost", *(f"IP:{address}" for address in addresses)])
+        return self._issue("server", "/CN=kube-apiserver", f"subjectAltName={names}")
+
+    def client(self, user: str, group: str = "") -> Pair:
+        """Make the certificate of a user, in a group."""
+        subject = f"/O={group}/CN={user}" if group else f"/CN={user}"
+        return self._issue(user.replace(":", "-"), subject, "extendedKeyUsage=clientAuth")
+
+    def signing_key(self) -> Path:
+        """Make the key that signs the tokens of service accounts."""
+        path = self.folder / "service-accounts.key"
+        _openssl("genrsa", "-out", str(path), "2048")
+        return path
+
+    def _issue(self, name: str, subject: str, extension: str) -> Pair:
+        pair = Pair(certificate=self.folder / f"{name}.crt", key=self.folder / f"{name}.key")
+        signer = ("-CA", str(self.pair.certificate), "-CAkey", str(self.pair.key))
+        usage = ("-addext", "keyUsage=critical,digitalSignature", "-addext", extension)
+        _openssl("req", "-x509", "-new", *CURVE, *DAY, *signer, "-subj", subject, *usage, *_files(pair))
+        return pair
+
+
+def _files(pair: Pair) -> tuple[str, ...]:
+    return ("-out", str(pair.certificate), "-keyout", str(pair.key))
+
+
+def _openssl(*arguments: str) -> None:
+    subprocess.run(["openssl", *arguments], check=True, capture_output=True, timeout=30)

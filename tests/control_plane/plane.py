@@ -1,0 +1,232 @@
+"""A control plane without nodes: etcd, kube-apiserver and kube-controller-manager as processes of ours.
+
+It stands in seconds and does what a cluster does up to the pods: it validates, stores, watches, collects
+garbage and turns Jobs into pods that nobody runs. Everything listens on the loopback only, and no program of
+it connects to anything else. The processes end with the one that started them, however that ends (pdeathsig).
+"""
+
+import json
+import shutil
+import socket
+import ssl
+import subprocess
+import threading
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.error import URLError
+
+from tests.control_plane.certificates import Authority, Pair
+from tests.control_plane.programs import programs
+
+ADDRESS = "127.0.0.1"
+SERVICES = "198.19.0.0/24"  # a range for benchmarks: no route leads there
+START_DEADLINE_S = 60
+STOP_DEADLINE_S = 10
+AUDIT = {
+    "apiVersion": "audit.k8s.io/v1",
+    "kind": "Policy",
+    "omitStages": ["RequestReceived"],
+    "rules": [{"level": "Metadata"}],
+}
+
+
+class DidNotStart(Exception):
+    """A program of the control plane ended, or was not ready in time; the message ends with its log."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControlPlane:
+    """A running control plane.
+
+    Attributes:
+        folder: certificates, logs and data; removed by whoever made it.
+        port: of the API server, on 127.0.0.1.
+        authority: signs more clients.
+        kubeconfig: of an administrator.
+        binaries: the folder of the programs.
+    """
+
+    folder: Path
+    port: int
+    authority: Authority
+    kubeconfig: Path
+    binaries: Path
+
+    @property
+    def server(self) -> str:
+        """The API server's address."""
+        return f"https://{ADDRESS}:{self.port}"
+
+    @property
+    def audit_log(self) -> Path:
+        """A line of JSON for each request, with user, verb and object."""
+        return self.folder / "audit.log"
+
+    def kubectl(self, *arguments: str, sent: str = "") -> "subprocess.CompletedProcess[str]":
+        """Run kubectl as the administrator, with `sent` as its standard input; 60 s at most."""
+        return subprocess.run(
+            [str(self.binaries / "kubectl"), f"--cache-dir={self.folder / 'cache'}", *arguments],
+            env={"KUBECONFIG": str(self.kubeconfig)},
+            input=sent,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+
+    def kubeconfig_of(self, user: str, group: str = "") -> Path:
+        """Write a kubeconfig for a user with a certificate and return its path."""
+        return _kubeconfig(self.folder / f"{user.replace(':', '-')}.kubeconfig", self, user, group)
+
+
+@contextmanager
+def running(folder: Path, *, controllers: bool = True) -> Iterator[ControlPlane]:
+    """Run a control plane with its files in `folder` until the block ends.
+
+    Args:
+        folder: exists and is empty.
+        controllers: whether Jobs get pods and garbage is collected.
+
+    Raises:
+        NoPrograms: the programs are not built.
+        DidNotStart: one of them did not come up in 60 s.
+    """
+    authority = Authority.create(folder)
+    etcd_port, peer_port, port = _free_ports(3)
+    plane = ControlPlane(
+        folder=folder,
+        port=port,
+        authority=authority,
+        kubeconfig=folder / "kubeconfig",
+        binaries=programs(),
+    )
+    _kubeconfig(plane.kubeconfig, plane, "admin", "system:masters")
+    with ExitStack() as processes:
+        processes.enter_context(_process(folder, _etcd(plane, etcd_port, peer_port)))
+        api_server = processes.enter_context(_process(folder, _api_server(plane, etcd_port)))
+        _wait_ready(plane, api_server)
+        if controllers:
+            processes.enter_context(_process(folder, _controllers(plane)))
+        yield plane
+
+
+def _etcd(plane: ControlPlane, port: int, peer_port: int) -> list[str]:
+    client, peer = f"http://{ADDRESS}:{port}", f"http://{ADDRESS}:{peer_port}"
+    return [
+        str(plane.binaries / "etcd"),
+        f"--data-dir={plane.folder / 'etcd'}",
+        f"--listen-client-urls={client}",
+        f"--advertise-client-urls={client}",
+        f"--listen-peer-urls={peer}",
+        f"--initial-advertise-peer-urls={peer}",
+        f"--initial-cluster=default={peer}",
+        "--unsafe-no-fsync",
+        "--log-level=warn",
+    ]
+
+
+def _api_server(plane: ControlPlane, etcd_port: int) -> list[str]:
+    serving, signing = plane.authority.server([ADDRESS]), plane.authority.signing_key()
+    policy = plane.folder / "audit.json"
+    policy.write_text(json.dumps(AUDIT))
+    return [
+        str(plane.binaries / "kube-apiserver"),
+        f"--etcd-servers=http://{ADDRESS}:{etcd_port}",
+        f"--bind-address={ADDRESS}",
+        f"--advertise-address={ADDRESS}",
+        f"--secure-port={plane.port}",
+        f"--tls-cert-file={serving.certificate}",
+        f"--tls-private-key-file={serving.key}",
+        f"--client-ca-file={plane.authority.pair.certificate}",
+        f"--service-account-key-file={signing}",
+        f"--service-account-signing-key-file={signing}",
+        f"--service-account-issuer={plane.server}",
+        f"--service-cluster-ip-range={SERVICES}",
+        "--endpoint-reconciler-type=none",
+        "--authorization-mode=RBAC",
+        f"--audit-policy-file={policy}",
+        f"--audit-log-path={plane.audit_log}",
+    ]
+
+
+def _controllers(plane: ControlPlane) -> list[str]:
+    user = "system:kube-controller-manager"
+    return [
+        str(plane.binaries / "kube-controller-manager"),
+        f"--kubeconfig={plane.kubeconfig_of(user)}",
+        f"--service-account-private-key-file={plane.folder / 'service-accounts.key'}",
+        f"--root-ca-file={plane.authority.pair.certificate}",
+        "--use-service-account-credentials",
+        "--leader-elect=false",
+        f"--bind-address={ADDRESS}",
+        "--secure-port=0",
+    ]
+
+
+@contextmanager
+def _process(folder: Path, command: list[str]) -> Iterator["subprocess.Popen[bytes]"]:
+    if not shutil.which("setpriv"):
+        raise DidNotStart(
+            "setpriv is missing, without which processes could be left behind; install util-linux"
+        )
+    with (folder / f"{Path(command[0]).name}.log").open("wb") as log:
+        process = subprocess.Popen(
+            ["setpriv", "--pdeathsig", "KILL", "--", *command],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(STOP_DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _wait_ready(plane: ControlPlane, api_server: "subprocess.Popen[bytes]") -> None:
+    ends = time.monotonic() + START_DEADLINE_S
+    context = ssl.create_default_context(cafile=plane.authority.pair.certificate)
+    admin = Pair(certificate=plane.folder / "admin.crt", key=plane.folder / "admin.key")
+    context.load_cert_chain(admin.certificate, admin.key)
+    while time.monotonic() < ends and api_server.poll() is None:
+        with suppress(URLError, OSError):
+            answer = urllib.request.urlopen(f"{plane.server}/readyz", context=context, timeout=5)
+            answer.close()
+            return
+        threading.Event().wait(0.1)  # a port that nobody listens on yet gives nothing to wait for
+    log = (plane.folder / "kube-apiserver.log").read_text(errors="replace")[-3000:]
+    raise DidNotStart(f"kube-apiserver: not ready in {START_DEADLINE_S} s; its log ends with\n{log}")
+
+
+def _kubeconfig(path: Path, plane: ControlPlane, user: str, group: str) -> Path:
+    pair = plane.authority.client(user, group)
+    cluster = {"server": plane.server, "certificate-authority": str(plane.authority.pair.certificate)}
+    credentials = {"client-certificate": str(pair.certificate), "client-key": str(pair.key)}
+    content = {
+        "apiVersion": "v1",
+        "kind": "Config",
+        "clusters": [{"name": "here", "cluster": cluster}],
+        "users": [{"name": user, "user": credentials}],
+        "contexts": [{"name": "here", "context": {"cluster": "here", "user": user}}],
+        "current-context": "here",
+    }
+    path.write_text(json.dumps(content, indent=1))
+    return path
+
+
+def _free_ports(count: int) -> list[int]:
+    with ExitStack() as sockets:
+        ports = []
+        for _ in range(count):
+            opened = sockets.enter_context(closing(socket.socket()))
+            opened.bind((ADDRESS, 0))
+            ports.append(opened.getsockname()[1])
+        return ports

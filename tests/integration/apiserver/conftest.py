@@ -1,0 +1,61 @@
+"""API servers for the tests: a rude one, and a real one without nodes."""
+
+import itertools
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from palaestra.cluster import Limits, connect
+from palaestra.cluster.backoff import Backoff
+from palaestra.cluster.resources import NAMESPACES
+from tests.control_plane.fixture import control_plane
+from tests.integration.apiserver.server import serving
+
+__all__ = ["control_plane"]
+
+HASTE = Limits(
+    connect_s=1, call_s=1, silence_s=0.5, again=Backoff(first_s=0.05, cap_s=0.2, chance=lambda: 0.0)
+)
+numbers = itertools.count(1)
+
+
+def write_kubeconfig(path, server, user):
+    """Write a kubeconfig with two contexts, of which `usual` is the current one."""
+    content = {
+        "clusters": [{"name": "here", "cluster": {"server": server}}],
+        "users": [{"name": "me", "user": user}, {"name": "other", "user": {"token": "other-token"}}],
+        "contexts": [
+            {"name": "usual", "context": {"cluster": "here", "user": "me"}},
+            {"name": "other", "context": {"cluster": "here", "user": "other"}},
+        ],
+        "current-context": "usual",
+    }
+    path.write_text(json.dumps(content))
+    return str(path)
+
+
+@pytest.fixture
+def rude(tmp_path):
+    """A server that answers what a test wrote down, and an impatient client of it."""
+    with serving() as (address, script):
+        kubeconfig = write_kubeconfig(tmp_path / "kubeconfig", address, {"token": "my-token"})
+        api = connect(kubeconfig, limits=HASTE)
+        yield SimpleNamespace(address=address, script=script, api=api, kubeconfig=kubeconfig)
+        api.close()
+
+
+@pytest.fixture(scope="session")
+def real(control_plane):
+    """A client of a real API server, as administrator."""
+    api = connect(str(control_plane.kubeconfig))
+    yield api
+    api.close()
+
+
+@pytest.fixture
+def namespace(real):
+    """A namespace of the test's own."""
+    name = f"test-{next(numbers)}"
+    real.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": name}})
+    return name

@@ -1,0 +1,164 @@
+"""An API server that misbehaves: real sockets, and answers that a test writes down beforehand."""
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
+
+Answer = Callable[["Exchange"], None]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One request as it came."""
+
+    method: str
+    path: str
+    query: dict[str, str]
+    headers: dict[str, str]
+    body: Any
+
+    @property
+    def watches(self):
+        """Whether it is a watch."""
+        return self.query.get("watch") == "true"
+
+
+@dataclass
+class Script:
+    """What was asked, and what will be answered; the last answer of each kind is given for ever."""
+
+    asked: list[Asked] = field(default_factory=list)
+    calls: list[Answer] = field(default_factory=list)
+    watches: list[Answer] = field(default_factory=list)
+    over: threading.Event = field(default_factory=threading.Event)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def next(self, asked: Asked) -> Answer:
+        """Take notice of a request and return its answer."""
+        with self.lock:
+            self.asked.append(asked)
+            answers = self.watches if asked.watches else self.calls
+            return answers.pop(0) if len(answers) > 1 else answers[0]
+
+    def of(self, *, watches: bool) -> list[Asked]:
+        """Return the watches that were asked for, or all other requests."""
+        with self.lock:
+            return [asked for asked in self.asked if asked.watches == watches]
+
+
+class Exchange(BaseHTTPRequestHandler):
+    """One connection; answers come from the script of its server."""
+
+    protocol_version = "HTTP/1.1"
+    script: Script
+
+    def answer(self):
+        """Answer as the script says."""
+        address = urlsplit(self.path)
+        length = int(self.headers.get("Content-Length") or 0)
+        body = json.loads(self.rfile.read(length)) if length else None
+        asked = Asked(self.command, address.path, dict(parse_qsl(address.query)), dict(self.headers), body)
+        self.script.next(asked)(self)
+
+    do_GET = do_POST = do_PATCH = do_DELETE = answer  # noqa: N815 - the names are http.server's
+
+    def send(self, code: int, body: bytes, **headers: str) -> None:
+        """Send a whole answer."""
+        self.send_response(code)
+        for name, value in {"Content-Length": str(len(body)), **headers}.items():
+            self.send_header(name.replace("_", "-"), value)
+        self.end_headers()
+        self.wfile.write(body)
+
+    def chunk(self, data: bytes) -> None:
+        """Send a part of a chunked answer."""
+        self.wfile.write(b"%x\r\n%s\r\n" % (len(data), data))
+        self.wfile.flush()
+
+    def log_message(self, *arguments):
+        """Say nothing."""
+
+
+def reply(code: int = 200, obj: Any = None, **headers: str) -> Answer:
+    """Answer with JSON."""
+    return lambda exchange: exchange.send(code, json.dumps(obj or {}).encode(), **headers)
+
+
+def raw(body: bytes, code: int = 200) -> Answer:
+    """Answer with something else."""
+    return lambda exchange: exchange.send(code, body)
+
+
+def refusal(code: int, reason: str, **headers: str) -> Answer:
+    """Answer with a Status."""
+    return reply(code, {"kind": "Status", "code": code, "reason": reason, "message": "no"}, **headers)
+
+
+def hang(exchange: Exchange) -> None:
+    """Say nothing, as a server behind a half-open connection."""
+    exchange.script.over.wait(30)
+    exchange.close_connection = True
+
+
+def hang_up(exchange: Exchange) -> None:
+    """Close the connection without an answer."""
+    exchange.close_connection = True
+
+
+def trickle(exchange: Exchange) -> None:
+    """Send a byte now and then, for ever."""
+    exchange.send_response(200)
+    exchange.send_header("Content-Length", "100000")
+    exchange.end_headers()
+    while not exchange.script.over.wait(0.1):
+        exchange.wfile.write(b" ")
+
+
+def stream(*events: Any, ends: str = "properly") -> Answer:
+    """Send events of a watch; it `ends` properly, is silent for ever, or is broken in mid-line."""
+
+    def answer(exchange: Exchange) -> None:
+        exchange.send_response(200)
+        exchange.send_header("Transfer-Encoding", "chunked")
+        exchange.end_headers()
+        for event in events:
+            exchange.chunk(event if isinstance(event, bytes) else json.dumps(event).encode() + b"\n")
+        if ends == "silent":
+            exchange.script.over.wait(30)
+        elif ends == "broken":
+            exchange.chunk(b'{"type": "ADDED", "object": {"metadata": {"name": "half')
+            exchange.close_connection = True
+            return
+        exchange.chunk(b"")
+
+    return answer
+
+
+@contextmanager
+def serving() -> Iterator[tuple[str, Script]]:
+    """Serve on a free port; yields the address and the script."""
+    script = Script()
+    handler = type("Scripted", (Exchange,), {"script": script})
+
+    class Server(ThreadingHTTPServer):
+        daemon_threads = True
+
+        def handle_error(self, *arguments):
+            """The client left first: that is what the tests are about."""
+
+    server = Server(("127.0.0.1", 0), handler)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02})
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}", script
+    finally:
+        script.over.set()
+        with suppress(OSError):
+            server.shutdown()
+        server.server_close()
+        thread.join()

@@ -1,0 +1,150 @@
+"""Which API server, and who we are: from a kubeconfig, a plugin, or a pod's service account."""
+
+import base64
+import json
+import stat
+from datetime import datetime, timedelta
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from kubernetes.config import incluster_config
+
+from palaestra.cluster import ApiError, Forbidden, NotConfigured, Unreachable, connect
+from palaestra.cluster.resources import PODS
+from tests.control_plane.certificates import Authority
+from tests.integration.apiserver.conftest import write_kubeconfig
+from tests.integration.apiserver.server import reply
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(monkeypatch, tmp_path):
+    """No kubeconfig of the person who runs the tests."""
+    monkeypatch.delenv("KUBECONFIG", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+
+
+def who_asks(rude, api):
+    """Return the credentials that arrive."""
+    rude.script.calls = [reply(obj={"gitVersion": "v1.36.4"})]
+    assert api.version() == "v1.36.4"
+    api.close()
+    return rude.script.asked[-1].headers.get("Authorization")
+
+
+def test_the_current_context_is_used_where_none_is_named(rude):
+    """As kubectl does it."""
+    assert who_asks(rude, connect(rude.kubeconfig)) == "Bearer my-token"
+
+
+def test_a_context_may_be_named(rude):
+    """One file for many clusters."""
+    assert who_asks(rude, connect(rude.kubeconfig, "other")) == "Bearer other-token"
+
+
+def test_the_environment_names_a_kubeconfig(rude, monkeypatch):
+    """KUBECONFIG, as for kubectl."""
+    monkeypatch.setenv("KUBECONFIG", rude.kubeconfig)
+
+    assert who_asks(rude, connect()) == "Bearer my-token"
+
+
+def test_a_plugin_is_asked_for_a_token(rude, tmp_path):
+    """Clouds give credentials so."""
+    plugin = tmp_path / "plugin"
+    answer = {
+        "apiVersion": "client.authentication.k8s.io/v1",
+        "kind": "ExecCredential",
+        "status": {"token": "of-the-plugin"},
+    }
+    plugin.write_text(f"#!/bin/sh\necho '{json.dumps(answer)}'\n")
+    plugin.chmod(plugin.stat().st_mode | stat.S_IXUSR)
+    user = {"exec": {"apiVersion": answer["apiVersion"], "command": str(plugin), "interactiveMode": "Never"}}
+
+    api = connect(write_kubeconfig(tmp_path / "with-plugin", rude.address, user))
+
+    assert who_asks(rude, api) == "Bearer of-the-plugin"
+
+
+def test_certificates_may_stand_in_the_kubeconfig_itself(control_plane, tmp_path):
+    """As kind and most clouds write them."""
+    content = json.loads(control_plane.kubeconfig.read_text())
+    for part in (content["clusters"][0]["cluster"], content["users"][0]["user"]):
+        for field in [field for field in part if field != "server"]:
+            part[f"{field}-data"] = base64.b64encode(Path(part.pop(field)).read_bytes()).decode()
+    kubeconfig = tmp_path / "whole"
+    kubeconfig.write_text(json.dumps(content))
+
+    api = connect(str(kubeconfig))
+    assert api.list(PODS, "default") == []
+    api.close()
+
+
+def test_a_server_that_another_authority_vouches_for_is_not_talked_to(control_plane, tmp_path):
+    """No credentials are sent there."""
+    content = json.loads(control_plane.kubeconfig.read_text())
+    other = tmp_path / "other"
+    other.mkdir()
+    authority = str(Authority.create(other).pair.certificate)
+    content["clusters"][0]["cluster"]["certificate-authority"] = authority
+    kubeconfig = tmp_path / "wrong"
+    kubeconfig.write_text(json.dumps(content))
+
+    with pytest.raises(Unreachable, match="certificate"):
+        connect(str(kubeconfig)).version()
+
+
+@pytest.fixture
+def in_a_pod(control_plane, tmp_path, monkeypatch):
+    """The environment and the files of a pod; returns its token's file and a clock to be set forward."""
+    token, late = tmp_path / "token", [timedelta()]
+    monkeypatch.setattr(incluster_config, "SERVICE_TOKEN_FILENAME", str(token))
+    authority = control_plane.authority.pair.certificate
+    monkeypatch.setattr(incluster_config, "SERVICE_CERT_FILENAME", str(authority))
+    monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "127.0.0.1")
+    monkeypatch.setenv("KUBERNETES_SERVICE_PORT", str(control_plane.port))
+    clock = SimpleNamespace(now=lambda: datetime.now() + late[0])  # noqa: DTZ005 - as the client does
+    monkeypatch.setattr(incluster_config, "datetime", SimpleNamespace(datetime=clock, timedelta=timedelta))
+    return SimpleNamespace(token=token, late=late)
+
+
+def test_a_pod_is_its_service_account_and_reads_its_token_anew(control_plane, in_a_pod):
+    """The kubelet replaces tokens before they expire; the operator runs on."""
+    account = ("serviceaccount/default", "--namespace=default", "--timeout=30s")
+    assert control_plane.kubectl("wait", "--for=create", *account).returncode == 0
+    in_a_pod.token.write_text("expired")
+    api = connect()
+    with pytest.raises(ApiError, match="Unauthorized"):
+        api.version()
+
+    in_a_pod.token.write_text(control_plane.kubectl("create", "token", "default").stdout.strip())
+    in_a_pod.late[0] = timedelta(seconds=61)
+
+    with pytest.raises(Forbidden, match='"system:serviceaccount:default:default" cannot list'):
+        api.list(PODS, "default")
+    api.close()
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["", "[]", "{}", "not: [yaml", '{"current-context": "x", "contexts": []}', "contexts: 7"],
+)
+def test_a_kubeconfig_that_cannot_be_used_is_named_with_a_remedy(tmp_path, content):
+    """Whatever stands in it."""
+    path = tmp_path / "wrong"
+    path.write_text(content)
+
+    with pytest.raises(NotConfigured, match=f"{path}: .*KUBECONFIG"):
+        connect(str(path))
+
+
+def test_a_missing_kubeconfig_is_named(tmp_path):
+    """Not the pod's service account in its place."""
+    with pytest.raises(NotConfigured, match="missing"):
+        connect(str(tmp_path / "missing"))
+
+
+def test_nowhere_to_connect_to_is_said_with_a_remedy():
+    """On a laptop without any cluster."""
+    with pytest.raises(NotConfigured, match="--kubeconfig"):
+        connect()

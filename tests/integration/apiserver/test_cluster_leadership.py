@@ -1,0 +1,177 @@
+"""Two operators, one lease, a real API server: one leads, and another follows however the first one ends."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from palaestra.cluster import Leadership
+from palaestra.cluster.resources import LEASES
+
+PROGRAM = Path(__file__).with_name("candidate.py")
+DURATION_S = 3
+
+
+class Candidate:
+    """A process that stands for election."""
+
+    def __init__(self, control_plane, namespace, identity):
+        arguments = [str(control_plane.kubeconfig), namespace, identity]
+        self.process = subprocess.Popen(
+            [sys.executable, str(PROGRAM), *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            bufsize=0,
+        )
+        self.unread = b""
+
+    def line(self, deadline_s=15):
+        """Return its next line, or None when there is none in time."""
+        ends = time.monotonic() + deadline_s
+        while b"\n" not in self.unread:
+            ready, _, _ = select.select([self.process.stdout], [], [], max(0, ends - time.monotonic()))
+            part = os.read(self.process.stdout.fileno(), 4096) if ready else b""
+            if not part:
+                return None
+            self.unread += part
+        line, _, self.unread = self.unread.partition(b"\n")
+        return line.decode()
+
+    def ask(self):
+        """Make it say what it thinks now, and return the first line that says so or anything else."""
+        self.process.stdin.write(b"\n")
+        return self.line()
+
+    def close(self):
+        """End it, whatever its state."""
+        self.process.kill()
+        self.process.wait()
+        self.process.stdin.close()
+        self.process.stdout.close()
+
+
+@pytest.fixture
+def candidate(control_plane, namespace):
+    """Start candidates for one lease; all are ended."""
+    started = []
+
+    def start(identity):
+        started.append(Candidate(control_plane, namespace, identity))
+        return started[-1]
+
+    yield start
+    for each in started:
+        each.close()
+
+
+def test_one_of_two_leads(candidate):
+    """The second one waits as long as the first one lives."""
+    first = candidate("first")
+    assert first.line() == "leads True"
+
+    second = candidate("second")
+
+    assert second.line(2 * DURATION_S) is None
+    assert second.ask() == "now False"
+    assert first.ask() == "now True"
+
+
+def test_a_leader_that_ends_hands_over_at_once(candidate, real, namespace):
+    """Released, not left to run out."""
+    first, second = candidate("first"), None
+    assert first.line() == "leads True"
+    second = candidate("second")
+    assert second.ask() == "now False"
+    started = time.monotonic()
+
+    first.process.stdin.close()
+    assert second.line() == "leads True"
+
+    assert time.monotonic() - started < DURATION_S * 2 / 3
+    assert first.line() == "follows False"
+    spec = real.get(LEASES, namespace, "operator")["spec"]
+    assert (spec["holderIdentity"], spec["leaseTransitions"]) == ("second", 1)
+
+
+def test_a_leader_that_is_killed_is_followed_after_its_lease(candidate):
+    """Nobody gave the lease back."""
+    first = candidate("first")
+    assert first.line() == "leads True"
+    second = candidate("second")
+    assert second.ask() == "now False"
+    started = time.monotonic()
+
+    first.process.kill()
+    assert second.line() == "leads True"
+
+    assert DURATION_S * 0.6 < time.monotonic() - started < DURATION_S * 4
+
+
+def test_a_leader_that_was_frozen_knows_that_it_is_none_when_it_wakes(candidate):
+    """Before it does anything else: `leads()` asks the clock."""
+    first = candidate("first")
+    assert first.line() == "leads True"
+    second = candidate("second")
+    assert second.ask() == "now False"
+
+    first.process.send_signal(signal.SIGSTOP)
+    assert second.line() == "leads True"
+    first.process.stdin.write(b"\n")
+    first.process.send_signal(signal.SIGCONT)
+
+    assert {first.line(), first.line()} == {"now False", "follows False"}
+    assert second.ask() == "now True"
+
+
+def test_a_leader_whose_lease_was_deleted_takes_it_again(candidate, real, namespace):
+    """A person may delete anything."""
+    first = candidate("first")
+    assert first.line() == "leads True"
+
+    real.delete(LEASES, namespace, "operator")
+    ends = time.monotonic() + 10
+    found = []
+    while not found and time.monotonic() < ends:
+        found = real.list(LEASES, namespace)
+
+    assert first.ask() == "now True"
+    assert found[0]["spec"]["holderIdentity"] == "first"
+
+
+def test_a_leader_whose_lease_another_has_taken_stops(candidate, real, namespace):
+    """A person may write anything too."""
+    first = candidate("first")
+    assert first.line() == "leads True"
+
+    real.merge(LEASES, namespace, "operator", {"spec": {"holderIdentity": "a person"}})
+
+    assert first.line() == "follows False"
+
+
+def test_a_leader_that_ends_leaves_the_lease_to_nobody(real, namespace):
+    """And is none any more, from the moment when it was told."""
+    leads, follows = threading.Event(), threading.Event()
+    leadership = Leadership(real, namespace, "operator", "me", duration_s=DURATION_S, renew_s=0.3)
+    leadership.start(leads.set, follows.set)
+    assert leads.wait(10)
+
+    leadership.stop()
+
+    assert not leadership.leads()
+    assert follows.is_set()
+    assert not real.get(LEASES, namespace, "operator")["spec"].get("holderIdentity")
+
+
+def test_a_candidate_that_never_started_can_be_stopped(real, namespace):
+    """Whatever went wrong before."""
+    leadership = Leadership(real, namespace, "operator", "me")
+    leadership.stop()
+
+    assert not leadership.leads()

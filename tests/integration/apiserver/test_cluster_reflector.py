@@ -1,0 +1,240 @@
+"""The cache under an API server that misbehaves: it goes on, knows the truth again, and does not hammer."""
+
+import threading
+import time
+
+import pytest
+
+from palaestra.cluster import Reflector
+from palaestra.cluster.resources import CONFIG_MAPS, PODS
+from tests.integration.apiserver.server import hang, raw, refusal, reply, stream
+
+
+def pod(name, version="1"):
+    """A pod as the API server sends it; `bad` ones make the cache's user stumble."""
+    return {"metadata": {"name": name, "namespace": "n", "resourceVersion": version, "labels": {}}}
+
+
+def listed(*names, version="10"):
+    """A whole list."""
+    return reply(obj={"metadata": {"resourceVersion": version}, "items": [pod(name) for name in names]})
+
+
+def added(name, version):
+    """An event."""
+    return {"type": "ADDED", "object": pod(name, version)}
+
+
+def bookmark(version):
+    """An event that says no more than how far things are."""
+    return {"type": "BOOKMARK", "object": {"metadata": {"resourceVersion": version}}}
+
+
+EXPIRED = {
+    "type": "ERROR",
+    "object": {"kind": "Status", "code": 410, "reason": "Expired", "message": "too old"},
+}
+
+
+class Followed:
+    """A reflector of pods, and what it reported."""
+
+    def __init__(self, rude, resource=PODS):
+        self.script, self.names = rude.script, []
+        self.more = threading.Condition()
+        self.reflector = Reflector(rude.api, resource, namespace="n", keep=self.keep, changed=self.changed)
+
+    def keep(self, obj):
+        """Keep everything, but stumble over a pod called bad."""
+        if obj["metadata"]["name"] == "bad":
+            raise ValueError("nobody foresaw this")
+        return obj
+
+    def changed(self, obj):
+        """Note the name."""
+        with self.more:
+            self.names.append(obj["metadata"]["name"])
+            self.more.notify_all()
+
+    def wait_reported(self, *names):
+        """Wait for all of these names."""
+        with self.more:
+            assert self.more.wait_for(lambda: set(names) <= set(self.names), timeout=5), self.names
+
+    def wait_asked(self, count, *, watches):
+        """Wait until there were so many watches, or lists, and return them."""
+        ends = time.monotonic() + 5
+        while len(asked := self.script.of(watches=watches)) < count:
+            assert time.monotonic() < ends, f"only {len(asked)} of {count}"
+            threading.Event().wait(0.01)  # the server tells nobody
+        return asked
+
+    def known(self):
+        """The names in the cache."""
+        keys = self.reflector.store.keys()
+        return {name for _, name in keys}
+
+
+@pytest.fixture
+def follow(rude):
+    """Start a reflector against a list and some watches; the last watch is silent."""
+    started = []
+
+    def start(*watches, lists=(), resource=PODS):
+        rude.script.calls, rude.script.watches = (
+            list(lists) or [listed("a", "b")],
+            [*watches, stream(ends="silent")],
+        )
+        followed = Followed(rude, resource)
+        followed.reflector.start()
+        started.append(followed)
+        return followed
+
+    yield start
+    for followed in started:
+        followed.reflector.stop(2)
+
+
+def test_what_is_listed_and_what_is_added_is_known(follow):
+    """The way without trouble."""
+    followed = follow(stream(added("c", "11"), ends="silent"))
+
+    followed.wait_reported("a", "b", "c")
+
+    assert followed.reflector.synced
+    assert followed.known() == {"a", "b", "c"}
+
+
+def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):
+    """A half-open connection looks alive for ever; nothing is listed anew for it."""
+    followed = follow(stream(added("c", "11"), ends="silent"), stream(added("d", "12"), ends="silent"))
+
+    followed.wait_reported("d")
+
+    versions = [asked.query["resourceVersion"] for asked in followed.script.of(watches=True)]
+    assert versions[:2] == ["10", "11"]
+    assert len(followed.script.of(watches=False)) == 1
+
+
+def test_a_watch_whose_answer_never_begins_is_given_up(follow):
+    """The server accepted the connection, and no more."""
+    followed = follow(hang, stream(added("c", "11"), ends="silent"))
+
+    followed.wait_reported("c")
+
+
+@pytest.mark.parametrize(
+    "forgotten", [refusal(410, "Expired"), stream(EXPIRED)], ids=["as a status", "as an event"]
+)
+def test_a_forgotten_version_means_a_new_list_and_no_missed_deletion(follow, forgotten):
+    """While nobody watched, b was deleted."""
+    followed = follow(forgotten, lists=[listed("a", "b"), listed("a", "c", version="90")])
+
+    followed.wait_reported("c")
+    followed.wait_asked(2, watches=True)
+
+    assert followed.known() == {"a", "c"}
+    assert followed.names == ["a", "b", "c", "b"]
+    assert followed.script.of(watches=True)[1].query["resourceVersion"] == "90"
+
+
+def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(follow, rude):
+    """Some clients give up at the second 410, others ask 3,000 times a second."""
+    followed = follow()
+    rude.script.watches = [refusal(410, "Expired")]
+    followed.wait_reported("a", "b")
+    threading.Event().wait(1.0)  # what is measured is how little happens
+
+    assert 2 <= len(rude.script.of(watches=False)) <= 10
+
+
+@pytest.mark.parametrize(
+    "trouble", [refusal(500, "InternalError"), raw(b"garbage"), stream(), stream(b"garbage\n")],
+    ids=["500", "garbage", "ends at once", "garbage lines"],
+)  # fmt: skip
+def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
+    """Waits of 0.05 to 0.2 s here; 0.5 to 30 s in a cluster."""
+    follow()
+    rude.script.watches = [trouble]
+    rude.script.calls = [listed("a")]
+    threading.Event().wait(1.0)  # what is measured is how little happens
+
+    assert len(rude.script.of(watches=True)) <= 10
+
+
+def test_an_event_that_was_cut_is_never_seen(follow):
+    """The next watch brings it whole."""
+    followed = follow(stream(added("c", "11"), ends="broken"), stream(added("d", "12"), ends="silent"))
+
+    followed.wait_reported("d")
+
+    assert followed.known() == {"a", "b", "c", "d"}
+    assert followed.script.of(watches=True)[1].query["resourceVersion"] == "11"
+
+
+def test_bookmarks_alone_move_the_version_on(follow):
+    """Where nothing changes for an hour, the version is not forgotten all the same."""
+    followed = follow(stream(bookmark("50")), stream(bookmark("60"), ends="silent"))
+
+    asked = followed.wait_asked(3, watches=True)
+
+    assert [each.query["resourceVersion"] for each in asked[:3]] == ["10", "50", "60"]
+    assert asked[0].query["allowWatchBookmarks"] == "true"
+    assert 300 <= int(asked[0].query["timeoutSeconds"]) <= 600
+    assert len(followed.script.of(watches=False)) == 1
+
+
+def test_lists_that_fail_are_tried_until_one_succeeds(follow):
+    """The API server starts after the operator."""
+    followed = follow(lists=[refusal(503, "ServiceUnavailable"), raw(b"garbage"), listed("a")])
+
+    assert followed.reflector.wait_synced(5)
+    assert followed.known() == {"a"}
+
+
+def test_before_the_first_whole_list_nothing_is_in_step(follow):
+    """What is not there may only not be known yet."""
+    followed = follow(lists=[hang])
+
+    assert not followed.reflector.wait_synced(0.2)
+
+
+def test_one_object_that_nobody_foresaw_hides_no_other(follow):
+    """One bad object never delays another."""
+    followed = follow(stream(added("bad", "11"), added("c", "12"), ends="silent"), lists=[listed("bad", "a")])
+
+    followed.wait_reported("a", "c")
+
+    assert followed.known() == {"a", "c"}
+
+
+def test_a_change_that_leaves_what_is_kept_as_it_was_is_not_reported(follow):
+    """Heartbeats wake no worker."""
+    same = {"type": "MODIFIED", "object": pod("a", "1")}
+    followed = follow(stream(same, added("c", "12"), ends="silent"))
+
+    followed.wait_reported("c")
+
+    assert followed.names == ["a", "b", "c"]
+
+
+def test_metadata_are_kept_under_the_name_of_their_kind(follow):
+    """The API server sends PartialObjectMetadata; nobody else has to know."""
+    followed = follow(stream(added("c", "11"), ends="silent"), resource=CONFIG_MAPS.only_metadata())
+
+    followed.wait_reported("a", "c")
+
+    assert {followed.reflector.store.get("n", name)["kind"] for name in "ac"} == {"ConfigMap"}
+
+
+@pytest.mark.parametrize("watch", [stream(ends="silent"), hang], ids=["watching", "not answered"])
+def test_stopping_takes_no_longer_than_it_may(follow, rude, watch):
+    """The operator ends in two seconds."""
+    followed = follow(watch)
+    followed.wait_asked(1, watches=True)
+    started = time.monotonic()
+
+    followed.reflector.stop(1)
+
+    assert time.monotonic() - started < 1.5
+    assert len(rude.script.of(watches=True)) == 1

@@ -1,0 +1,76 @@
+"""Who may lead, and until when: a given clock, no API server."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.cluster.tenure import Claim, Sighting, Tenure
+
+seconds = st.floats(min_value=0, max_value=10**6)
+durations = st.floats(min_value=1, max_value=3600)
+
+
+def claim(**changes):
+    """A lease that somebody holds."""
+    return Claim(**{"holder": "a", "duration_s": 15.0, "renewed": "1", "transitions": 0} | changes)
+
+
+@given(duration_s=durations, offset=seconds, sent=seconds, travel=seconds, looked=seconds, now=seconds)
+def test_a_leader_has_stopped_before_anyone_can_follow(duration_s, offset, sent, travel, looked, now):
+    """Two clocks that agree on nothing but the length of a second: `offset` lies between them."""
+    tenure = Tenure(sent=sent, duration_s=duration_s)
+    follower = Sighting()
+    seen = sent + travel + looked + offset  # it was written after it was sent, and seen after that
+    follower.see(claim(duration_s=duration_s), seen)
+
+    assert not (tenure.holds(now) and now + offset >= seen and follower.free(now + offset))
+
+
+@given(duration_s=durations)
+def test_a_leader_stops_while_a_third_of_the_lease_is_left(duration_s):
+    """Time for the writes that are on their way."""
+    tenure = Tenure(sent=100.0, duration_s=duration_s)
+
+    assert tenure.holds(100.0)
+    assert not tenure.holds(100.0 + duration_s * 0.667)
+
+
+def test_a_renewal_starts_the_count_anew():
+    """A leader that renews is never overtaken."""
+    sighting = Sighting()
+    sighting.see(claim(renewed="1"), 0.0)
+    sighting.see(claim(renewed="2"), 14.0)
+
+    assert not sighting.free(28.9)
+    assert sighting.free(29.0)
+
+
+def test_seeing_the_same_again_does_not_start_the_count_anew():
+    """A leader that died is followed, however often one looks."""
+    sighting = Sighting()
+    for moment in range(15):
+        sighting.see(claim(), float(moment))
+
+    assert sighting.free(15.0)
+
+
+def test_a_lease_that_was_given_back_is_free_at_once():
+    """An operator that ends hands over without a pause."""
+    sighting = Sighting()
+    sighting.see(claim(), 0.0)
+    sighting.see(claim(holder="", duration_s=1), 0.1)
+
+    assert sighting.free(0.1)
+
+
+def test_the_times_in_a_lease_are_never_compared_with_a_clock():
+    """A renewal from the year 2000 or 3000 holds as long as any."""
+    sighting = Sighting()
+    sighting.see(claim(renewed="2000-01-01T00:00:00.000000Z"), 50.0)
+
+    assert not sighting.free(64.9)
+
+
+def test_a_lease_without_a_spec_is_nobodys():
+    """Anything may stand in the cluster; it must not stop us."""
+    assert Claim.read({"metadata": {"name": "x"}}) == Claim()
+    assert Sighting().free(0.0)

@@ -1,0 +1,90 @@
+"""The cache: found by name and by label, never shared, always what was put last."""
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from palaestra.cluster import Store
+from palaestra.cluster.store import JOB_LABEL
+
+namespaces, names = st.sampled_from(["n1", "n2"]), st.sampled_from("abcd")
+labels = st.dictionaries(st.sampled_from([JOB_LABEL, "role"]), st.sampled_from("xy"))
+
+
+def make_object(name="a", namespace="n1", **labels):
+    """An object with labels; `job` stands for the indexed one."""
+    marks = {JOB_LABEL if key == "job" else key: value for key, value in labels.items()}
+    return {"metadata": {"name": name, "namespace": namespace, "labels": marks}}
+
+
+class Cache(RuleBasedStateMachine):
+    """Any order of putting and dropping, against a dict that is searched."""
+
+    def __init__(self):
+        super().__init__()
+        self.store = Store()
+        self.model = {}
+
+    @rule(namespace=namespaces, name=names, labels=labels)
+    def put(self, namespace, name, labels):
+        """A new object, or a change of its labels."""
+        obj = {"metadata": {"name": name, "namespace": namespace, "labels": labels}}
+
+        assert self.store.put(obj) == (self.model.get((namespace, name)) != obj)
+        self.model[namespace, name] = obj
+
+    @rule(namespace=namespaces, name=names)
+    def drop(self, namespace, name):
+        """A deletion."""
+        assert self.store.drop(namespace, name) == self.model.pop((namespace, name), None)
+
+    @rule(namespace=st.none() | namespaces, wanted=labels)
+    def select(self, namespace, wanted):
+        """With the index and without it, the same is found."""
+        found = self.store.select(namespace, wanted)
+
+        assert found == [
+            obj
+            for (where, _), obj in sorted(self.model.items())
+            if namespace in (None, where) and wanted.items() <= obj["metadata"]["labels"].items()
+        ]
+
+    @invariant()
+    def holds_what_was_put(self):
+        """No more and no less."""
+        assert self.store.keys() == self.model.keys()
+        assert len(self.store) == len(self.model)
+        assert all(self.store.get(*key) == obj for key, obj in self.model.items())
+
+
+Cache.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+TestCache = Cache.TestCase
+
+
+def test_what_a_reader_changes_nobody_else_sees():
+    """A cache that its readers can change lies to the next one."""
+    store = Store()
+    store.put(make_object(job="x"))
+
+    store.get("n1", "a")["metadata"]["labels"].clear()
+
+    assert store.select("n1", {JOB_LABEL: "x"}) == [make_object(job="x")]
+
+
+def test_objects_outside_of_namespaces_are_found_without_one():
+    """Nodes."""
+    store = Store()
+    store.put({"metadata": {"name": "node"}})
+
+    assert store.get(None, "node") == {"metadata": {"name": "node"}}
+
+
+def test_nothing_remains_of_what_was_dropped():
+    """An operator that has seen a million jobs is no larger for it."""
+    store = Store()
+    for number in range(1000):
+        store.put(make_object(f"o{number}", f"n{number}", job=f"j{number}"))
+        store.drop(f"n{number}", f"o{number}")
+
+    assert len(store) == 0
+    assert store.select(None, {}) == []
