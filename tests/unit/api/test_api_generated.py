@@ -11,7 +11,7 @@ from palaestra.api.reference import page, tables
 from palaestra.api.simulators import Builtin
 from palaestra_sim.world import builtin
 
-EXAMPLES = ["minimal", "move-to-target", "reinforce", "sparse-reward", "two-collectors"]
+EXAMPLES = ["minimal", "move-to-target", "reinforce", "sparse-reward", "tiny", "two-collectors"]
 
 
 @pytest.mark.parametrize("name", ["manifests/crd.yaml", "docs/trainingjob.md"])

@@ -57,7 +57,7 @@ def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):
     assert main(["plan", str(job)]) == 0
 
     kinds = [each["kind"] for each in yaml.safe_load_all(capsys.readouterr().out)]
-    assert kinds == ["ConfigMap", "PersistentVolumeClaim", "Job"] * 2
+    assert kinds == ["NetworkPolicy", *["ConfigMap", "PersistentVolumeClaim", "Job"] * 2]
 
 
 def test_plan_can_print_what_run_would_do_here(job, tmp_path, capsys):
@@ -166,7 +166,29 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
     assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
 
 
-@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"], ["plan", "--help"]])
+@pytest.mark.parametrize(
+    ("option", "line"),
+    [
+        ("--workers=0", "--workers and --resync: must be above 0; leave them out for the defaults"),
+        ("--metrics-address=8080", "--metrics-address: '8080' is no address; write it as 0.0.0.0:8080"),
+    ],
+)
+def test_an_operator_that_cannot_be_is_not_started(option, line, fails):
+    """Before anything is connected to."""
+    assert fails("operator", option) == [line]
+
+
+def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
+    """Not a traceback of a library."""
+    [line] = fails("operator", f"--kubeconfig={tmp_path}/none", "--metrics-address=127.0.0.1:0")
+
+    assert line.startswith(f"{tmp_path}/none: ")
+    assert "--kubeconfig" in line
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--version"], ["--help"], ["run", "--help"], ["plan", "--help"], ["operator", "--help"]]
+)
 def test_help_and_version_say_what_they_are(arguments, capsys):
     """Every help ends with the exit codes."""
     with pytest.raises(SystemExit) as ended:

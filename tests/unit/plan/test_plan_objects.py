@@ -13,11 +13,11 @@ def pod(planned, replica=0):
     return planned.replicas[replica].job["spec"]["template"]["spec"]
 
 
-def test_a_replica_is_a_config_map_a_claim_and_a_job_in_this_order(in_cluster):
-    """A pod that is made before its volumes exist waits for them for no reason."""
+def test_a_job_is_a_policy_and_for_each_replica_a_config_map_a_claim_and_a_job(in_cluster):
+    """In this order: a pod waits for its volumes, and is never there before its policy."""
     kinds = [each["kind"] for each in in_cluster(replicas=2).objects]
 
-    assert kinds == ["ConfigMap", "PersistentVolumeClaim", "Job"] * 2
+    assert kinds == ["NetworkPolicy", *["ConfigMap", "PersistentVolumeClaim", "Job"] * 2]
 
 
 def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_cluster):
@@ -102,12 +102,12 @@ def test_one_pod_at_a_time(in_cluster):
 
 
 def test_a_queued_job_leaves_suspension_to_kueue(in_cluster):
-    """Two owners of one field would undo each other's work for ever."""
+    """It is made suspended, so that no pod starts before Kueue has looked at it."""
     queued = in_cluster(scheduling={"queueName": "robots"}).replicas[0].job
     own = in_cluster(suspend=True).replicas[0].job
 
     assert queued["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] == "robots"
-    assert "suspend" not in queued["spec"]
+    assert queued["spec"]["suspend"] is True
     assert own["spec"]["suspend"] is True
 
 

@@ -63,6 +63,7 @@ SHAPES = {
         ).map(tuple),
         last_checkpoint=st.none() | checkpoints,
         last_progress=st.none() | times,
+        attempt=st.none() | st.integers(1, 2**53),
     ),
     Termination: st.builds(
         Termination,
@@ -70,6 +71,8 @@ SHAPES = {
         reason=texts,
         success_rate=st.none() | shares,
         last_checkpoint=st.none() | checkpoints,
+        attempt=st.none() | st.integers(1, 2**53),
+        restarts=st.none() | counts,
     ),
 }
 

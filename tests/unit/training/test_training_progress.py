@@ -102,6 +102,31 @@ def test_recycling_is_no_restart(progress):
     assert (progress.counters.restarts, progress.counters.recycled) == (0, 1)
 
 
+def test_a_simulator_is_ready_when_it_is_up_and_not_when_all_are(progress):
+    """Whoever asks which one is late must not be told of the others."""
+    progress.started("collect-0")
+
+    states = {each.name: each.state for each in progress.status().simulators}
+    assert states == {"collect-0": "ready", "evaluate-0": "starting"}
+
+
+def test_a_run_that_goes_on_never_says_step_0(progress):
+    """From the moment that its checkpoint is found, before any simulator is up."""
+    progress.resumed(40)
+
+    assert (progress.status().step, progress.status().last_checkpoint.step) == (40, 40)
+
+
+def test_restarts_of_this_attempt_are_those_of_all_simulators(progress):
+    """Recycling is none; the counters have those of former attempts too."""
+    progress.counters.restarts = 7
+    progress.restarted("collect-0", recycled=False)
+    progress.restarted("evaluate-0", recycled=False)
+    progress.restarted("evaluate-0", recycled=True)
+
+    assert progress.restarts() == 2
+
+
 def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
     """An evaluation is no stall."""
     clock.now = 50.0

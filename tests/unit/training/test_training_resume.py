@@ -56,6 +56,25 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     assert reasons == ["new run", f"resumed at step {saved.step}"]
 
 
+def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job, last_word):
+    """By the run directory's record, which outlives every pod; restarts are those of this attempt."""
+    play(job("DQN"), {"collect-0": {"steps": [5]}}, signal_after(42))
+    first = last_word()
+
+    play(job("DQN"), must_resume=True)
+
+    assert (first.attempt, first.restarts) == (1, 1)
+    assert (last_word().attempt, last_word().restarts) == (2, 0)
+
+
+def test_an_attempt_whose_simulators_never_start_is_on_record(play, job, directory, last_word):
+    """It was a pod, and the next one is the second."""
+    code, _ = play(job("DQN"), {"collect-0": {"starts": range(1, 20)}})
+
+    assert code == 80
+    assert (last_word().attempt, len(list(read_lines(directory.attempts)))) == (1, 1)
+
+
 def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_word):
     """A pod that is started once more must not cost anything."""
     play(job())

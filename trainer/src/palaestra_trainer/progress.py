@@ -74,6 +74,7 @@ class Progress:
         counters: what is counted over all attempts.
         success_rate: that of this attempt's last evaluation; None before it.
         checkpoint: the newest checkpoint; None without one.
+        attempt: this one's number in the run directory's record; None before it is recorded.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class Progress:
         self.counters = Counters()
         self.success_rate: float | None = None
         self.checkpoint: CheckpointStatus | None = None
+        self.attempt: int | None = None
         self._clock = clock
         self._lock = threading.Lock()
         self._simulators = {name: _Simulator(role=role) for name, role in simulators}
@@ -102,12 +104,22 @@ class Progress:
         self._moved = self._clock()
         self._moved_at = time.time()
 
+    def resumed(self, step: int) -> None:
+        """The run goes on from the checkpoint at `step`: whoever asks is told so from now on."""
+        self.step = step
+        self.saved(step)
+
     def fault(self, simulator: str, fault: SimulatorFault) -> None:
         """Count a fault of a simulator, which is down from now on."""
         with self._lock:
             self.counters.faults[fault.kind] += 1
             entry = self._simulators[simulator]
             entry.state, entry.last_fault = "failed", str(fault)
+
+    def started(self, simulator: str) -> None:
+        """A simulator is up for the first time in this attempt."""
+        with self._lock:
+            self._simulators[simulator].state = "ready"
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
         """Count a restart of a simulator, which is up from now on."""
@@ -156,6 +168,13 @@ class Progress:
             self._counted = now
             return self.counters
 
+    def restarts(self) -> int:
+        """Return the restarts of simulators after faults, in this attempt.
+
+        Waits for nobody: the watchdog asks when the others hang.
+        """
+        return sum(simulator.restarts for simulator in self._simulators.values())
+
     def idle_s(self) -> float:
         """Return the seconds since the last environment step of any simulator, or since the start."""
         return self._clock() - self._moved
@@ -192,6 +211,7 @@ class Progress:
                 last_checkpoint=self.checkpoint,
                 last_progress=None if self._moved_at is None else timestamp(self._moved_at),
                 phase=self.phase,
+                attempt=self.attempt,
             )
 
 

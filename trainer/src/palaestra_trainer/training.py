@@ -114,8 +114,8 @@ class Attempt:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
             with ExitStack() as stack:
-                run = self._prepare(stack)
-                self._train(run, stack)
+                run, found = self._prepare(stack)
+                self._train(run, found, stack)
         except Exception as error:  # the process's edge: every end has an exit code
             end = end_of(error)
             if end.reason == "Unexpected":
@@ -130,23 +130,33 @@ class Attempt:
             success_rate=self._progress.success_rate,
             reason=f"{end.reason}: {end.message}",
             last_checkpoint=self._progress.checkpoint,
+            attempt=self._progress.attempt,
+            restarts=self._progress.restarts(),
         )
 
-    def _prepare(self, stack: ExitStack) -> Run:
-        """Return a run whose simulators are up; what it opened is closed by `stack`."""
+    def _prepare(self, stack: ExitStack) -> tuple[Run, checkpoint.Checkpoint | None]:
+        """Return a run whose simulators are up, and the checkpoint that it goes on from.
+
+        The attempt is on record before its simulators start: one that they end is an attempt too.
+        What was opened is closed by `stack`.
+        """
         configuration, progress = self._configuration, self._progress
         algorithms.check(configuration.algorithm)
         interruption = stack.enter_context(Interruption())
         stack.enter_context(StatusServer(configuration.status_address, progress))
         self._watch(stack)
         stack.enter_context(self._around.display)
+        found = self._newest()
+        self._begin(found)
+        if found:
+            progress.resumed(found.manifest.step)
         with interruption.at_once():
             fleet = Fleet(configuration, self._around.make_members(configuration), progress)
             stack.callback(fleet.stop)
             fleet.start()
         rest(fleet.evaluating)
         progress.ready()
-        return Run(
+        run = Run(
             configuration=configuration,
             directory=self._directory,
             fleet=fleet,
@@ -154,14 +164,18 @@ class Attempt:
             interruption=interruption,
             display=self._around.display,
         )
+        return run, found
 
-    def _train(self, run: Run, stack: ExitStack) -> None:
-        use_threads(self._around.environment)
+    def _newest(self) -> checkpoint.Checkpoint | None:
         found = checkpoint.newest(self._directory.checkpoints)
         if found is None and self._around.must_resume:
             raise ConfigurationError(
                 f"{self._directory.path}: has no checkpoint to resume from; leave --resume out"
             )
+        return found
+
+    def _train(self, run: Run, found: checkpoint.Checkpoint | None, stack: ExitStack) -> None:
+        use_threads(self._around.environment)
         env = SimulatorsVecEnv(
             run.fleet.collecting,
             self._configuration.seed,
@@ -169,7 +183,7 @@ class Attempt:
         )
         stack.callback(env.close)
         model = self._make_model(env, found)
-        self._begin(found)
+        self._progress.phase = "training"
         self._learn(model, Conductor(run, env, model.num_timesteps))
         self._progress.count_time()
         write_summary(self._directory, summarise(self._directory, self._progress))
@@ -184,8 +198,6 @@ class Attempt:
             model.set_random_seed(configuration.seed + step)
             env.seed(configuration.seed)
             self._progress.counters = Counters.from_json(found.manifest.counters)
-            self._progress.step = step
-            self._progress.saved(step)
         model.set_logger(configure(str(self._directory.tensorboard), ["tensorboard"]))
         return model
 
@@ -193,9 +205,9 @@ class Attempt:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
-        attempt = self._directory.begin_attempt(self._around.environment.get("PALAESTRA_POD_UID", ""), reason)
+        pod = self._around.environment.get("PALAESTRA_POD_UID", "")
+        self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason)
         log.info("training", attempt=attempt, reason=reason, target=self._configuration.steps)
-        self._progress.phase = "training"
 
     def _learn(self, model: BaseAlgorithm, conductor: Conductor) -> None:
         missing = self._configuration.steps - model.num_timesteps

@@ -158,11 +158,17 @@ def _free(value: dict[str, Any]) -> dict[str, Any]:
     return value
 
 
+# A map to anything, not an object with unknown fields: an API server that compares two of the latter
+# overlooks a key that was renamed, and what is frozen could be changed.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),
     AfterValidator(_free),
     WithJsonSchema(
-        {"type": "object", "maxProperties": 64, "x-kubernetes-preserve-unknown-fields": True},
+        {
+            "type": "object",
+            "maxProperties": 64,
+            "additionalProperties": {"x-kubernetes-preserve-unknown-fields": True, "nullable": True},
+        },
     ),
 ]

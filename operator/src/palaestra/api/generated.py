@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from palaestra.api.crd import crd
+from palaestra.api.reason_table import page as reasons_page
 from palaestra.api.reference import page
 from palaestra.api.yaml_text import write
 
@@ -17,10 +18,11 @@ def crd_text() -> str:
 def generated_files(root: Path) -> dict[str, str]:
     """Return path, relative to the repository's `root`, and text of each generated file.
 
-    Only the tables of docs/trainingjob.md are generated; the rest of it is read from `root`.
+    Only the tables of the two pages are generated; the rest of them is read from `root`.
     """
-    reference = "docs/trainingjob.md"
+    reference, operations = "docs/trainingjob.md", "docs/operations.md"
     return {
         "manifests/crd.yaml": _HEADER + crd_text(),
         reference: page((root / reference).read_text(encoding="utf-8")),
+        operations: reasons_page((root / operations).read_text(encoding="utf-8")),
     }

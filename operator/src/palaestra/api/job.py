@@ -16,6 +16,7 @@ from palaestra.api.fields import (
     Word,
 )
 from palaestra.api.model import ApiModel, Rule
+from palaestra.api.network import Network
 from palaestra.api.scheduling import Scheduling
 from palaestra.api.simulators import Role, SimulatorGroup
 from palaestra.api.status import Status
@@ -34,7 +35,6 @@ _WRITTEN_BY_SERVERS = frozenset(
         "deletionGracePeriodSeconds",
         "deletionTimestamp",
         "finalizers",
-        "generation",
         "managedFields",
         "ownerReferences",
         "resourceVersion",
@@ -54,6 +54,9 @@ class Metadata(ApiModel):
 
     uid: Word | None = None
     """Given by the cluster; absent for a job that was not applied to one."""
+
+    generation: Count | None = Field(default=None, exclude=True)
+    """Counts the changes of the spec; given by the cluster."""
 
     labels: Annotated[dict[str, Annotated[str, Field(max_length=63)]], Field(max_length=64)] = Field(
         default={}
@@ -122,6 +125,9 @@ class Spec(ApiModel):
 
     scheduling: Scheduling = Scheduling()
     """Where and when the pods run."""
+
+    network: Network = Network()
+    """Whom the pods may talk to."""
 
     image_pull_secrets: Annotated[NamedList[PullSecret], Field(max_length=8)] = ()
     """Secrets with which the pod's images are pulled."""

@@ -6,24 +6,20 @@ from typing import Any
 
 from palaestra.api.crd import schema
 from palaestra.api.job import TrainingJob
+from palaestra.api.marks import between_marks
 from palaestra.api.structural import Schema
 from palaestra.api.tree import model_at
 
 BEGIN = "<!-- generated from the models: palaestra.api.reference -->"
-END = "<!-- end of the generated part -->"
 
 
 def page(text: str) -> str:
-    """Return the page `text` with the part between its two marks made anew.
+    """Return docs/trainingjob.md, of which `text` is what it was, with its tables made anew.
 
     Raises:
         ValueError: a mark is missing.
     """
-    before, mark, rest = text.partition(BEGIN)
-    _, other_mark, after = rest.partition(END)
-    if not (mark and other_mark):
-        raise ValueError(f"docs/trainingjob.md: no {BEGIN} and {END}; put both in")
-    return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"
+    return between_marks(text, BEGIN, tables())
 
 
 def tables() -> str:
@@ -98,6 +94,8 @@ def _kind(field: Schema) -> str:
         return f"list of {_kind(field['items'])}"
     if "additionalProperties" in field:
         return f"map to {_kind(field['additionalProperties'])}"
+    if field.get("x-kubernetes-preserve-unknown-fields"):
+        return "anything"
     kind = str(field.get("format", field.get("type", "quantity")))
     return _KINDS.get(kind, kind) + _range(field)
 

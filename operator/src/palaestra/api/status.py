@@ -10,7 +10,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from palaestra.api.fields import Count, Fraction, Listed, Sentence, Word
+from palaestra.api.fields import Count, Fraction, Image, Listed, Sentence, Word
 from palaestra.api.model import ApiModel
 from palaestra.api.simulators import Role
 
@@ -86,7 +86,10 @@ class LastCheckpoint(ApiModel):
 
 
 class Restarts(ApiModel):
-    """What was started again in a replica, by cause."""
+    """What was started again in a replica, by cause.
+
+    The attempt's number is 1 + trainer + disruption + suspension.
+    """
 
     trainer: Count = 0
     """Pods that were replaced because the trainer failed; these count against `backoffLimit`."""
@@ -95,7 +98,24 @@ class Restarts(ApiModel):
     """Simulators that were started again after a fault, over all attempts."""
 
     disruption: Count = 0
-    """Pods that were replaced because the cluster took them: preemption, eviction, drain."""
+    """Pods that were replaced because the cluster took them (preemption, eviction, drain) or
+    somebody deleted them; they do not count against `backoffLimit`."""
+
+    suspension: Count = 0
+    """Pods that were replaced because the job was suspended and resumed."""
+
+
+class PodReference(ApiModel):
+    """The pod of the current attempt."""
+
+    name: Word
+    """Its name, for `kubectl logs`."""
+
+    uid: Word
+    """Its UID."""
+
+    created: datetime = Field(strict=False)
+    """When it was made."""
 
 
 class SimulatorStatus(ApiModel):
@@ -132,8 +152,14 @@ class ReplicaStatus(ApiModel):
     message: Sentence | None = None
     """Why, in a sentence for people; absent: nothing to say."""
 
+    since: datetime | None = Field(default=None, strict=False)
+    """When `phase` or `reason` last changed; absent: not seen yet."""
+
     attempt: Count = 0
     """Number of the current pod, from 1; 0: none yet."""
+
+    pod: PodReference | None = None
+    """The pod of the current attempt; absent: none yet."""
 
     step: Count | None = None
     """Environment steps learned from; absent: not known yet."""
@@ -156,8 +182,31 @@ class ReplicaStatus(ApiModel):
     last_checkpoint: LastCheckpoint | None = None
     """The newest checkpoint; absent: none yet."""
 
+    furthest_step: Count | None = None
+    """The highest step of all attempts; a new attempt goes on from the last checkpoint, which may
+    be behind it. Absent: not known yet."""
+
+    fruitless: Count = 0
+    """Pods in a row that were taken or interrupted without a step beyond `furthestStep`."""
+
+    simulator_restarts: Count = 0
+    """Simulators that were started again after a fault in the current attempt."""
+
     restarts: Restarts = Restarts()
     """What was started again, by cause."""
+
+
+class Release(ApiModel):
+    """The images that were fixed when the job was accepted, for whatever names none of its own."""
+
+    trainer: Image
+    """Image of trainer and ROS master."""
+
+    stub: Image
+    """Image of the stub simulator."""
+
+    webots: Image
+    """Image of Webots."""
 
 
 class Status(ApiModel):
@@ -168,6 +217,10 @@ class Status(ApiModel):
 
     phase: Phase | None = Field(default=None, strict=False)
     """The job in one word; absent: not seen yet."""
+
+    release: Release | None = None
+    """The images of the release that accepted the job, kept for its whole life; absent: not
+    accepted yet."""
 
     conditions: Annotated[
         Listed[Condition],
@@ -186,6 +239,12 @@ class Status(ApiModel):
 
     completion_time: datetime | None = Field(default=None, strict=False)
     """When the last replica ended; absent: not all have."""
+
+    active_seconds: Count = 0
+    """Seconds that the job was active before `activeSince`; suspended time is not counted."""
+
+    active_since: datetime | None = Field(default=None, strict=False)
+    """Since when the job is active; absent: it is suspended, has ended, or was not seen yet."""
 
     running: Word | None = None
     """Replicas that run or have succeeded, of all: `2/2`; absent: not seen yet."""

@@ -16,7 +16,7 @@ FROZEN = "cannot be changed; make a new TrainingJob"
 _KEPT = (
     "description", "type", "format", "pattern", "enum", "minimum", "maximum", "required",
     "minLength", "maxLength", "minItems", "maxItems", "minProperties", "maxProperties",
-    "x-kubernetes-int-or-string", "x-kubernetes-preserve-unknown-fields",
+    "nullable", "x-kubernetes-int-or-string", "x-kubernetes-preserve-unknown-fields",
     "x-kubernetes-list-type", "x-kubernetes-list-map-keys", "x-kubernetes-validations",
     MAY_CHANGE,
 )  # fmt: skip

@@ -16,6 +16,7 @@ from palaestra.plan.config_map import config_map
 from palaestra.plan.errors import PlanError
 from palaestra.plan.job import job as replica_job
 from palaestra.plan.layout import ClusterLayout, Images, Layout, LocalLayout, Places, Ports
+from palaestra.plan.network_policy import network_policy
 from palaestra.plan.pod import pod_template
 from palaestra.plan.replica import Replica
 from palaestra.plan.worlds import ConfigMaps, world_files
@@ -56,14 +57,19 @@ class ReplicaPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """The objects of a TrainingJob, by replica."""
+    """The objects of a TrainingJob: one for all of it, then those of each replica.
 
+    `network_policy` is None in a layout whose pods have no network of their own.
+    """
+
+    network_policy: Object | None
     replicas: tuple[ReplicaPlan, ...]
 
     @property
     def objects(self) -> tuple[Object, ...]:
-        """Return all of them in the order of their creation."""
-        return tuple(each for replica in self.replicas for each in replica.objects)
+        """Return all of them in the order of their creation: no pod is there before its policy."""
+        policy = () if self.network_policy is None else (self.network_policy,)
+        return (*policy, *(each for replica in self.replicas for each in replica.objects))
 
 
 def plan(job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None) -> Plan:
@@ -81,7 +87,8 @@ def plan(job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None
             "start the job without it, or copy the run directory"
         )
     replicas = (Replica(job=job, index=i, layout=layout) for i in range(job.spec.replicas))
-    return Plan(replicas=tuple(_replica_plan(each, config_maps or {}) for each in replicas))
+    planned = tuple(_replica_plan(each, config_maps or {}) for each in replicas)
+    return Plan(network_policy=network_policy(job, layout), replicas=planned)
 
 
 def identified(job: TrainingJob, uid: str) -> TrainingJob:

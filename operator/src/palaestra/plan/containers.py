@@ -19,6 +19,9 @@ SECURITY = {
     "capabilities": {"drop": ["ALL"]},
     "readOnlyRootFilesystem": True,
 }
+# Process 1 of a container ends at a signal only if it asks for it, which rosmaster does not: without
+# somebody before it, a pod would stay for its whole grace period.
+ROS_MASTER_PROGRAM = "trap 'kill $!; exit' TERM; rosmaster --core -p {port} & wait $!"
 # One try waits for the port itself: a kubelet's shortest period is a second, and the master takes a
 # quarter of one. The port is on loopback, where a kubelet's own TCP probe cannot look.
 MASTER_ANSWERS = "until (exec 3<>/dev/tcp/{host}/{port}) 2>/dev/null; do sleep 0.05; done"
@@ -33,7 +36,7 @@ def ros_master(replica: Replica) -> Container:
         "image": _trainer_image(replica),
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
         "restartPolicy": "Always",
-        "command": ["rosmaster", "--core", "-p", str(port)],
+        "command": ["bash", "-c", ROS_MASTER_PROGRAM.format(port=port)],
         "startupProbe": {
             "exec": {"command": probe},
             "periodSeconds": 1,
@@ -48,29 +51,37 @@ def sidecar(replica: Replica, simulator: Simulator, worlds: Mapping[str, bytes])
     """Return the sidecar of one simulator, which the trainer tells when to start it."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
+    common = _common(replica, simulator.container, group.resources, planned.SIMULATOR, group.env)
     program = SIDECAR
     if group.driver is Driver.COMMAND and places.sidecar is not None:
         program = f"{places.sidecar}/{SIDECAR}"
+        common["volumeMounts"].append({"name": "sidecar", "mountPath": places.sidecar, "readOnly": True})
     return {
         "name": simulator.container,
         "image": _simulator_image(replica, simulator),
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
         "restartPolicy": "Always",
         "command": [program],
-        "args": [
-            f"--driver={group.driver.value}",
-            f"--world={world_path(replica, simulator, worlds)}",
-            f"--work={places.scratch}/work",
-            f"--control={LOOPBACK}:{ports.control[simulator.place]}",
-            f"--health={replica.layout.health_host}:{ports.health[simulator.place]}",
-            *_identity(simulator),
-            *(f"--option={option}" for option in group.options),
-            *(("--", *group.command) if group.command else ()),
-        ],
+        "args": _arguments(replica, simulator, world_path(replica, simulator, worlds)),
         "ports": [_port(f"sim-{simulator.place}", ports.health[simulator.place])],
         "livenessProbe": _healthz(ports.health[simulator.place], initialDelaySeconds=10),
-        **_common(replica, simulator.container, group.resources, planned.SIMULATOR, group.env),
+        **common,
     }
+
+
+def _arguments(replica: Replica, simulator: Simulator, world: str) -> list[str]:
+    """Return the options of a sidecar."""
+    group, layout = simulator.group, replica.layout
+    return [
+        f"--driver={group.driver.value}",
+        f"--world={world}",
+        f"--work={replica.places(simulator.container).scratch}/work",
+        f"--control={LOOPBACK}:{layout.ports.control[simulator.place]}",
+        f"--health={layout.health_host}:{layout.ports.health[simulator.place]}",
+        *_identity(simulator),
+        *(f"--option={option}" for option in group.options),
+        *(("--", *group.command) if group.command else ()),
+    ]
 
 
 def trainer(replica: Replica) -> Container:
@@ -103,7 +114,8 @@ def install_sidecar(replica: Replica) -> Container | None:
         "name": "install-sidecar",
         "image": replica.layout.images.stub,
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
-        "command": ["cp", "-a", "/opt/palaestra/.", f"{target}/"],
+        # What is in the folder, not the folder: the volume's own times are not ours to set.
+        "command": ["sh", "-c", f"cp -a /opt/palaestra/* {target}/"],
         "securityContext": SECURITY,
         "resources": planned.resources(Resources(), planned.ROS_MASTER),
         "volumeMounts": [{"name": "sidecar", "mountPath": target}],

@@ -11,7 +11,10 @@ GIVEN_UP = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET, ExitCode.DIVERGED)
 
 
 def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the Job; its deadline is the operator's, which does not count suspended time."""
+    """Return the Job; its deadline is the operator's, which does not count suspended time.
+
+    With a queue it is made suspended, and whether it is is Kueue's from then on.
+    """
     queue = replica.job.spec.scheduling.queue_name
     metadata = replica.metadata(replica.name)
     if queue is not None:
@@ -24,7 +27,7 @@ def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
             "backoffLimit": replica.job.spec.backoff_limit,
             "podReplacementPolicy": "Failed",  # one writer: the old pod is gone before the next
             "podFailurePolicy": {"rules": _failure_rules()},
-            **({} if queue is not None else {"suspend": replica.job.spec.suspend}),
+            "suspend": queue is not None or replica.job.spec.suspend,
             "template": template,
         },
     }

@@ -78,6 +78,16 @@ class Layout(Protocol):
         """The address on which health and metrics are served."""
         ...
 
+    @property
+    def operator_namespace(self) -> str | None:
+        """Where the operator runs, whose pods may ask the trainers; None: no pod has a network."""
+        ...
+
+    @property
+    def monitoring_namespace(self) -> str | None:
+        """Where metrics are gathered; None: no pod has a network."""
+        ...
+
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
@@ -90,6 +100,8 @@ class ClusterLayout:
     images: Images
     ports: Ports = Ports()
     health_host: str = "0.0.0.0"  # noqa: S104 - the pod's address, for the kubelet and Prometheus
+    operator_namespace: str = "palaestra-system"
+    monitoring_namespace: str = "monitoring"
 
     def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - no container differs
         """Return the same places for every container; runs are kept apart by the job's uid."""
@@ -116,6 +128,8 @@ class LocalLayout:
     job_directory: str
     ports: Ports = Ports()
     health_host: str = "127.0.0.1"
+    operator_namespace: None = None
+    monitoring_namespace: None = None
 
     def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - the folder is the job's already
         """Return the places of one container, all below `<job_directory>/<replica>`."""

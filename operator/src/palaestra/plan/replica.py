@@ -13,6 +13,7 @@ from palaestra_sim.world import RunIdentity
 
 JOB_LABEL = "palaestra.dev/job"
 REPLICA_LABEL = "palaestra.dev/replica"
+UID_LABEL = "palaestra.dev/job-uid"  # a job that is made again has the name of the one before
 TRAINER = "trainer"
 ROS_MASTER = "ros-master"
 
@@ -41,6 +42,29 @@ class Simulator:
         return self.place == 0
 
 
+def uid_of(job: TrainingJob) -> str:
+    """Return the uid of a job.
+
+    Raises:
+        PlanError: it has none.
+    """
+    if job.metadata.uid is None:
+        raise PlanError("metadata.uid: is absent; plan the job as the cluster returned it")
+    return job.metadata.uid
+
+
+def owner(job: TrainingJob) -> dict[str, object]:
+    """Return the owner reference of what goes with the TrainingJob."""
+    return {
+        "apiVersion": job.api_version,
+        "kind": job.kind,
+        "name": job.metadata.name,
+        "uid": job.metadata.uid,
+        "controller": True,
+        "blockOwnerDeletion": True,
+    }
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replica:
     """One replica of a job in a layout."""
@@ -56,9 +80,7 @@ class Replica:
         Raises:
             PlanError: it has none.
         """
-        if self.job.metadata.uid is None:
-            raise PlanError("metadata.uid: is absent; plan the job as the cluster returned it")
-        return self.job.metadata.uid
+        return uid_of(self.job)
 
     @property
     def name(self) -> str:
@@ -86,7 +108,7 @@ class Replica:
             "labels": self.labels,
         }
         if owned:
-            metadata["ownerReferences"] = [self._owner]
+            metadata["ownerReferences"] = [owner(self.job)]
         return metadata
 
     @property
@@ -96,17 +118,7 @@ class Replica:
             "app.kubernetes.io/managed-by": "palaestra",
             JOB_LABEL: self.job.metadata.name,
             REPLICA_LABEL: str(self.index),
-        }
-
-    @property
-    def _owner(self) -> dict[str, object]:
-        return {
-            "apiVersion": self.job.api_version,
-            "kind": self.job.kind,
-            "name": self.job.metadata.name,
-            "uid": self.uid,
-            "controller": True,
-            "blockOwnerDeletion": True,
+            UID_LABEL: self.uid,
         }
 
     def _identity(self, group: SimulatorGroup, index: int) -> RunIdentity:

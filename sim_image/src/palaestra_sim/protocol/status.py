@@ -137,6 +137,7 @@ class TrainerStatus:
         last_checkpoint: the newest; None: none yet.
         last_progress: when an environment last stepped (RFC 3339); None: never yet.
         phase: what the trainer does now, in one word.
+        attempt: number of this attempt by the run directory's record, from 1; None: not recorded yet.
     """
 
     step: int
@@ -149,6 +150,7 @@ class TrainerStatus:
     simulators: tuple[SimulatorStatus, ...] = ()
     last_checkpoint: CheckpointStatus | None = None
     last_progress: str | None = None
+    attempt: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data; a number that is not finite is not known."""
@@ -164,6 +166,7 @@ class TrainerStatus:
             "simulators": [each.to_json() for each in self.simulators[:MOST_SIMULATORS]],
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
             "last_progress": self.last_progress,
+            "attempt": self.attempt,
         }
 
     @classmethod
@@ -185,6 +188,7 @@ class TrainerStatus:
             simulators=fields.parts("simulators", SimulatorStatus.from_json, MOST_SIMULATORS),
             last_checkpoint=_checkpoint(fields),
             last_progress=fields.time("last_progress") if fields.has("last_progress") else None,
+            attempt=_attempt(fields),
         )
 
 
@@ -197,12 +201,16 @@ class Termination:
         reason: why it ended, in a sentence.
         success_rate: of the last evaluation, 0 to 1; None: none.
         last_checkpoint: the newest; None: none.
+        attempt: number of this attempt by the run directory's record, from 1; None: not recorded.
+        restarts: of simulators after faults, in this attempt; None: not told.
     """
 
     step: int
     reason: str
     success_rate: float | None = None
     last_checkpoint: CheckpointStatus | None = None
+    attempt: int | None = None
+    restarts: int | None = None
 
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes, the reason cut to fit."""
@@ -220,6 +228,8 @@ class Termination:
             "reason": clipped(self.reason, MOST_REASON),
             "success_rate": known(self.success_rate),
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
+            "attempt": self.attempt,
+            "restarts": self.restarts,
         }
 
     @classmethod
@@ -244,7 +254,13 @@ class Termination:
             reason=fields.text("reason", MOST_REASON),
             success_rate=_share(fields),
             last_checkpoint=_checkpoint(fields),
+            attempt=_attempt(fields),
+            restarts=fields.whole("restarts") if fields.has("restarts") else None,
         )
+
+
+def _attempt(fields: Fields) -> int | None:
+    return fields.whole("attempt", 1) if fields.has("attempt") else None
 
 
 def _share(fields: Fields) -> float | None:

@@ -75,6 +75,10 @@ class Watcher(Protocol):
         """A simulator broke."""
         ...
 
+    def started(self, simulator: str) -> None:
+        """A simulator is up for the first time."""
+        ...
+
     def restarted(self, simulator: str, *, recycled: bool) -> None:
         """A simulator is up again, after a fault or because it was recycled."""
         ...
@@ -87,6 +91,9 @@ class Nobody:
         """Ignore it."""
 
     def fault(self, simulator: str, fault: SimulatorFault) -> None:
+        """Ignore it."""
+
+    def started(self, simulator: str) -> None:
         """Ignore it."""
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
@@ -169,6 +176,8 @@ class Keeper:
             self.member.start()
         except SimulatorFault as fault:
             self.mend(fault)
+        else:
+            self.watcher.started(self.name)
 
     def stop(self) -> None:
         """Stop the member, however it is."""

@@ -1,0 +1,313 @@
+"""Every reason that a condition, a replica or an event may have, and all their sentences.
+
+A reason is one word for programs; its message, with the facts filled in, is a sentence for people: the
+fact and the remedy. `meaning` and `remedy` are the rows of docs/operations.md.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from palaestra.api.lines import flat, one_line
+
+LONGEST_MESSAGE = 1024  # characters, as the API server bounds an event's; ours stay within it everywhere
+LONGEST_FACT = 600  # of one fact that comes from elsewhere: the scheduler, a registry, a trainer
+
+
+class Reason(StrEnum):
+    """Why something is as it is, in one word."""
+
+    ACCEPTED = "Accepted"
+    INVALID_SPEC = "InvalidSpec"
+    STATUS_UNREADABLE = "StatusUnreadable"
+    WORLD_MISSING = "WorldMissing"
+    WORLD_INVALID = "WorldInvalid"
+    CONFIG_MAP_NOT_FOR_JOBS = "ConfigMapNotForJobs"
+    SECRET_MISSING = "SecretMissing"  # noqa: S105 - a reason
+    SECRET_NOT_FOR_JOBS = "SecretNotForJobs"  # noqa: S105 - a reason
+    CLAIM_MISSING = "ClaimMissing"
+    CLAIM_NOT_FOR_JOBS = "ClaimNotForJobs"
+    NO_KUEUE = "NoKueue"
+    NAME_TAKEN = "NameTaken"
+    PLANNED = "Planned"
+    QUEUED = "Queued"
+    SUSPENDED = "Suspended"
+    RESUMED = "Resumed"
+    STARTING = "Starting"
+    TRAINING = "Training"
+    INTERRUPTED = "Interrupted"
+    RETRYING = "Retrying"
+    UNSCHEDULABLE = "Unschedulable"
+    IMAGE_PULL = "ImagePull"
+    CONTAINER_REFUSED = "ContainerRefused"
+    PODS_REFUSED = "PodsRefused"
+    RESTART_POLICY_DROPPED = "RestartPolicyDropped"
+    SIDECAR_CRASH_LOOP = "SidecarCrashLoop"
+    SIMULATOR_START_DEADLINE = "SimulatorStartDeadline"
+    TRAINER_NOT_STARTED = "TrainerNotStarted"
+    SIMULATOR_OUT_OF_MEMORY = "SimulatorOutOfMemory"
+    TRAINER_OUT_OF_MEMORY = "TrainerOutOfMemory"
+    EPHEMERAL_STORAGE = "EphemeralStorage"
+    NODE_LOST = "NodeLost"
+    STALLED = "Stalled"
+    DEADLINE_EXCEEDED = "DeadlineExceeded"
+    BACKOFF_LIMIT_SPENT = "BackoffLimitSpent"
+    CONFIGURATION_REFUSED = "ConfigurationRefused"
+    FAULT_BUDGET_SPENT = "FaultBudgetSpent"
+    DIVERGED = "Diverged"
+    NO_PROGRESS = "NoProgress"
+    JOB_FAILED = "JobFailed"
+    SUCCEEDED = "Succeeded"
+    SOME_REPLICAS_FAILED = "SomeReplicasFailed"
+    EXPIRED = "Expired"
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What is said with a reason: `message` has the facts in braces; `warning` is the event's type."""
+
+    message: str
+    meaning: str
+    remedy: str
+    warning: bool = True
+
+
+ROWS: dict[Reason, Row] = {
+    Reason.ACCEPTED: Row(
+        "the spec is right and all that it names is there{note}",
+        "the job can be planned; the images of this release are fixed for it",
+        "nothing",
+        warning=False,
+    ),
+    Reason.INVALID_SPEC: Row(
+        "{problem}",
+        "the spec says something that cannot be carried out; the message names the field",
+        "make a new TrainingJob with the field mended: a spec does not change",
+    ),
+    Reason.STATUS_UNREADABLE: Row(
+        "{problem}; nothing is done with the job; upgrade the operator, or make a new TrainingJob",
+        "the status was written by something else than this release, so it is not known which replicas ended",
+        "run the release that wrote it, or make a new TrainingJob",
+    ),
+    Reason.WORLD_MISSING: Row(
+        "{field}: {fact}; create it and the job starts",
+        "the ConfigMap of a world, or its key, is not there",
+        'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
+    ),
+    Reason.WORLD_INVALID: Row(
+        "{problem}",
+        "a world is no readable `.wbt` file, or names other files",
+        "mend the world; one that came from a ConfigMap is read again by itself",
+    ),
+    Reason.CONFIG_MAP_NOT_FOR_JOBS: Row(
+        '{field}: ConfigMap {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
+        "a job may read only what somebody has opened to jobs",
+        "whoever owns the ConfigMap sets the label",
+    ),
+    Reason.SECRET_MISSING: Row(
+        "{field}: there is no Secret {name} here; create it and the job starts",
+        "the Secret of a variable is not there",
+        'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
+    ),
+    Reason.SECRET_NOT_FOR_JOBS: Row(
+        '{field}: Secret {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
+        "a job may read only what somebody has opened to jobs",
+        "whoever owns the Secret sets the label",
+    ),
+    Reason.CLAIM_MISSING: Row(
+        "{field}: there is no PersistentVolumeClaim {name} here; create it and the job starts",
+        "the existing claim that the job names is not there",
+        'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
+    ),
+    Reason.CLAIM_NOT_FOR_JOBS: Row(
+        '{field}: PersistentVolumeClaim {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
+        "a job may write only where somebody has opened a volume to jobs",
+        "whoever owns the claim sets the label",
+    ),
+    Reason.NO_KUEUE: Row(
+        "spec.scheduling.queueName: this cluster has no Kueue; install it, or make a job without a queue",
+        "a queue is named and nothing would ever admit the job",
+        "install Kueue, or make a new TrainingJob without `queueName`",
+    ),
+    Reason.NAME_TAKEN: Row(
+        "Job {name} belongs to somebody else{deleting}; remove it or rename this TrainingJob",
+        "a Job of another owner has the name of a replica's",
+        "wait while it is being deleted; otherwise remove it, or rename the TrainingJob",
+    ),
+    Reason.PLANNED: Row(
+        "created {objects}",
+        "the objects of a replica were created",
+        "nothing",
+        warning=False,
+    ),
+    Reason.QUEUED: Row(
+        "waits in queue {queue} for Kueue",
+        "Kueue has not admitted the replica yet, or has taken it back",
+        "look at the Workload with `kubectl describe`: it tells what is short",
+        warning=False,
+    ),
+    Reason.SUSPENDED: Row(
+        "suspended by spec.suspend; set it to false to go on from the last checkpoint",
+        "the pods were deleted after a checkpoint",
+        "set `spec.suspend: false`",
+        warning=False,
+    ),
+    Reason.RESUMED: Row(
+        "goes on from the last checkpoint",
+        "the replica is no longer suspended",
+        "nothing",
+        warning=False,
+    ),
+    Reason.STARTING: Row(
+        "{what}",
+        "the objects are there and nothing trains yet",
+        "nothing; after some minutes, `kubectl describe pod` tells what it waits for",
+        warning=False,
+    ),
+    Reason.TRAINING: Row(
+        "{what}",
+        "at least one trainer runs",
+        "nothing",
+        warning=False,
+    ),
+    Reason.INTERRUPTED: Row(
+        "pod {pod} was taken by the cluster{words}; another goes on from the last checkpoint",
+        "an eviction, a preemption, a drain, or a deletion; it does not count against `backoffLimit`",
+        "nothing; often: ask for nodes that stay",
+        warning=False,
+    ),
+    Reason.RETRYING: Row(
+        "pod {pod} failed: {how}; another goes on from the last checkpoint",
+        "a pod failed and counts against `backoffLimit`",
+        "read the trainer's log: `kubectl logs POD -c trainer`",
+    ),
+    Reason.UNSCHEDULABLE: Row(
+        "no node takes pod {pod}: {words}; make room or ask for less",
+        "the scheduler finds no node; the words are its own",
+        "add nodes, lower `resources`, or look at `nodeSelector` and `tolerations`",
+    ),
+    Reason.IMAGE_PULL: Row(
+        "container {container}: image {image} cannot be pulled ({words}); name one that can",
+        "an image does not exist, or the registry refuses it; after the start deadline the replica fails",
+        "correct the image's name, or give `imagePullSecrets`",
+    ),
+    Reason.CONTAINER_REFUSED: Row(
+        "container {container}: the node cannot make it ({words}); mend what it names",
+        "a program, a key of a Secret or a device that the container needs is not there; "
+        "after the start deadline the replica fails",
+        "the words are the kubelet's and name what is missing",
+    ),
+    Reason.PODS_REFUSED: Row(
+        "no pod can be made: {words}",
+        "a quota, a LimitRange, Pod Security or a webhook refuses the pod; the words are the API server's",
+        "raise the quota, or allow what the message names; the Job controller tries again by itself",
+    ),
+    Reason.RESTART_POLICY_DROPPED: Row(
+        "pod {pod}: {containers} lost restartPolicy: Always, so that the trainer would wait for ever; "
+        "update the webhook or scheduler that rewrites pods",
+        "something between operator and kubelet does not know sidecar containers and has dropped the field",
+        "update or remove the mutating webhook",
+    ),
+    Reason.SIDECAR_CRASH_LOOP: Row(
+        "container {container} has crashed {times} times ({how}); read its log",
+        "a sidecar does not stay up, which Kubernetes never tells of",
+        "`kubectl logs POD -c CONTAINER --previous`",
+    ),
+    Reason.SIMULATOR_START_DEADLINE: Row(
+        "{what}; read the simulator's log or raise startDeadlineSeconds",
+        "a simulator did not come up within `startDeadlineSeconds` of its container's start",
+        "`kubectl logs POD -c sim-GROUP-N`; raise the deadline if it is only slow",
+    ),
+    Reason.TRAINER_NOT_STARTED: Row(
+        "all sidecars of pod {pod} run and the node has not started the trainer for {seconds} s; "
+        "update the node's Kubernetes",
+        "a kubelet forgets the main container when a sidecar's first start failed (Kubernetes issue 132826)",
+        "update the nodes to 1.34 or newer",
+    ),
+    Reason.SIMULATOR_OUT_OF_MEMORY: Row(
+        "container {container} was killed for its memory {times} times; raise its memory limit",
+        "a simulator needs more than its limit",
+        "raise `spec.simulators[].resources.limits.memory` in a new TrainingJob",
+    ),
+    Reason.TRAINER_OUT_OF_MEMORY: Row(
+        "the trainer was killed for its memory{times}; raise its limit, or lower buffer_size",
+        "the trainer needs more than its limit",
+        "raise `spec.trainer.resources.limits.memory`, or lower the replay buffer, in a new TrainingJob",
+    ),
+    Reason.EPHEMERAL_STORAGE: Row(
+        "pod {pod} was evicted for its storage ({words}); write less outside of the run directory",
+        "the pod wrote more to temporary volumes than its limit, or the node's disk is full",
+        "write less to /tmp, or enlarge the volume: `spec.storage.size` when it is ephemeral",
+    ),
+    Reason.NODE_LOST: Row(
+        "pod {pod} was to be gone {seconds} s ago and node {node} does not confirm it; "
+        "delete the Node object or taint it node.kubernetes.io/out-of-service",
+        "the node does not answer; no second pod is made while the first may still write",
+        "`kubectl delete node NODE` once the machine is off",
+    ),
+    Reason.STALLED: Row(
+        "{what}; read the stacks in the trainer's log",
+        "no environment step for `stallDeadlineSeconds`, by the trainer's own word",
+        "`kubectl logs POD -c trainer`; raise the deadline if a step may take that long",
+    ),
+    Reason.DEADLINE_EXCEEDED: Row(
+        "the job was active for {seconds} s, as long as activeDeadlineSeconds allows; "
+        "go on with a new job from the same volume",
+        "the time is over; suspended time was not counted",
+        "raise `activeDeadlineSeconds` before the end, or make a new TrainingJob",
+    ),
+    Reason.BACKOFF_LIMIT_SPENT: Row(
+        "{pods} pods failed, as many as backoffLimit allows; the last: {how}",
+        "retrying has not helped",
+        "read the message of the last failure and the trainer's log",
+    ),
+    Reason.CONFIGURATION_REFUSED: Row(
+        "the trainer refuses its configuration (exit code 2): {words}",
+        "algorithm, environment and options do not go together; it is not tried again",
+        "make a new TrainingJob with the field that the message names mended",
+    ),
+    Reason.FAULT_BUDGET_SPENT: Row(
+        "the simulators broke too often (exit code 80): {words}",
+        "a simulator had more than `restart.limit` faults within `restart.withinSeconds`; "
+        "it is not tried again",
+        "read the simulator's log; raise `restart.limit` if faults are to be borne",
+    ),
+    Reason.DIVERGED: Row(
+        "the learner diverged (exit code 81): {words}",
+        "the networks hold NaN or infinity; it is not tried again",
+        "lower the learning rate, in a new TrainingJob",
+    ),
+    Reason.NO_PROGRESS: Row(
+        "{pods} pods in a row were taken or interrupted without one new step; "
+        "ask for nodes that stay, or checkpoint more often",
+        "the cluster takes pods faster than they come forward, or the trainer always exits with 75",
+        "lower `spec.trainer.checkpoint.everySteps`, or use nodes that are not taken away",
+    ),
+    Reason.JOB_FAILED: Row(
+        "the Job failed: {words}",
+        "something else than Palaestra ended the replica's Job; the words are the Job's",
+        "`kubectl describe job`",
+    ),
+    Reason.SUCCEEDED: Row(
+        "{what}",
+        "the training is complete",
+        "fetch `model.zip` from the run directory",
+        warning=False,
+    ),
+    Reason.SOME_REPLICAS_FAILED: Row(
+        "{failed} of {all} replicas failed; the first: replica {index}, {message}",
+        "all replicas have ended and not all succeeded",
+        "the reason of each stands in `status.replicas`",
+    ),
+    Reason.EXPIRED: Row(
+        "ended more than {seconds} s ago and is deleted, as ttlSecondsAfterFinished asks",
+        "the TrainingJob is deleted; its claims stay unless `retain: Delete`",
+        "nothing",
+        warning=False,
+    ),
+}
+
+
+def say(reason: Reason, **facts: object) -> str:
+    """Return the message of `reason` with the facts filled in: one line, at most 1024 characters."""
+    told = {name: flat(str(fact), LONGEST_FACT) for name, fact in facts.items()}
+    return one_line(ROWS[reason].message.format(**told), LONGEST_MESSAGE)

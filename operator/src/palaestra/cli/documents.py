@@ -1,0 +1,90 @@
+"""`palaestra plan`, `world` and `crd`: text in, text out, nothing is started."""
+
+import argparse
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+from palaestra.api.generated import crd_text
+from palaestra.cli.files import add_dir, job, read
+from palaestra.cli.parsing import Commands, command
+from palaestra.local.rundir import job_directory, uid_of
+from palaestra.plan import ClusterLayout, Images, Layout, LocalLayout, identified, plan
+from palaestra.plan.text import as_yaml
+from palaestra_sim.world import RunIdentity, generate
+
+UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # stands for the uid that a cluster gives
+
+PLAN = """\
+Reads the TrainingJob in FILE and writes the Kubernetes objects that it needs to standard output, as
+YAML. Outside a cluster the job has no uid yet: zeros stand in its place.
+"""
+WORLD = """\
+Reads the world in FILE and writes it to standard output as one simulator of a job gets it: its robots
+have ROS names of their own and nothing else is changed.
+"""
+CRD = "Writes the CustomResourceDefinition of TrainingJobs to standard output, as YAML."
+
+
+def add(commands: Commands) -> None:
+    """Add the three commands."""
+    _add_plan(commands)
+    _add_world(commands)
+    command(commands, "crd", _crd, "print the CustomResourceDefinition", CRD)
+
+
+def _plan(options: argparse.Namespace) -> int:
+    planned = job(options.file)
+    images = Images.of_release(version("palaestra"))
+    layout: Layout = ClusterLayout(images=images)
+    uid = planned.metadata.uid or UNASSIGNED
+    if options.layout == "local":
+        directory = job_directory(options.dir, planned.metadata.name)
+        layout, uid = LocalLayout(images=images, job_directory=str(directory)), uid_of(directory)
+    sys.stdout.write(as_yaml(plan(identified(planned, uid), layout).objects))
+    return 0
+
+
+def _world(options: argparse.Namespace) -> int:
+    identity = RunIdentity(
+        job=options.job,
+        namespace=options.namespace,
+        uid=options.uid,
+        replica=options.replica,
+        group=options.group,
+        index=options.index,
+    )
+    world = generate(
+        read(options.file),
+        identity,
+        clock=options.clock,
+        name=str(options.file),
+        relative_addresses=True,
+    )
+    sys.stdout.write(world.decode())
+    return 0
+
+
+def _crd(options: argparse.Namespace) -> int:
+    del options
+    sys.stdout.write(crd_text())
+    return 0
+
+
+def _add_plan(commands: Commands) -> None:
+    parser = command(commands, "plan", _plan, "print the objects that a job needs", PLAN)
+    parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
+    parser.add_argument("--layout", choices=("cluster", "local"), default="cluster", help="for where")
+    add_dir(parser)
+
+
+def _add_world(commands: Commands) -> None:
+    parser = command(commands, "world", _world, "print one simulator's own world", WORLD)
+    parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt)")
+    parser.add_argument("--job", metavar="NAME", required=True, help="name of the job")
+    parser.add_argument("--namespace", default="default", help="namespace of the job")
+    parser.add_argument("--uid", default="", help="uid of the job in its cluster")
+    parser.add_argument("--replica", type=int, default=0, help="number of the replica")
+    parser.add_argument("--group", required=True, help="name of the group of simulators")
+    parser.add_argument("--index", type=int, default=0, help="number in the group")
+    parser.add_argument("--clock", action="store_true", help="keep a --clock that the world has")

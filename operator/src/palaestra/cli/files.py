@@ -1,0 +1,37 @@
+"""Files that are named on the command line."""
+
+import argparse
+from pathlib import Path
+
+from palaestra.api import TrainingJob, load
+from palaestra.errors import PalaestraError
+
+
+def job(file: Path) -> TrainingJob:
+    """Return the TrainingJob in a file.
+
+    Raises:
+        PalaestraError: it cannot be read, or is wrong.
+    """
+    try:
+        text = read(file).decode()
+    except UnicodeDecodeError:
+        raise PalaestraError(f"{file}: is not UTF-8; save it as UTF-8") from None
+    return load(text, str(file))
+
+
+def read(file: Path) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        PalaestraError: it cannot be read.
+    """
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise PalaestraError(f"{file}: {error.strerror}; name a file that can be read") from error
+
+
+def add_dir(parser: argparse.ArgumentParser) -> None:
+    """Add the option that names the folder of all runs."""
+    parser.add_argument("--dir", type=Path, default=Path("runs"), help="folder of all runs; default: runs")

@@ -1,0 +1,91 @@
+"""`palaestra operator`: look after the TrainingJobs of a cluster."""
+
+import argparse
+from importlib.metadata import version
+
+from palaestra.cli.parsing import Commands, command
+from palaestra.errors import PalaestraError
+from palaestra.operator.options import Options, address, own_namespace
+from palaestra.operator.run import run
+from palaestra.plan import Images
+
+OPERATOR = """\
+Watches the TrainingJobs of a cluster, makes what they need, and writes their status. Reads the
+kubeconfig as kubectl does, inside a pod the pod's own account. Writes log lines, one JSON object each,
+to standard error; ends within 2 s of SIGTERM. Only one leads at a time, the others wait.
+"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    parser = command(commands, "operator", _operator, "look after the jobs of a cluster", OPERATOR)
+    parser.add_argument("--namespace", metavar="NS", help="look after this namespace only; default: all")
+    parser.add_argument(
+        "--workers", metavar="N", type=int, default=4, help="jobs looked at at once; default: 4"
+    )
+    parser.add_argument(
+        "--resync",
+        metavar="S",
+        type=float,
+        default=600.0,
+        help="seconds after which every job is looked at again; default: 600",
+    )
+    parser.add_argument(
+        "--leader-elect",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="wait for the Lease before anything is written; default: yes",
+    )
+    parser.add_argument(
+        "--metrics-address",
+        metavar="HOST:PORT",
+        default="0.0.0.0:8080",
+        help="of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
+    )
+    _add_cluster(parser)
+    _add_images(parser)
+
+
+def _add_cluster(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--kubeconfig", metavar="FILE", help="connect with it; default: as kubectl does")
+    parser.add_argument("--context", metavar="NAME", help="of the kubeconfig; default: its current one")
+    parser.add_argument(
+        "--operator-namespace",
+        metavar="NS",
+        default=own_namespace(),
+        help="where this operator runs; default: the pod's own, else palaestra-system",
+    )
+    parser.add_argument(
+        "--monitoring-namespace",
+        metavar="NS",
+        default="monitoring",
+        help="whose pods may scrape training pods; default: monitoring",
+    )
+
+
+def _add_images(parser: argparse.ArgumentParser) -> None:
+    release = Images.of_release(version("palaestra"))
+    for name in ("trainer", "stub", "webots"):
+        image = getattr(release, name)
+        told = f"for jobs that name none; default: {image}"
+        parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=told)
+
+
+def _operator(options: argparse.Namespace) -> int:
+    if options.workers < 1 or options.resync <= 0:
+        raise PalaestraError("--workers and --resync: must be above 0; leave them out for the defaults")
+    images = Images(trainer=options.trainer_image, stub=options.stub_image, webots=options.webots_image)
+    return run(
+        Options(
+            images=images,
+            operator_namespace=options.operator_namespace,
+            monitoring_namespace=options.monitoring_namespace,
+            namespace=options.namespace,
+            workers=options.workers,
+            resync_s=options.resync,
+            leader_elect=options.leader_elect,
+            metrics_address=address(options.metrics_address),
+            kubeconfig=options.kubeconfig,
+            context=options.context,
+        )
+    )

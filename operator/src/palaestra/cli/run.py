@@ -1,0 +1,45 @@
+"""`palaestra run`: train on this machine."""
+
+import argparse
+from importlib.metadata import version
+from pathlib import Path
+
+from palaestra.cli.files import add_dir, job
+from palaestra.cli.parsing import Commands, command
+from palaestra.local.run import Options, run
+
+RUN = """\
+Reads the TrainingJob in FILE and writes <dir>/<job name>/<replica>/: checkpoints/, tensorboard/,
+evaluations.jsonl, model.zip, the generated worlds, training.yaml and logs/. Typed again it goes on from
+the newest checkpoint. Replicas run one after another; --replica picks one.
+Ctrl-C ends it with a checkpoint, a second one at once.
+"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    parser = command(commands, "run", _run, "train on this machine", RUN)
+    parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
+    add_dir(parser)
+    parser.add_argument("--replica", metavar="N", type=int, help="this replica only")
+    parser.add_argument("--fresh", action="store_true", help="begin anew; what was there is moved aside")
+    parser.add_argument(
+        "--ros-port", metavar="PORT", type=int, help="port of the ROS master; default: a free one"
+    )
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="show all logs, each line with its container"
+    )
+
+
+def _run(options: argparse.Namespace) -> int:
+    return run(
+        job(options.file),
+        Options(
+            runs=options.dir,
+            version=version("palaestra"),
+            replica=options.replica,
+            fresh=options.fresh,
+            verbose=options.verbose,
+            ros_port=options.ros_port,
+        ),
+    )

@@ -1,0 +1,105 @@
+"""A TrainingJob from the API server's JSON, or why it cannot be one: one bad object delays no other."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+from pydantic import ValidationError
+
+from palaestra.api import TrainingJob, validate
+from palaestra.api.reasons import Reason, say
+from palaestra.api.status import Phase, Status
+from palaestra.decide.conditions import Claim, Told, claims, conditions
+from palaestra.decide.decision import Decision
+from palaestra.decide.ending import expired, expires
+from palaestra.decide.happenings import happening, of_actions, of_change
+from palaestra.decide.moments import next_of, whole
+from palaestra.errors import SpecErrors, TrainingJobError
+from palaestra.observe.reading import count, part, text
+
+MANAGER = "palaestra.dev/operator"  # spec.managedBy of what is ours, where it is given at all
+
+
+class Refused(TrainingJobError, ValueError):
+    """What an API server holds cannot be looked after as it stands; retrying cannot help.
+
+    Attributes:
+        reason: in one word.
+        message: in a sentence.
+    """
+
+    def __init__(self, reason: Reason, problem: str) -> None:
+        super().__init__(problem)
+        self.reason = reason
+        self.message = say(reason, problem=problem)
+
+
+def managed_here(raw: Mapping[str, Any]) -> bool:
+    """Return whether to look after the object: it names no other controller, and nobody deletes it."""
+    manager = part(raw, "spec").get("managedBy")
+    ours = manager is None or manager == MANAGER
+    return ours and "deletionTimestamp" not in part(raw, "metadata")
+
+
+def accept(raw: Mapping[str, Any]) -> TrainingJob:
+    """Return the TrainingJob that `raw` describes, with its status.
+
+    Raises:
+        Refused: the spec breaks a rule that an API server cannot check, or the status is not ours.
+    """
+    try:
+        job = validate({name: value for name, value in raw.items() if name != "status"})
+    except SpecErrors as error:
+        raise Refused(Reason.INVALID_SPEC, "; ".join(error.problems)) from error
+    return job.model_copy(update={"status": _status(raw)})
+
+
+def reject(raw: Mapping[str, Any], refused: Refused, now: datetime) -> Decision:
+    """Return the decision about an object that was refused.
+
+    A job that was never accepted has failed for good: a spec does not change. One that was accepted, by
+    an older release, goes on as it is: its pods are not this release's to touch.
+    """
+    now = whole(now)
+    told = Told(reason=refused.reason, message=refused.message)
+    warning = happening(refused.reason, refused.message)
+    try:
+        old = _status(raw)
+    except Refused:
+        return Decision(status=None, events=(warning,))
+    if old.release is not None:
+        return Decision(status=None, events=(warning,))
+    status = _failed(raw, old, told, now)
+    ttl_s = count(part(raw, "spec"), "ttlSecondsAfterFinished") if _has_ttl(raw) else None
+    at, metadata = expires(status, ttl_s), part(raw, "metadata")
+    actions = expired(text(metadata, "name", 253), text(metadata, "uid", 253), at, status, now)
+    return Decision(
+        status=status,
+        actions=actions,
+        events=(*of_change(old, status), *of_actions(actions)),
+        wake_after_s=next_of([at], now),
+    )
+
+
+def _status(raw: Mapping[str, Any]) -> Status:
+    try:
+        return Status.model_validate(raw.get("status") or {}, by_alias=True, by_name=False)
+    except ValidationError as error:
+        raise Refused(Reason.STATUS_UNREADABLE, f"status: {error.error_count()} fields are wrong") from error
+
+
+def _has_ttl(raw: Mapping[str, Any]) -> bool:
+    return part(raw, "spec").get("ttlSecondsAfterFinished") is not None
+
+
+def _failed(raw: Mapping[str, Any], old: Status, told: Told, now: datetime) -> Status:
+    generation = count(part(raw, "metadata"), "generation") or None
+    current = claims(Claim(holds=False, told=told), Phase.FAILED, told)
+    return old.model_copy(
+        update={
+            "phase": Phase.FAILED,
+            "observed_generation": generation,
+            "conditions": conditions(old, current, generation, now),
+            "completion_time": old.completion_time or now,
+        }
+    )

@@ -1,0 +1,69 @@
+"""The five conditions of a TrainingJob, each with a reason whether it holds or not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import Condition, ConditionStatus, ConditionType, Phase, Status
+
+_CONDITION_OF = {
+    Phase.RUNNING: ConditionType.RUNNING,
+    Phase.SUSPENDED: ConditionType.SUSPENDED,
+    Phase.SUCCEEDED: ConditionType.SUCCEEDED,
+    Phase.FAILED: ConditionType.FAILED,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """A reason and its message."""
+
+    reason: Reason
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """Whether a condition holds, and why."""
+
+    holds: bool
+    told: Told
+
+
+Claims = Mapping[ConditionType, Claim]
+
+
+def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
+    """Return the claim of each condition of a job that stands in `phase` for the reason `why`."""
+    true = _CONDITION_OF.get(phase)
+    others = {kind: Claim(holds=kind is true, told=why) for kind in _CONDITION_OF.values()}
+    return {ConditionType.ACCEPTED: accepted, **others}
+
+
+def conditions(old: Status, current: Claims, generation: int | None, now: datetime) -> tuple[Condition, ...]:
+    """Return the conditions; the time of one whose status is what it was stays as it was."""
+    before = {each.type: each for each in old.conditions}
+    return tuple(
+        _condition(kind, claim, before.get(kind), generation, now) for kind, claim in current.items()
+    )
+
+
+def condition(status: Status, kind: ConditionType) -> Condition | None:
+    """Return the condition of a type, None where the status has none."""
+    return next((each for each in status.conditions if each.type is kind), None)
+
+
+def _condition(
+    kind: ConditionType, claim: Claim, old: Condition | None, generation: int | None, now: datetime
+) -> Condition:
+    status = ConditionStatus.TRUE if claim.holds else ConditionStatus.FALSE
+    kept = old is not None and old.status is status
+    return Condition(
+        type=kind,
+        status=status,
+        reason=claim.told.reason.value,
+        message=claim.told.message,
+        last_transition_time=old.last_transition_time if old is not None and kept else now,
+        observed_generation=generation,
+    )

@@ -1,0 +1,168 @@
+"""Attempts and restarts of a replica: exact, never falling, and counted from what is, not from what happened.
+
+The status is the memory. It names the pod of the current attempt (`pod`), so that every pod made after
+that one is a new attempt, however many came and went since the status was written; the trainers' record
+in the run directory (`attempt` in /status and in the last word) adds those that nobody saw. Whatever was
+replaced has one of three causes, and 1 + trainer + disruption + suspension is the attempt's number:
+
+    trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
+    suspension  the Job was resumed between the two pods
+    disruption  all others: the cluster or a person took the pod, or it exited with 75
+
+A failed pod that was not replaced yet is no restart. Restarts of simulators are counted within an attempt
+by its trainer; the status holds that count (`simulatorRestarts`) beside the sum, so that only what is new
+is added. All of it is written at once, on the status that was read, so nothing counts twice.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from palaestra.api.status import PodReference, ReplicaStatus, Restarts
+from palaestra.observe.reading import MOST_COUNT
+from palaestra.observe.views import PodView, ReplicaObserved
+from palaestra_sim.protocol.status import ExitCode
+
+MOST_UNSEEN = 100  # pods that a trainer's record may have and nobody saw: a record is not to be trusted
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Counted:
+    """The counts of a replica, each as the field of `ReplicaStatus` that it becomes."""
+
+    attempt: int
+    pod: PodReference | None
+    restarts: Restarts
+    simulator_restarts: int
+    furthest_step: int | None
+    fruitless: int
+
+
+def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
+    """Return the counts after what is seen; `old` is what the status said."""
+    newer = _newer(old, seen.pods)
+    attempt = _attempt(old, seen, newer)
+    restarts = _restarts(old, seen, newer, attempt)
+    furthest = _furthest(old, seen)
+    came_forward = furthest is not None and furthest > (old.furthest_step or 0)
+    taken = restarts.disruption - old.restarts.disruption
+    within = _within_attempt(old, seen, newer)
+    return Counted(
+        attempt=attempt,
+        pod=_reference(newer[-1]) if newer else old.pod,
+        restarts=restarts.model_copy(update={"simulator": _simulators(old, seen, newer, within)}),
+        simulator_restarts=within,
+        furthest_step=furthest,
+        fruitless=0 if came_forward else _bounded(old.fruitless + taken),
+    )
+
+
+def failed_by_itself(pod: PodView) -> bool:
+    """Return whether the end of a pod counts against `backoffLimit`, as the podFailurePolicy has it."""
+    interrupted = pod.trainer is not None and exit_code(pod) == ExitCode.INTERRUPTED
+    return pod.phase == "Failed" and not pod.disruption and not interrupted
+
+
+def exit_code(pod: PodView) -> int | None:
+    """Return the exit code of a pod's trainer; None: it has not ended, or nobody knows."""
+    trainer = pod.trainer
+    ended = trainer is not None and trainer.running_since is None and trainer.exit is not None
+    return trainer.exit.code if ended and trainer and trainer.exit else None
+
+
+def _newer(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
+    """Return the pods made after the one that the status names, oldest first."""
+    named = old.pod
+    if named is None:
+        return tuple(pods)
+    uids = [each.uid for each in pods]
+    if named.uid in uids:
+        return tuple(pods[uids.index(named.uid) + 1 :])
+    return tuple(each for each in pods if each.created > named.created)
+
+
+def _attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    by_pods = old.attempt + len(newer)
+    polled = seen.polled.status.attempt if seen.polled else None
+    ended = seen.termination.attempt if seen.termination else None
+    recorded = max(polled or 0, ended or 0)
+    return _bounded(max(by_pods, recorded if recorded <= by_pods + MOST_UNSEEN else 0))
+
+
+def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView], attempt: int) -> Restarts:
+    before = old.restarts
+    explained = before.trainer + before.disruption + before.suspension
+    replaced = max(attempt - 1 - explained, 0)
+    trainer = min(max(_by_evidence(old, seen, newer), _by_the_job(old, seen)), replaced)
+    suspension = min(_resumed(old, seen, newer), replaced - trainer)
+    return before.model_copy(
+        update={
+            "trainer": before.trainer + trainer,
+            "suspension": before.suspension + suspension,
+            "disruption": before.disruption + replaced - trainer - suspension,
+        }
+    )
+
+
+def _by_evidence(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    """Return how many of the pods that were replaced since failed by themselves."""
+    named = [each for each in seen.pods if old.pod is not None and each.uid == old.pod.uid]
+    chain = [*named, *newer]
+    return sum(failed_by_itself(each) for each in chain[:-1])
+
+
+def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
+    """Return how many failures the Job has booked that are not counted yet, but the newest pod's own."""
+    if seen.job is None:
+        return 0
+    last = seen.pod is not None and failed_by_itself(seen.pod)
+    return max(seen.job.failures - last - old.restarts.trainer, 0)
+
+
+def _resumed(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    """Return 1 if the Job was resumed after the named pod was made and before the newest was."""
+    if old.pod is None or not newer or seen.job is None or seen.job.resumed is None:
+        return 0
+    return int(old.pod.created <= seen.job.resumed <= newer[-1].created)
+
+
+def _within_attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    """Return the restarts of simulators within the current attempt."""
+    before = 0 if newer else old.simulator_restarts
+    polled = sum(each.restarts for each in seen.polled.status.simulators) if seen.polled else 0
+    ended = (seen.termination.restarts or 0) if seen.termination else 0
+    return _bounded(max(before, polled, ended))
+
+
+def _simulators(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView], within: int) -> int:
+    """Return the restarts of simulators over all attempts."""
+    if not newer:
+        return _bounded(old.restarts.simulator + within - old.simulator_restarts)
+    words = seen.terminations
+    named = words.get(old.pod.uid) if old.pod else None
+    late = max((named.restarts or 0) - old.simulator_restarts, 0) if named else 0
+    passed = sum(_told(words[each.uid].restarts) for each in newer[:-1] if each.uid in words)
+    return _bounded(old.restarts.simulator + late + passed + within)
+
+
+def _furthest(old: ReplicaStatus, seen: ReplicaObserved) -> int | None:
+    steps = [old.furthest_step, old.step, *_steps(seen)]
+    return max((_bounded(step) for step in steps if step is not None), default=None)
+
+
+def _steps(seen: ReplicaObserved) -> Iterable[int]:
+    for word in seen.terminations.values():
+        yield word.step
+    if seen.polled:
+        yield seen.polled.status.step
+
+
+def _reference(pod: PodView) -> PodReference:
+    return PodReference(name=pod.name or "unknown", uid=pod.uid or "unknown", created=pod.created)
+
+
+def _told(number: int | None) -> int:
+    return number or 0
+
+
+def _bounded(number: int) -> int:
+    return min(max(number, 0), MOST_COUNT)

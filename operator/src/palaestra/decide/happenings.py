@@ -1,0 +1,67 @@
+"""Events: what changed between two statuses, and what is done about it."""
+
+from collections.abc import Iterator, Sequence
+
+from palaestra.api.reasons import ROWS, Reason, say
+from palaestra.api.status import Condition, ConditionStatus, ConditionType, Phase, ReplicaStatus, Status
+from palaestra.decide.conditions import condition
+from palaestra.decide.decision import Action, Create, Happening, HappeningType, SetSuspend, Stop
+
+_ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
+_BY_ACTION = {Reason.PLANNED, Reason.SUSPENDED, Reason.RESUMED, Reason.EXPIRED}
+
+
+def happening(reason: Reason, message: str, replica: int | None = None) -> Happening:
+    """Return the event of a reason, of the type that docs/operations.md gives it."""
+    kind = HappeningType.WARNING if ROWS[reason].warning else HappeningType.NORMAL
+    return Happening(type=kind, reason=reason, message=message, replica=replica)
+
+
+def of_change(old: Status, new: Status) -> Iterator[Happening]:
+    """Yield an event for each change of a condition or replica that somebody may wait for."""
+    yield from _of_condition(old, new, ConditionType.ACCEPTED)
+    before = {each.index: each for each in old.replicas}
+    for each in new.replicas:
+        yield from _of_replica(before.get(each.index), each)
+    for kind in _ENDS:
+        yield from _of_condition(old, new, kind)
+
+
+def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
+    """Yield an event for everything that is done; the objects of a replica are one."""
+    created: dict[int | None, list[str]] = {}
+    for action in actions:
+        match action:
+            case Create(object=thing, replica=replica):
+                created.setdefault(replica, []).append(f"{thing['kind']} {thing['metadata']['name']}")
+            case Stop(reason=reason, message=message, replica=replica):
+                yield happening(reason, message, replica)
+            case SetSuspend(suspend=suspend, replica=replica):
+                reason = Reason.SUSPENDED if suspend else Reason.RESUMED
+                yield happening(reason, say(reason), replica)
+            case _:
+                yield happening(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
+    for replica, names in created.items():
+        yield happening(Reason.PLANNED, say(Reason.PLANNED, objects=", ".join(names)), replica)
+
+
+def _of_condition(old: Status, new: Status, kind: ConditionType) -> Iterator[Happening]:
+    """Yield an event if a condition changed and is worth one; that a job has not ended yet is not."""
+    before, now = condition(old, kind), condition(new, kind)
+    silent = now is None or (kind in _ENDS and now.status is ConditionStatus.FALSE)
+    if now is None or silent or (before is not None and _same(before, now)):
+        return
+    yield happening(Reason(now.reason), now.message)
+
+
+def _same(one: Condition, other: Condition) -> bool:
+    return (one.status, one.reason) == (other.status, other.reason)
+
+
+def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
+    before = (old.phase, old.reason) if old is not None else (Phase.PENDING, None)
+    if before == (new.phase, new.reason) or new.reason is None or new.message is None:
+        return
+    reason = Reason(new.reason)
+    if reason not in _BY_ACTION:
+        yield happening(reason, new.message, new.index)

@@ -1,0 +1,151 @@
+"""One replica: from what its status said and what is seen to its status now, and whether to stop it."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from palaestra.api import Role
+from palaestra.api.lines import one_line
+from palaestra.api.reasons import Reason
+from palaestra.api.status import (
+    LastCheckpoint,
+    Phase,
+    ReplicaStatus,
+    SimulatorPhase,
+    SimulatorStatus,
+)
+from palaestra.decide.conditions import Told
+from palaestra.decide.deadlines import DEADLINES
+from palaestra.decide.ending import TERMINAL
+from palaestra.decide.outcomes import ended, last_word_by
+from palaestra.decide.preparing import Hold
+from palaestra.decide.situation import Situation, Verdict, told
+from palaestra.decide.troubles import TROUBLES, lost_at
+from palaestra.observe.reading import MOST_COUNT, as_time
+from palaestra_sim.protocol.status import CheckpointStatus, TrainerStatus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decided:
+    """The status of a replica, why to stop it (None: go on), and when time alone may change it."""
+
+    status: ReplicaStatus
+    stop: Told | None = None
+    moments: tuple[datetime, ...] = ()
+
+
+def decided(it: Situation, hold: Hold | None) -> Decided:
+    """Return what follows for a replica that had not ended; `hold` keeps its objects from being made."""
+    end = ended(it)
+    if end is not None:
+        return Decided(status=_status(it, end))
+    deadlines = [found for check in DEADLINES if (found := check(it)) is not None]
+    over = next((each.told for each in deadlines if each.at <= it.now), None)
+    if it.seen.job is None and hold is not None and hold.final:
+        over = hold.told
+    if over is not None and it.seen.job is None:  # there is nothing to stop, and nothing will be made
+        return Decided(status=_status(it, Verdict(phase=Phase.FAILED, told=over)))
+    waited_for = (at for at in (last_word_by(it), lost_at(it)) if at is not None)
+    moments = (*waited_for, *(each.at for each in deadlines))
+    return Decided(status=_status(it, _standing(it, hold)), stop=over, moments=moments)
+
+
+def _standing(it: Situation, hold: Hold | None) -> Verdict:
+    """Return where a replica stands that goes on."""
+    job, spec = it.seen.job, it.job.spec
+    queue = spec.scheduling.queue_name
+    if job is None and hold is not None:
+        return Verdict(phase=Phase.PENDING, told=hold.told)
+    if (job is None and spec.suspend) or (job is not None and job.suspended):
+        why = told(Reason.QUEUED, queue=queue) if queue is not None else told(Reason.SUSPENDED)
+        return Verdict(phase=Phase.SUSPENDED, told=why)
+    trouble = next((found for check in TROUBLES if (found := check(it)) is not None), None)
+    trainer = it.seen.pod.trainer if it.seen.pod is not None and job is not None else None
+    if trainer is not None and trainer.exit is not None and not trouble:
+        what = f"attempt {it.counted.attempt} has ended, its simulators are stopped"
+        return Verdict(phase=Phase.RUNNING, told=told(Reason.TRAINING, what=what))
+    runs = it.pod is not None and trainer is not None and trainer.running_since is not None
+    phase = Phase.RUNNING if runs else Phase.PENDING
+    return Verdict(phase=phase, told=trouble or (_running(it) if runs else _starting(it)))
+
+
+def _running(it: Situation) -> Told:
+    if it.seen.polled is not None and not it.trains:
+        return told(Reason.STARTING, what="its simulators are on their way")
+    return told(Reason.TRAINING, what=f"attempt {it.counted.attempt} trains")
+
+
+def _starting(it: Situation) -> Told:
+    there = it.pod is not None
+    if it.seen.job is None:
+        return told(
+            Reason.STARTING, what="waits for its old pod to end" if there else "is about to be created"
+        )
+    return told(Reason.STARTING, what="its containers start" if there else "its pod is about to be created")
+
+
+def _status(it: Situation, verdict: Verdict) -> ReplicaStatus:
+    old, reason = it.old, verdict.told.reason.value
+    changed = (old.phase, old.reason) != (verdict.phase, reason) or old.since is None
+    counts = it.counted
+    return old.model_copy(
+        update={
+            "phase": verdict.phase,
+            "reason": reason,
+            "message": verdict.told.message,
+            "since": it.now if changed else old.since,
+            "attempt": counts.attempt,
+            "pod": counts.pod,
+            "restarts": counts.restarts,
+            "simulator_restarts": counts.simulator_restarts,
+            "furthest_step": counts.furthest_step,
+            "fruitless": counts.fruitless,
+            **_progress(it, verdict.phase),
+        }
+    )
+
+
+def _progress(it: Situation, phase: Phase) -> dict[str, object]:
+    """Return what the trainer last told; what it does not tell any more stays as it was.
+
+    One that has not looked into its run directory yet says step 0, whatever was learned before.
+    """
+    polled = it.seen.polled.status if it.seen.polled and phase not in TERMINAL else None
+    ended_with = it.seen.termination
+    told_last = ended_with or polled
+    fields: dict[str, object] = {"steps_per_second": None}
+    if told_last is not None and not (told_last.attempt is None and told_last.step == 0):
+        fields["step"] = min(told_last.step, MOST_COUNT)
+        fields["success_rate"] = _or(told_last.success_rate, it.old.success_rate)
+        fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or it.old.last_checkpoint
+    if polled is not None and ended_with is None:
+        fields |= {
+            "target": min(polled.target, MOST_COUNT),
+            "mean_return": _or(polled.mean_return, it.old.mean_return),
+            "steps_per_second": polled.steps_per_second,
+            "simulators": _simulators(polled),
+        }
+    return fields
+
+
+def _simulators(polled: TrainerStatus) -> tuple[SimulatorStatus, ...]:
+    return tuple(
+        SimulatorStatus(
+            name=one_line(each.name, 255) or "unnamed",
+            role=Role(each.role),
+            state=SimulatorPhase(each.state),
+            restarts=min(each.restarts, MOST_COUNT),
+            last_fault=None if each.last_fault is None else one_line(each.last_fault, 500),
+        )
+        for each in polled.simulators
+    )
+
+
+def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
+    at = as_time(checkpoint.time) if checkpoint is not None else None
+    if checkpoint is None or at is None:
+        return None
+    return LastCheckpoint(step=min(checkpoint.step, MOST_COUNT), time=at)
+
+
+def _or(new: float | None, old: float | None) -> float | None:
+    return old if new is None else new

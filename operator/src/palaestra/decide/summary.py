@@ -1,0 +1,96 @@
+"""The job as a whole: one phase, one reason, and the columns of `kubectl get`."""
+
+from collections import Counter
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+from palaestra.api import TrainingJob
+from palaestra.api.reasons import Reason, say
+from palaestra.api.status import Phase, ReplicaStatus, Status
+from palaestra.decide.conditions import Told
+from palaestra.decide.ending import TERMINAL
+from palaestra.decide.moments import seconds_between
+from palaestra.decide.situation import Verdict
+from palaestra.observe.reading import MOST_COUNT
+from palaestra.observe.views import Observed
+
+
+def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
+    """Return where the job stands."""
+    phases = Counter(each.phase for each in replicas)
+    if all(each.phase in TERMINAL for each in replicas):
+        return _ended(replicas)
+    if phases[Phase.RUNNING]:
+        what = f"{phases[Phase.RUNNING]} of {len(replicas)} replicas train"
+        return Verdict(phase=Phase.RUNNING, told=Told(reason=Reason.TRAINING, message=what))
+    if phases[Phase.SUSPENDED] and not phases[Phase.PENDING]:
+        return _as_first(replicas, Phase.SUSPENDED)
+    return _as_first(replicas, Phase.PENDING)
+
+
+def active(
+    old: Status, phase: Phase, replicas: Sequence[ReplicaStatus], now: datetime
+) -> tuple[int, datetime | None]:
+    """Return the seconds that the job was active before, and since when it is; suspended time is none."""
+    suspended = all(each.phase in TERMINAL | {Phase.SUSPENDED} for each in replicas)
+    if phase not in TERMINAL and not suspended:
+        return old.active_seconds, old.active_since or now
+    if old.active_since is None:
+        return old.active_seconds, None
+    return min(old.active_seconds + seconds_between(old.active_since, now), MOST_COUNT), None
+
+
+def started(old: Status, observed: Observed) -> datetime | None:
+    """Return when the first pod of all was started by a node."""
+    if old.start_time is not None:
+        return old.start_time
+    begun = [pod.started for each in observed.replicas for pod in each.pods if pod.started]
+    return min(begun, default=None)
+
+
+def completed(phase: Phase, observed: Observed, now: datetime) -> datetime | None:
+    """Return when the last replica ended: when the last Job did, or now where one does not tell."""
+    if phase not in TERMINAL:
+        return None
+    return min(max(each.job.ended or now if each.job else now for each in observed.replicas), now)
+
+
+def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:
+    """Return the figures of `kubectl get tj`: of the replica that is furthest behind, and of the worst."""
+    up = sum(each.phase in {Phase.RUNNING, Phase.SUCCEEDED} for each in replicas)
+    steps = [each.step for each in replicas if each.step is not None]
+    rates = [each.success_rate for each in replicas if each.success_rate is not None]
+    return {
+        "running": f"{up}/{job.spec.replicas}",
+        "step": min(steps, default=None),
+        "success_rate": min(rates, default=None),
+    }
+
+
+def _ended(replicas: Sequence[ReplicaStatus]) -> Verdict:
+    failed = [each for each in replicas if each.phase is Phase.FAILED]
+    if not failed:
+        what = f"{len(replicas)} of {len(replicas)} replicas succeeded"
+        return Verdict(phase=Phase.SUCCEEDED, told=Told(reason=Reason.SUCCEEDED, message=what))
+    first = failed[0]
+    told = Told(reason=Reason(first.reason or Reason.JOB_FAILED), message=first.message or "")
+    if len(replicas) > 1:
+        message = say(
+            Reason.SOME_REPLICAS_FAILED,
+            failed=len(failed),
+            all=len(replicas),
+            index=first.index,
+            message=f"{first.reason}: {first.message}",
+        )
+        alike = len(failed) == len(replicas) and len({each.reason for each in failed}) == 1
+        told = Told(reason=told.reason if alike else Reason.SOME_REPLICAS_FAILED, message=message)
+    return Verdict(phase=Phase.FAILED, told=told)
+
+
+def _as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> Verdict:
+    """Return the word of the first replica that stands so."""
+    first = next(each for each in replicas if each.phase is phase)
+    of = f"replica {first.index}: " if len(replicas) > 1 else ""
+    told = Told(reason=Reason(first.reason or Reason.STARTING), message=f"{of}{first.message or ''}")
+    return Verdict(phase=phase, told=told)

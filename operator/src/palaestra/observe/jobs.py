@@ -1,0 +1,60 @@
+"""The batch/v1 Job of a replica, as the API server shows it."""
+
+from palaestra.observe.reading import condition, count, holds, part, parts, text, time
+from palaestra.observe.views import JobEnd, JobView, Raw
+
+STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
+STOP_DEADLINE_S = 1
+
+# The outcome is certain before the last pod has ended: a pod on a lost node never does.
+_ENDS = (
+    ("Complete", JobEnd.COMPLETE),
+    ("Failed", JobEnd.FAILED),
+    ("SuccessCriteriaMet", JobEnd.COMPLETE),
+    ("FailureTarget", JobEnd.FAILED),
+)
+
+
+def job_view(raw: Raw) -> JobView:
+    """Return the Job; what it does not tell is empty."""
+    metadata, spec, status = part(raw, "metadata"), part(raw, "spec"), part(raw, "status")
+    named, end = next(((kind, end) for kind, end in _ENDS if holds(raw, kind)), ("", None))
+    ending = condition(raw, named)
+    suspension = condition(raw, "Suspended")
+    return JobView(
+        name=text(metadata, "name", 253),
+        uid=text(metadata, "uid", 253),
+        suspended=spec.get("suspend") is True,
+        resumed=time(suspension, "lastTransitionTime") if suspension.get("status") == "False" else None,
+        stopped=_stopped(part(metadata, "annotations")),
+        short=spec.get("activeDeadlineSeconds") == STOP_DEADLINE_S,
+        failures=_failures(status),
+        end=end,
+        end_reason=text(ending, "reason", 60),
+        end_message=text(ending, "message"),
+        ended=time(ending, "lastTransitionTime"),
+        deleting="deletionTimestamp" in metadata,
+        volumes=_volumes(raw),
+    )
+
+
+def _stopped(annotations: dict[str, object]) -> tuple[str, str] | None:
+    if not isinstance(annotations.get(STOPPED), str):
+        return None
+    reason, _, message = text(annotations, STOPPED, 1100).partition(": ")
+    return reason, message
+
+
+def _failures(status: dict[str, object]) -> int:
+    """Return the pods that failed: those that the Job controller has booked and those that it is about to."""
+    uncounted = part(status, "uncountedTerminatedPods").get("failed")
+    return count(status, "failed") + (len(uncounted) if isinstance(uncounted, list) else 0)
+
+
+def _volumes(raw: Raw) -> frozenset[str]:
+    names = (
+        text(part(volume, kind), name, 253)
+        for volume in parts(raw, "spec", "template", "spec", "volumes")
+        for kind, name in (("configMap", "name"), ("persistentVolumeClaim", "claimName"))
+    )
+    return frozenset(name for name in names if name)

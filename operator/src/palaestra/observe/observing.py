@@ -1,0 +1,105 @@
+"""Sort what was read by replica, and make values of it."""
+
+from datetime import datetime
+
+from palaestra.api import TrainingJob
+from palaestra.observe.jobs import job_view
+from palaestra.observe.pods import BEGINNING, pod_view
+from palaestra.observe.reading import part, parts, text, time
+from palaestra.observe.views import (
+    CreateFailure,
+    JobView,
+    Objects,
+    Observed,
+    Obstacle,
+    PodView,
+    Raw,
+    ReplicaObserved,
+)
+from palaestra.plan.replica import REPLICA_LABEL, UID_LABEL
+from palaestra_sim.protocol.status import ProtocolError, Termination
+
+
+def observe(job: TrainingJob, objects: Objects) -> Observed:
+    """Return what `objects` show of the job; nothing in them is trusted."""
+    return Observed(
+        replicas=tuple(_replica(job, index, objects) for index in range(job.spec.replicas)),
+        present=frozenset(
+            (kind, text(part(raw, "metadata"), "name", 253))
+            for kind, group in (
+                ("ConfigMap", objects.config_maps),
+                ("PersistentVolumeClaim", objects.claims),
+                ("NetworkPolicy", objects.policies),
+            )
+            for raw in group
+        ),
+        sources=dict(objects.sources),
+        kueue=objects.kueue,
+    )
+
+
+def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
+    name = f"{job.metadata.name}-{index}"
+    named = [raw for raw in objects.jobs if part(raw, "metadata").get("name") == name]
+    ours = next((job_view(raw) for raw in named if _owned(raw, job)), None)
+    pods = _pods(job, index, objects)
+    newest = pods[-1] if pods else None
+    return ReplicaObserved(
+        index=index,
+        job=ours,
+        obstacle=next((_obstacle(raw, name) for raw in named if not _owned(raw, job)), None),
+        pods=pods,
+        polled=objects.polled.get(newest.uid) if newest and not newest.ended else None,
+        terminations={each.uid: word for each in pods if (word := _last_word(each)) is not None},
+        refused=_refused(ours, newest, objects) if ours else None,
+    )
+
+
+def _owned(raw: Raw, job: TrainingJob) -> bool:
+    owners = parts(raw, "metadata", "ownerReferences")
+    return job.metadata.uid is not None and any(each.get("uid") == job.metadata.uid for each in owners)
+
+
+def _obstacle(raw: Raw, name: str) -> Obstacle:
+    return Obstacle(name=name, deleting="deletionTimestamp" in part(raw, "metadata"))
+
+
+def _pods(job: TrainingJob, index: int, objects: Objects) -> tuple[PodView, ...]:
+    """Return the pods of a replica, those of a Job before the present one too, oldest first."""
+    found: dict[str, PodView] = {}
+    for raw in objects.pods:
+        labels = part(raw, "metadata", "labels")
+        if labels.get(UID_LABEL) == job.metadata.uid and labels.get(REPLICA_LABEL) == str(index):
+            view = pod_view(raw)
+            found[view.uid] = view
+    found.pop("", None)
+    return tuple(sorted(found.values(), key=lambda it: (it.created, not it.ended, it.name)))
+
+
+def _last_word(pod: PodView) -> Termination | None:
+    """Return the trainer's last word; None for the end of a log, or whatever else a pod may write."""
+    trainer = pod.trainer
+    if trainer is None or trainer.exit is None:
+        return None
+    try:
+        return Termination.from_message(trainer.exit.message)
+    except ProtocolError:
+        return None
+
+
+def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFailure | None:
+    """Return the last refusal of a pod, unless one was made since."""
+    failures = [
+        CreateFailure(message=text(raw, "message"), at=_when(raw))
+        for raw in objects.events
+        if raw.get("reason") == "FailedCreate" and part(raw, "involvedObject").get("uid") == job.uid
+    ]
+    last = max(failures, key=lambda it: it.at, default=None)
+    if last is None or (newest is not None and newest.created >= last.at):
+        return None
+    return last
+
+
+def _when(event: Raw) -> datetime:
+    series = time(part(event, "series"), "lastObservedTime")
+    return series or time(event, "lastTimestamp") or time(event, "eventTime") or BEGINNING

@@ -1,0 +1,100 @@
+"""One pod, as the API server shows it."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from palaestra.observe.reading import condition, count, holds, part, parts, text, time
+from palaestra.observe.views import ContainerKind, ContainerView, Exit, PodView, Raw
+
+MOST_MESSAGE = 4096  # of a termination message: Kubernetes cuts it there
+BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # of what has no readable time
+UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
+SIDECARS = ("sim-", "ros-master")  # names of the containers that have to be restarted
+
+
+def pod_view(raw: Raw) -> PodView:
+    """Return the pod; what it does not tell is empty."""
+    status, metadata = part(raw, "status"), part(raw, "metadata")
+    scheduled = condition(raw, "PodScheduled")
+    return PodView(
+        name=text(metadata, "name", 253),
+        uid=text(metadata, "uid", 253),
+        created=time(metadata, "creationTimestamp") or BEGINNING,
+        phase=text(status, "phase", 20) or "Pending",
+        started=time(status, "startTime"),
+        reason=text(status, "reason", 60),
+        message=text(status, "message"),
+        ready=holds(raw, "Ready"),
+        node=text(part(raw, "spec"), "nodeName", 253),
+        unschedulable=text(scheduled, "message") if _unschedulable(scheduled) else "",
+        disruption=_disruption(raw),
+        gone_by=time(metadata, "deletionTimestamp"),
+        containers=_containers(raw),
+    )
+
+
+def dropped(view: PodView) -> tuple[str, ...]:
+    """Return the containers of a pod that should be sidecars and are plain init containers."""
+    return tuple(
+        each.name
+        for each in view.containers
+        if each.kind is ContainerKind.INIT and each.name.startswith(SIDECARS)
+    )
+
+
+def _unschedulable(scheduled: dict[str, Any]) -> bool:
+    return scheduled.get("status") == "False" and text(scheduled, "reason") in UNSCHEDULABLE
+
+
+def _disruption(raw: Raw) -> str:
+    if not holds(raw, "DisruptionTarget"):
+        return ""
+    target = condition(raw, "DisruptionTarget")
+    return text(target, "message") or text(target, "reason") or "it was taken"
+
+
+def _containers(raw: Raw) -> tuple[ContainerView, ...]:
+    states = {
+        each.get("name"): each
+        for field in ("initContainerStatuses", "containerStatuses")
+        for each in parts(raw, "status", field)
+        if isinstance(each.get("name"), str)
+    }
+    planned = [
+        *((each, _kind(each)) for each in parts(raw, "spec", "initContainers")),
+        *((each, ContainerKind.MAIN) for each in parts(raw, "spec", "containers")),
+    ]
+    return tuple(_container(each, kind, states) for each, kind in planned)
+
+
+def _kind(planned: dict[str, Any]) -> ContainerKind:
+    return ContainerKind.SIDECAR if planned.get("restartPolicy") == "Always" else ContainerKind.INIT
+
+
+def _container(planned: dict[str, Any], kind: ContainerKind, states: dict[Any, Any]) -> ContainerView:
+    name = text(planned, "name", 63)
+    status = states.get(name, {})
+    running, waiting = part(status, "state", "running"), part(status, "state", "waiting")
+    ended = part(status, "state", "terminated") or part(status, "lastState", "terminated")
+    started_at = time(running, "startedAt")
+    return ContainerView(
+        name=name,
+        kind=kind,
+        image=text(planned, "image", 512),
+        running_since=started_at,
+        started=started_at is not None and status.get("started") is True,
+        waiting=text(waiting, "reason", 60),
+        waiting_message=text(waiting, "message"),
+        exit=_exit(ended) if ended else None,
+        restarts=count(status, "restartCount"),
+    )
+
+
+def _exit(ended: dict[str, Any]) -> Exit:
+    message = ended.get("message")
+    return Exit(
+        code=count(ended, "exitCode"),
+        reason=text(ended, "reason", 60),
+        message=message[:MOST_MESSAGE] if isinstance(message, str) else "",
+        at=time(ended, "finishedAt"),
+    )

@@ -1,0 +1,46 @@
+"""The objects that a job refers to by name; each must be open to jobs before it is used."""
+
+from collections.abc import Iterator, Mapping
+
+from palaestra.api import TrainingJob
+from palaestra.api.container import Variable
+from palaestra.observe.views import Source, SourceKind
+
+FOR_JOBS = "palaestra.dev/for-jobs"
+
+
+def references(job: TrainingJob) -> tuple[Source, ...]:
+    """Return every object of the job's namespace that its spec refers to, each once."""
+    return tuple(dict.fromkeys((*_worlds(job), *_secrets(job), *_claims(job))))
+
+
+def open_to_jobs(raw: object) -> bool:
+    """Return whether an object carries the label that opens it to jobs."""
+    metadata = raw.get("metadata") if isinstance(raw, Mapping) else None
+    labels = metadata.get("labels") if isinstance(metadata, Mapping) else None
+    return isinstance(labels, Mapping) and labels.get(FOR_JOBS) == "true"
+
+
+def _worlds(job: TrainingJob) -> Iterator[Source]:
+    for place, group in enumerate(job.spec.simulators):
+        if (reference := group.world.config_map) is not None:
+            field = f"spec.simulators[{place}].world.configMap"
+            yield Source(kind=SourceKind.CONFIG_MAP, name=reference.name, field=field)
+
+
+def _secrets(job: TrainingJob) -> Iterator[Source]:
+    yield from _of_variables(job.spec.trainer.env, "spec.trainer")
+    for place, group in enumerate(job.spec.simulators):
+        yield from _of_variables(group.env, f"spec.simulators[{place}]")
+
+
+def _of_variables(env: tuple[Variable, ...], owner: str) -> Iterator[Source]:
+    for place, variable in enumerate(env):
+        if (reference := variable.secret_key_ref) is not None:
+            field = f"{owner}.env[{place}].secretKeyRef"
+            yield Source(kind=SourceKind.SECRET, name=reference.name, field=field)
+
+
+def _claims(job: TrainingJob) -> Iterator[Source]:
+    if (name := job.spec.storage.existing_claim) is not None:
+        yield Source(kind=SourceKind.CLAIM, name=name, field="spec.storage.existingClaim")

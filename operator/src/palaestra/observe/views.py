@@ -1,0 +1,253 @@
+"""What is known of a TrainingJob's objects, as values: the seam between reading and deciding.
+
+Everything here was checked when it was read (`palaestra.observe.reading`): a size has a bound, a time
+is a time, and what a pod says of itself is either our protocol or nothing.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import StrEnum
+from typing import Any
+
+from palaestra_sim.protocol.status import Termination, TrainerStatus
+
+Raw = Mapping[str, Any]  # an object as its JSON, of which nothing is believed
+
+
+class SourceKind(StrEnum):
+    """The kinds of object that a job may refer to."""
+
+    CONFIG_MAP = "ConfigMap"
+    SECRET = "Secret"  # noqa: S105 - the name of a kind
+    CLAIM = "PersistentVolumeClaim"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """An object of the job's namespace that its spec refers to; `field` is the first place that does.
+
+    Two are equal when they name the same object.
+    """
+
+    kind: SourceKind
+    name: str
+    field: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polled:
+    """What a trainer answered, and when (by this machine's clock, with a time zone)."""
+
+    status: TrainerStatus
+    at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Objects:
+    """Everything that is read for one TrainingJob, as raw JSON.
+
+    Attributes:
+        jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
+            a Job that was found to have one of our names belongs among `jobs`, whoever owns it.
+        events: FailedCreate events about those Jobs.
+        polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
+        sources: what `references(job)` names; None: there is no such object. Of a Secret the
+            metadata is enough.
+        kueue: whether the cluster has Kueue.
+    """
+
+    jobs: Sequence[Raw] = ()
+    pods: Sequence[Raw] = ()
+    claims: Sequence[Raw] = ()
+    config_maps: Sequence[Raw] = ()
+    policies: Sequence[Raw] = ()
+    events: Sequence[Raw] = ()
+    polled: Mapping[str, Polled] = field(default_factory=dict)
+    sources: Mapping[Source, Raw | None] = field(default_factory=dict)
+    kueue: bool = False
+
+
+class ContainerKind(StrEnum):
+    """What a container is in its pod."""
+
+    MAIN = "main"
+    SIDECAR = "sidecar"
+    INIT = "init"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exit:
+    """How a container ended; `message` is its termination message, as the pod wrote it."""
+
+    code: int
+    reason: str = ""
+    message: str = ""
+    at: datetime | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContainerView:
+    """One container of a pod.
+
+    Attributes:
+        running_since: None: it does not run now.
+        started: its startup probe has passed, or it has none and runs.
+        waiting, waiting_message: why it does not run yet, in the kubelet's words; "": it does not wait.
+        exit: how it ended, if it has; of a sidecar that runs again, how it ended before.
+        restarts: by the kubelet.
+    """
+
+    name: str
+    kind: ContainerKind
+    image: str = ""
+    running_since: datetime | None = None
+    started: bool = False
+    waiting: str = ""
+    waiting_message: str = ""
+    exit: Exit | None = None
+    restarts: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PodView:
+    """One pod of a replica.
+
+    Attributes:
+        started: when a kubelet took it.
+        phase: Pending, Running, Succeeded, Failed or Unknown.
+        reason, message: the pod's own, as of an eviction; mostly "".
+        ready: the kubelet's word; False: it is not, or nobody knows.
+        unschedulable: the scheduler's words; "": it was scheduled.
+        disruption: why the cluster took it (condition DisruptionTarget); "": it did not.
+        gone_by: when it was to be gone, its grace period included; None: nobody deleted it.
+        containers: in the order in which they start, the trainer last.
+    """
+
+    name: str
+    uid: str
+    created: datetime
+    phase: str = "Pending"
+    started: datetime | None = None
+    reason: str = ""
+    message: str = ""
+    ready: bool = False
+    node: str = ""
+    unschedulable: str = ""
+    disruption: str = ""
+    gone_by: datetime | None = None
+    containers: tuple[ContainerView, ...] = ()
+
+    @property
+    def ended(self) -> bool:
+        """Return whether all its containers have ended for good."""
+        return self.phase in {"Succeeded", "Failed"}
+
+    @property
+    def trainer(self) -> ContainerView | None:
+        """Return its main container, None where the pod shows none."""
+        return next((each for each in self.containers if each.kind is ContainerKind.MAIN), None)
+
+    @property
+    def sidecars(self) -> tuple[ContainerView, ...]:
+        """Return the ROS master's container and those of the simulators."""
+        return tuple(each for each in self.containers if each.kind is ContainerKind.SIDECAR)
+
+
+class JobEnd(StrEnum):
+    """How a batch/v1 Job ended."""
+
+    COMPLETE = "Complete"
+    FAILED = "Failed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobView:
+    """The batch/v1 Job of a replica.
+
+    Attributes:
+        suspended: as its spec says.
+        resumed: when it last was, None: it never was suspended or still is.
+        stopped: reason and message of our stop mark; None: it has none.
+        short: its deadline is that of a stopped Job.
+        failures: pods that failed and count against backoffLimit.
+        end, end_reason, end_message, ended: what its conditions say; None and "" while it goes on.
+        deleting: somebody deleted it.
+        volumes: names of the ConfigMaps and claims that its pods mount.
+    """
+
+    name: str
+    uid: str
+    suspended: bool = False
+    resumed: datetime | None = None
+    stopped: tuple[str, str] | None = None
+    short: bool = False
+    failures: int = 0
+    end: JobEnd | None = None
+    end_reason: str = ""
+    end_message: str = ""
+    ended: datetime | None = None
+    deleting: bool = False
+    volumes: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Obstacle:
+    """A Job that has our name and is not ours; `deleting`: it will be gone."""
+
+    name: str
+    deleting: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CreateFailure:
+    """The last time the API server refused a pod, in its words."""
+
+    message: str
+    at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplicaObserved:
+    """What the cluster shows of one replica.
+
+    Attributes:
+        pods: all there are, oldest first.
+        polled: the answer of the newest pod's trainer; None: unknown.
+        terminations: last words of trainers by pod UID, those that are of our protocol.
+        refused: why no pod could be made, if that is newer than the newest pod.
+    """
+
+    index: int
+    job: JobView | None = None
+    obstacle: Obstacle | None = None
+    pods: tuple[PodView, ...] = ()
+    polled: Polled | None = None
+    terminations: Mapping[str, Termination] = field(default_factory=dict)
+    refused: CreateFailure | None = None
+
+    @property
+    def pod(self) -> PodView | None:
+        """Return the newest pod."""
+        return self.pods[-1] if self.pods else None
+
+    @property
+    def termination(self) -> Termination | None:
+        """Return the last word of the newest pod's trainer."""
+        return self.terminations.get(self.pod.uid) if self.pod else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observed:
+    """What the cluster shows of a TrainingJob.
+
+    Attributes:
+        replicas: one for each replica of the spec, by index.
+        present: kind and name of the ConfigMaps, claims and NetworkPolicies that there are.
+        sources: as in `Objects`.
+    """
+
+    replicas: tuple[ReplicaObserved, ...]
+    present: frozenset[tuple[str, str]] = frozenset()
+    sources: Mapping[Source, Raw | None] = field(default_factory=dict)
+    kueue: bool = False

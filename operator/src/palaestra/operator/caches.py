@@ -1,0 +1,135 @@
+"""What the operator knows of the cluster: a cache for each kind of object, trimmed.
+
+TrainingJobs, and of everything else only what carries the label palaestra.dev/job: the operator's
+memory does not grow with what others run in the cluster.
+"""
+
+import time
+from collections.abc import Callable, Collection, Iterable
+from typing import Any
+
+from palaestra.api.status import Phase
+from palaestra.cluster import Api, Reflector, Resource
+from palaestra.cluster.resources import (
+    CLAIMS,
+    CONFIG_MAPS,
+    JOBS,
+    NETWORK_POLICIES,
+    PODS,
+    TRAINING_JOBS,
+)
+from palaestra.observe import trimmed
+from palaestra.operator.poller import Key, Target
+from palaestra.plan.layout import STATUS_PORT
+from palaestra.plan.replica import JOB_LABEL, TRAINER
+
+Object = dict[str, Any]
+Changed = Callable[[Key], None]
+
+CHILDREN = (JOBS, PODS, CLAIMS, CONFIG_MAPS.only_metadata(), NETWORK_POLICIES)
+
+
+class Caches:
+    """The objects of one namespace, or of all, as they were a moment ago.
+
+    Args:
+        api: the cluster.
+        namespace: None for all.
+        changed: is told the key of each TrainingJob that changed, or of which a child did.
+    """
+
+    def __init__(self, api: Api, namespace: str | None, changed: Changed) -> None:
+        self._changed = changed
+        self._phases: dict[Key, str] = {}
+        self._jobs = Reflector(
+            api, TRAINING_JOBS, namespace=namespace, keep=trimmed, changed=self._job_changed
+        )
+        self._children = {
+            resource.plural: Reflector(
+                api,
+                resource,
+                namespace=namespace,
+                labels=JOB_LABEL,
+                keep=trimmed,
+                changed=lambda child: changed(_parent(child)),
+            )
+            for resource in CHILDREN
+        }
+
+    def start(self) -> None:
+        """Begin to follow the cluster."""
+        for each in self._all():
+            each.start()
+
+    def stop(self, deadline_s: float) -> None:
+        """Follow no longer; a watch that does not end until `deadline_s` ends with the process."""
+        for each in self._all():
+            each.stop(0.0)
+        self._jobs.stop(deadline_s)
+
+    def wait_synced(self, deadline_s: float) -> bool:
+        """Return whether everything was read once, `deadline_s` from now at the latest."""
+        ends = time.monotonic() + deadline_s
+        return all(each.wait_synced(max(0.0, ends - time.monotonic())) for each in self._all())
+
+    def missing(self) -> tuple[str, ...]:
+        """Return the plurals of the kinds that were not read yet."""
+        children = (name for name, each in self._children.items() if not each.synced)
+        return (*(() if self._jobs.synced else (TRAINING_JOBS.plural,)), *children)
+
+    def known(self) -> Collection[Key]:
+        """Return the keys of all TrainingJobs."""
+        return self._jobs.store.keys()
+
+    def training_job(self, key: Key) -> Object | None:
+        """Return a TrainingJob, None if there is none or it is being deleted."""
+        found = self._jobs.store.get(*key)
+        return None if found is None or "deletionTimestamp" in found["metadata"] else found
+
+    def children(self, resource: Resource, key: Key) -> list[Object]:
+        """Return the objects of a kind that carry the label of a TrainingJob."""
+        namespace, name = key
+        return self._children[resource.plural].store.select(namespace, {JOB_LABEL: name})
+
+    def job(self, namespace: str, name: str) -> Object | None:
+        """Return a batch/v1 Job of ours."""
+        return self._children[JOBS.plural].store.get(namespace, name)
+
+    def phases(self) -> Iterable[str]:
+        """Return the phase of each TrainingJob."""
+        return tuple(self._phases.values())
+
+    def trainers(self) -> Collection[Target]:
+        """Return the trainers that run now."""
+        pods = self._children[PODS.plural].store.select(None, {})
+        return [
+            Target(
+                key=_parent(pod), uid=pod["metadata"]["uid"], host=pod["status"]["podIP"], port=STATUS_PORT
+            )
+            for pod in pods
+            if _trains(pod)
+        ]
+
+    def _all(self) -> tuple[Reflector, ...]:
+        return (self._jobs, *self._children.values())
+
+    def _job_changed(self, obj: Object) -> None:
+        key = (obj["metadata"]["namespace"], obj["metadata"]["name"])
+        if self._jobs.store.get(*key) is None:
+            self._phases.pop(key, None)
+        else:
+            self._phases[key] = (obj.get("status") or {}).get("phase") or Phase.PENDING.value
+        self._changed(key)
+
+
+def _parent(child: Object) -> Key:
+    metadata = child["metadata"]
+    return metadata["namespace"], metadata["labels"][JOB_LABEL]
+
+
+def _trains(pod: Object) -> bool:
+    """Return whether the trainer's container runs and can be reached."""
+    status = pod.get("status") or {}
+    states = {each.get("name"): each.get("state") or {} for each in status.get("containerStatuses") or ()}
+    running = "running" in states.get(TRAINER, {})
+    return running and bool(status.get("podIP")) and "deletionTimestamp" not in pod["metadata"]

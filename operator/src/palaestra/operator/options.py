@@ -1,0 +1,61 @@
+"""How the operator is started."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from palaestra.errors import PalaestraError
+from palaestra.plan import Images
+
+OWN_NAMESPACE = Path("/var/run/secrets/kubernetes.io/serviceaccount/namespace")
+DEFAULT_NAMESPACE = "palaestra-system"
+NAME = "palaestra-operator"  # of the Lease, and of whatever an installation makes
+MOST_PORT = 65_535
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What a person may choose.
+
+    Attributes:
+        images: the release's own, for jobs that name none.
+        operator_namespace: where the operator and its Lease are; its pods may ask trainers.
+        monitoring_namespace: whose pods may scrape trainers and simulators.
+        namespace: the only one whose jobs are looked after; None: all of them.
+        workers: jobs that are looked at at once.
+        resync_s: seconds after which every job is looked at again though nothing changed.
+        leader_elect: whether to wait for the Lease.
+        metrics_address: host and port of /healthz, /readyz and /metrics.
+        kubeconfig: the file to connect with; None: as kubectl finds it, or the pod's own account.
+        context: of the kubeconfig; None: its current one.
+    """
+
+    images: Images
+    operator_namespace: str
+    monitoring_namespace: str = "monitoring"
+    namespace: str | None = None
+    workers: int = 4
+    resync_s: float = 600.0
+    leader_elect: bool = True
+    metrics_address: tuple[str, int] = ("0.0.0.0", 8080)  # noqa: S104 - the pod's address, for probes
+    kubeconfig: str | None = None
+    context: str | None = None
+
+
+def own_namespace() -> str:
+    """Return the namespace that this process runs in; outside a cluster, the one of an installation."""
+    try:
+        return OWN_NAMESPACE.read_text(encoding="ascii").strip() or DEFAULT_NAMESPACE
+    except (OSError, UnicodeDecodeError):
+        return DEFAULT_NAMESPACE
+
+
+def address(text: str) -> tuple[str, int]:
+    """Return host and port of `0.0.0.0:8080`.
+
+    Raises:
+        PalaestraError: it is none.
+    """
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or int(port) > MOST_PORT:
+        raise PalaestraError(f"--metrics-address: {text!r} is no address; write it as 0.0.0.0:8080")
+    return host.removeprefix("[").removesuffix("]"), int(port)

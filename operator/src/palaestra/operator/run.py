@@ -1,0 +1,160 @@
+"""Put the operator together, run it until a signal, and end it within two seconds.
+
+The only place that knows all the parts. Reflectors follow the cluster from the start, so that a new
+leader begins at once; workers begin when the caches are whole and this operator leads.
+"""
+
+import signal
+import socket
+import threading
+import uuid
+from collections.abc import Collection
+
+import structlog
+
+from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
+from palaestra.operator.acting import Acting
+from palaestra.operator.caches import Caches
+from palaestra.operator.controller import Controller
+from palaestra.operator.health import HealthServer
+from palaestra.operator.logs import configure_logs
+from palaestra.operator.looking import Looking
+from palaestra.operator.metrics import Metrics
+from palaestra.operator.options import NAME, Options
+from palaestra.operator.poller import Key, Poller, Target
+from palaestra.operator.strangers import Strangers
+from palaestra.operator.telling import Telling
+from palaestra.operator.workers import Workers
+from palaestra.operator.writing import Writer
+from palaestra.plan import ClusterLayout
+
+log = structlog.get_logger(__name__)
+
+# Of the two seconds in which the operator ends: for what is under way, for the Lease, for the rest.
+FINISH_S, RELEASE_S, STOP_S = 0.6, 0.6, 0.1
+SYNC_S = 1.0
+FAILED = 1
+
+
+class Operator:
+    """A running operator.
+
+    Args:
+        api: the cluster.
+        options: how it was started.
+        metrics: what it counts.
+    """
+
+    def __init__(self, api: Api, options: Options, metrics: Metrics) -> None:
+        self._options = options
+        self._gate = threading.Event()
+        api.on_request = metrics.request
+        self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited)
+        self._caches = Caches(api, options.namespace, self._queue.add)
+        self._poller = Poller(self._trainers, self._queue.add)
+        identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
+        self._leadership = Leadership(api, options.operator_namespace, NAME, identity)
+        writer = Writer(api, self._leads)
+        strangers = Strangers(api)
+        controller = Controller(
+            self._caches,
+            Looking(api, self._caches, strangers, self._poller.known),
+            Acting(api, writer, self._caches, strangers),
+            Telling(writer, Recorder(api, instance=identity)),
+            _layout(options),
+        )
+        self._workers = Workers(
+            self._queue,
+            controller.reconcile,
+            gate=self._gate,
+            seconds=metrics.reconciled,
+            count=options.workers,
+        )
+        metrics.watch(depth=lambda: self._queue.depth, leads=self._leads, phases=self._caches.phases)
+        self._server = HealthServer(
+            options.metrics_address, healthy=self._unhealthy, ready=self._not_ready, metrics=metrics.text
+        )
+
+    def run(self, stopping: threading.Event) -> None:
+        """Look after the jobs until `stopping` is set."""
+        log.info("started", namespace=self._options.namespace or "all", address=self._server.shown)
+        self._caches.start()
+        self._workers.start()
+        self._poller.start()
+        try:
+            while not stopping.is_set() and not self._caches.wait_synced(SYNC_S):
+                log.info("waits for the first lists", missing=self._caches.missing())
+            self._stand()
+            while not stopping.wait(self._options.resync_s):
+                self._look_at_all()
+        finally:
+            self._end()
+
+    def _stand(self) -> None:
+        """Lead, or stand for election: not before the caches are whole, so that a leader can work."""
+        if self._options.leader_elect:
+            self._leadership.start(self._lead, self._gate.clear)
+        else:
+            self._lead()
+
+    def _lead(self) -> None:
+        self._look_at_all()
+        self._gate.set()
+
+    def _leads(self) -> bool:
+        return self._leadership.leads() if self._options.leader_elect else not self._queue.closed
+
+    def _look_at_all(self) -> None:
+        for key in self._caches.known():
+            self._queue.add(key)
+
+    def _trainers(self) -> Collection[Target]:
+        return self._caches.trainers() if self._gate.is_set() else ()
+
+    def _unhealthy(self) -> str | None:
+        return self._workers.trouble()
+
+    def _not_ready(self) -> str | None:
+        missing = self._caches.missing()
+        return f"not read yet: {', '.join(missing)}" if missing else None
+
+    def _end(self) -> None:
+        """End in the order that loses nothing: first the writes, then the Lease, then the rest."""
+        self._gate.clear()
+        self._workers.stop(FINISH_S)
+        self._leadership.stop(RELEASE_S)
+        self._poller.stop(STOP_S)
+        self._caches.stop(STOP_S)
+        log.info("ended")
+
+
+def run(options: Options, metrics: Metrics | None = None) -> int:
+    """Run the operator until SIGTERM or SIGINT and return its exit code; 1: a part of it broke.
+
+    Raises:
+        PalaestraError: no API server is named, or the metrics' address is taken.
+    """
+    configure_logs()
+    stopping = threading.Event()
+    broken: list[str] = []
+
+    def break_down(failed: threading.ExceptHookArgs) -> None:
+        """End with the first thread that ends by mistake: half an operator is worse than a new one."""
+        broken.append(failed.thread.name if failed.thread else "")
+        log.critical("thread failed", thread=broken[-1], exc_info=failed.exc_value)
+        stopping.set()
+
+    threading.excepthook = break_down
+    for each in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(each, lambda *_: stopping.set())
+    operator = Operator(connect(options.kubeconfig, options.context), options, metrics or Metrics())
+    operator.run(stopping)
+    return FAILED if broken else 0
+
+
+def _layout(options: Options) -> ClusterLayout:
+    return ClusterLayout(
+        images=options.images,
+        operator_namespace=options.operator_namespace,
+        monitoring_namespace=options.monitoring_namespace,
+    )

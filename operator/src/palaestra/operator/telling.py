@@ -1,0 +1,82 @@
+"""Tell people how a job stands: one status write if it changed, and events once that is written.
+
+An event for a change that was lost would be a lie, so none is written before the status is. Progress
+alone is written seldom; conditions and phases at once.
+"""
+
+import threading
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+from palaestra.api.reasons import Reason, say
+from palaestra.cluster import ApiError, Forbidden, Invalid, Recorder
+from palaestra.decide import Decision, Happening, worth_writing
+from palaestra.decide.happenings import happening
+from palaestra.decide.writing import PROGRESS_EVERY_S, as_data
+from palaestra.operator.acting import Refusals
+from palaestra.operator.poller import Key
+from palaestra.operator.writing import Writer, difference
+
+Object = Mapping[str, Any]
+
+
+class Telling:
+    """Writes status and events of TrainingJobs; safe to use from several threads.
+
+    Args:
+        writer: for the status.
+        recorder: for the events.
+    """
+
+    def __init__(self, writer: Writer, recorder: Recorder) -> None:
+        self._writer = writer
+        self._recorder = recorder
+        self._lock = threading.Lock()
+        self._written: dict[Key, datetime] = {}
+
+    def tell(self, raw: Object, decision: Decision, refusals: Refusals, now: datetime) -> float | None:
+        """Write what changed; return seconds until progress that was held back is to be written.
+
+        What was refused was not planned, and is told instead where a person has to act.
+
+        Raises:
+            Conflict: the job is not as it was when this was decided.
+            NotLeading: another operator may lead.
+        """
+        key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
+        held_back_s = (
+            None if decision.status is None else self._write(key, raw, as_data(decision.status), now)
+        )
+        for each in decision.events:
+            if each.reason != Reason.PLANNED or not refusals.keys() & {None, each.replica}:
+                self._record(raw, each)
+        for replica, refusal in refusals.items():
+            if isinstance(refusal, Forbidden | Invalid):
+                self._record(raw, happening(Reason.PODS_REFUSED, _words(refusal), replica))
+        return held_back_s
+
+    def _record(self, raw: Object, event: Happening) -> None:
+        whose = "" if event.replica is None else f"replica {event.replica}: "
+        self._recorder.record(raw, event.type, event.reason, whose + event.message)
+
+    def _write(self, key: Key, raw: Object, status: dict[str, Any], now: datetime) -> float | None:
+        old = raw.get("status")
+        patch = difference(old, status)
+        with self._lock:
+            last = self._written.get(key)
+        if not worth_writing(old, status, last, now):
+            return PROGRESS_EVERY_S if patch else None
+        self._writer.status(raw, patch)
+        with self._lock:
+            self._written[key] = now
+        return None
+
+    def forget(self, key: Key) -> None:
+        """Forget a TrainingJob that is gone."""
+        with self._lock:
+            self._written.pop(key, None)
+
+
+def _words(refusal: ApiError) -> str:
+    return say(Reason.PODS_REFUSED, words=refusal.message)

@@ -1,0 +1,112 @@
+"""Threads that take keys from the queue and reconcile them, each key in one thread at a time.
+
+One bad object never delays another: what goes wrong is logged with its key, counted, and tried again
+later and later, while the other keys go on.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+
+import structlog
+from prometheus_client import Histogram
+
+from palaestra.cluster import ApiError, Conflict, WorkQueue
+from palaestra.operator.acting import Outdated
+from palaestra.operator.poller import Key
+from palaestra.operator.writing import NotLeading
+
+IDLE_S = 1.0  # between two looks at whether to go on
+STUCK_S = 300.0  # on one key: every call has a deadline, so nothing takes so long
+
+log = structlog.get_logger(__name__)
+
+Reconcile = Callable[[Key], float | None]
+
+
+class Workers:
+    """A number of threads over one queue.
+
+    Args:
+        queue: of keys.
+        reconcile: looks at one job; returns seconds until it is to be looked at again, or None.
+        gate: nothing is begun while it is not set.
+        seconds: where durations are counted, by `result`.
+        count: how many threads.
+    """
+
+    def __init__(
+        self,
+        queue: WorkQueue[Key],
+        reconcile: Reconcile,
+        *,
+        gate: threading.Event,
+        seconds: Histogram,
+        count: int,
+    ) -> None:
+        self._queue = queue
+        self._reconcile = reconcile
+        self._gate = gate
+        self._seconds = seconds
+        self._began: dict[str, float] = {}
+        self._threads = [
+            threading.Thread(target=self._run, name=f"worker {i}", daemon=True) for i in range(count)
+        ]
+
+    def start(self) -> None:
+        """Begin to work as soon as the gate is set."""
+        for each in self._threads:
+            each.start()
+
+    def stop(self, deadline_s: float) -> None:
+        """Close the queue and wait for what is under way, `deadline_s` at most."""
+        self._queue.close()
+        ends = time.monotonic() + deadline_s
+        for each in self._threads:
+            if each.ident is not None:
+                each.join(max(0.0, ends - time.monotonic()))
+
+    def trouble(self) -> str | None:
+        """Return what is wrong with a thread so that only a new process helps; None: nothing."""
+        now = time.monotonic()
+        for each in self._threads:
+            if now - self._began.get(each.name, now) > STUCK_S:
+                return f"{each.name} is stuck"
+        return None
+
+    def _run(self) -> None:
+        name = threading.current_thread().name
+        while not self._queue.closed:
+            if not self._gate.wait(IDLE_S):
+                continue
+            key = self._queue.get(IDLE_S)
+            if key is None:
+                continue
+            began = self._began[name] = time.monotonic()
+            result = self._work(key)
+            self._queue.done(key)
+            del self._began[name]
+            self._seconds.labels(result).observe(time.monotonic() - began)
+
+    def _work(self, key: Key) -> str:
+        """Reconcile one key, and return how that ended."""
+        try:
+            again_s = self._reconcile(key)
+        except (Conflict, Outdated):  # somebody else wrote; what they wrote is on its way
+            self._queue.retry(key)
+            return "conflict"
+        except NotLeading:  # whoever leads looks at all jobs
+            return "conflict"
+        except ApiError as error:
+            log.warning("refused", job=key, error=str(error), again_in_s=self._retry(key))
+            return "error"
+        except Exception:  # whatever a job may cause, it must not end the worker of all others
+            log.exception("not reconciled", job=key, again_in_s=self._retry(key))
+            return "error"
+        self._queue.forget(key)
+        if again_s is not None:
+            self._queue.add_after(key, again_s)
+        return "done"
+
+    def _retry(self, key: Key) -> float:
+        return round(self._queue.retry(key), 2)

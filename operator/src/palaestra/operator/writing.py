@@ -1,0 +1,81 @@
+"""Every write to the cluster goes through here, and none does while another operator leads."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from palaestra.cluster import Api, Resource
+from palaestra.cluster.resources import TRAINING_JOBS, of
+from palaestra.errors import PalaestraError
+
+Object = Mapping[str, Any]
+
+
+class NotLeading(PalaestraError):
+    """Another operator may lead by now, so nothing is written; whoever leads looks at the job."""
+
+
+class Writer:
+    """Writes to the cluster while it may.
+
+    Each method raises NotLeading when it may not, and ApiError when the API server refuses.
+
+    Args:
+        api: the cluster.
+        leads: whether this operator leads; true without election.
+    """
+
+    def __init__(self, api: Api, leads: Callable[[], bool]) -> None:
+        self._api = api
+        self._leads = leads
+
+    def create(self, obj: Object) -> Object:
+        """Create an object and return it as stored."""
+        self._check()
+        return self._api.create(of(obj), obj)
+
+    def apply(self, obj: Object) -> Object:
+        """Make the fields of an object that is ours alone as given, whether it is there or not."""
+        self._check()
+        return self._api.apply(obj)
+
+    def merge(self, resource: Resource, namespace: str, name: str, patch: Object) -> Object:
+        """Change the fields in `patch`."""
+        self._check()
+        return self._api.merge(resource, namespace, name, patch)
+
+    def delete(self, resource: Resource, namespace: str, name: str, uid: str) -> None:
+        """Delete the object that has this uid, and no later one of its name."""
+        self._check()
+        self._api.delete(resource, namespace, name, uid=uid)
+
+    def status(self, job: Object, patch: Object) -> Object:
+        """Change the status of a TrainingJob, if it still is as `job`, and return it as stored."""
+        self._check()
+        metadata = job["metadata"]
+        return self._api.merge(
+            TRAINING_JOBS,
+            metadata["namespace"],
+            metadata["name"],
+            {"status": patch},
+            subresource="status",
+            resource_version=metadata["resourceVersion"],
+        )
+
+    def _check(self) -> None:
+        if not self._leads():
+            raise NotLeading("the Lease may have passed on; nothing is written any more")
+
+
+def difference(old: Any, new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the merge patch (RFC 7386) that makes `old` into `new`; empty: they are equal."""
+    before: Mapping[str, Any] = old if isinstance(old, Mapping) else {}
+    patch: dict[str, Any] = {key: None for key in before if key not in new}
+    for key, value in new.items():
+        if key not in before:
+            patch[key] = value
+        elif isinstance(value, Mapping) and isinstance(before[key], Mapping):
+            if part := difference(before[key], value):
+                patch[key] = part
+        elif before[key] != value:
+            patch[key] = value
+    return patch

@@ -1,0 +1,192 @@
+"""A namespace of a control plane without nodes, and someone who plays its kubelet."""
+
+import itertools
+import json
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Any
+
+from palaestra.cluster import Api, NotFound, Resource
+from palaestra.cluster.resources import (
+    CLAIMS,
+    CONFIG_MAPS,
+    EVENTS,
+    JOBS,
+    NAMESPACES,
+    NETWORK_POLICIES,
+    PODS,
+    TRAINING_JOBS,
+)
+from palaestra_sim.protocol.status import Termination
+from palaestra_sim.world import builtin
+
+DEADLINE_S = 30.0
+PACE_S = 0.05
+KINDS = (NETWORK_POLICIES, CONFIG_MAPS, CLAIMS, JOBS)
+
+Object = dict[str, Any]
+numbers = itertools.count(1)
+
+
+class TooLate(AssertionError):
+    """What was waited for did not come."""
+
+
+def eventually(seen: Callable[[], Any], deadline_s: float = DEADLINE_S) -> Any:
+    """Return the first true thing that `seen` returns.
+
+    Raises:
+        TooLate: there was none within `deadline_s`.
+    """
+    ends = time.monotonic() + deadline_s
+    while not (found := seen()):
+        if time.monotonic() > ends:
+            raise TooLate(f"not within {deadline_s} s; last seen: {found!r}")
+        time.sleep(PACE_S)
+    return found
+
+
+def training_job(name: str = "job", **spec: Any) -> Object:
+    """Return a TrainingJob; keywords are fields of its spec."""
+    return {
+        "apiVersion": "palaestra.dev/v1alpha1",
+        "kind": "TrainingJob",
+        "metadata": {"name": name},
+        "spec": spec,
+    }
+
+
+def world_of(config_map: str) -> Object:
+    """Return the fields of a job whose only simulator has the world in a ConfigMap."""
+    world = {"configMap": {"name": config_map, "key": "my.wbt"}}
+    return {
+        "simulators": [{"name": "collect", "role": "Collect", "world": world}],
+        "trainer": {"evaluation": {"everySteps": 0}},
+    }
+
+
+def world_map() -> Object:
+    """Return a ConfigMap with a world, open to jobs."""
+    return {
+        "apiVersion": "v1",
+        "kind": "ConfigMap",
+        "metadata": {"name": "world", "labels": {"palaestra.dev/for-jobs": "true"}},
+        "data": {"my.wbt": builtin("arena").decode()},
+    }
+
+
+def stranger(name: str) -> Object:
+    """Return a Job that has nothing to do with Palaestra."""
+    container = {"name": "main", "image": "theirs", "command": ["true"]}
+    template = {"spec": {"restartPolicy": "Never", "containers": [container]}}
+    return {
+        "apiVersion": "batch/v1",
+        "kind": "Job",
+        "metadata": {"name": name},
+        "spec": {"suspend": True, "template": template},
+    }
+
+
+class Place:
+    """A namespace, with what people and kubelets do there; `api` is an administrator's."""
+
+    def __init__(self, api: Api) -> None:
+        self.api = api
+        self.name = f"place-{next(numbers)}-{datetime.now(UTC):%M%S}"
+        api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": self.name}})
+
+    def create(self, resource: Resource, obj: Object) -> Object:
+        """Create an object here."""
+        return self.api.create(resource, {**obj, "metadata": {**obj["metadata"], "namespace": self.name}})
+
+    def get(self, resource: Resource, name: str) -> Object | None:
+        """Return an object, None if there is none."""
+        try:
+            return self.api.get(resource, self.name, name)
+        except NotFound:
+            return None
+
+    def all(self, resource: Resource, job: str | None = None) -> list[Object]:
+        """Return all objects of a kind here, or those of a TrainingJob."""
+        labels = f"palaestra.dev/job={job}" if job else None
+        return self.api.list(resource, self.name, labels=labels)
+
+    def train(self, name: str = "job", **spec: Any) -> Object:
+        """Create a TrainingJob, as its author does."""
+        return self.create(TRAINING_JOBS, training_job(name, **spec))
+
+    def status(self, name: str = "job") -> Object:
+        """Return the status of a TrainingJob, empty where there is none."""
+        return (self.get(TRAINING_JOBS, name) or {}).get("status") or {}
+
+    def condition(self, kind: str, name: str = "job") -> Object:
+        """Return a condition of a TrainingJob, empty where it has none."""
+        conditions = self.status(name).get("conditions", [])
+        return next((each for each in conditions if each["type"] == kind), {})
+
+    def children(self, name: str = "job") -> dict[str, str]:
+        """Return kind and name of everything that was made for a TrainingJob, each with its uid."""
+        return {
+            f"{resource.kind}/{each['metadata']['name']}": each["metadata"]["uid"]
+            for resource in KINDS
+            for each in self.all(resource, name)
+        }
+
+    def events(self, name: str = "job") -> set[str]:
+        """Return the reasons of the events about a TrainingJob."""
+        return {each["reason"] for each in self.about(name)}
+
+    def about(self, name: str = "job") -> list[Object]:
+        """Return the events about a TrainingJob."""
+        found = self.api.list(EVENTS, self.name, fields=f"involvedObject.name={name}")
+        return [each for each in found if each["involvedObject"]["kind"] == "TrainingJob"]
+
+    def until(self, phase: str, name: str = "job", deadline_s: float = DEADLINE_S) -> Object:
+        """Return the status of a TrainingJob once it is in a phase."""
+        try:
+            eventually(lambda: self.status(name).get("phase") == phase, deadline_s)
+        except TooLate as late:
+            raise TooLate(f"not {phase} but {json.dumps(self.status(name), indent=1)}") from late
+        return self.status(name)
+
+    def pods(self, name: str = "job", count: int = 1, deadline_s: float = DEADLINE_S) -> list[Object]:
+        """Return the pods of a TrainingJob once there are so many that have not ended."""
+
+        def seen() -> list[Object]:
+            alive = [
+                each
+                for each in self.all(PODS, name)
+                if each["status"].get("phase") in {"Pending", "Running"}
+                and "deletionTimestamp" not in each["metadata"]
+            ]
+            return alive if len(alive) >= count else []
+
+        return list(eventually(seen, deadline_s))
+
+    def run(self, pod: Object, address: str = "127.0.0.1") -> None:
+        """Let a pod run, as a kubelet tells it."""
+        now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        running = {"state": {"running": {"startedAt": now}}, "ready": True, "started": True}
+        self._report(pod, "Running", running, podIP=address, podIPs=[{"ip": address}], startTime=now)
+
+    def end(self, pod: Object, code: int = 0, word: Termination | None = None) -> None:
+        """Let a pod's trainer end with an exit code and a last word."""
+        now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        reason = "Error" if code else "Completed"
+        ended = {"exitCode": code, "startedAt": now, "finishedAt": now, "reason": reason}
+        if word is not None:
+            ended["message"] = word.to_message()
+        done = {"state": {"terminated": ended}, "ready": False, "started": False}
+        self._report(pod, "Failed" if code else "Succeeded", done)
+
+    def _report(self, pod: Object, phase: str, state: Object, **more: Any) -> None:
+        spec = pod["spec"]
+        common = {"image": "i", "imageID": "i", "restartCount": 0}
+        status = {
+            "phase": phase,
+            "initContainerStatuses": [{"name": c["name"], **common, **state} for c in spec["initContainers"]],
+            "containerStatuses": [{"name": c["name"], **common, **state} for c in spec["containers"]],
+            **more,
+        }
+        self.api.merge(PODS, self.name, pod["metadata"]["name"], {"status": status}, subresource="status")

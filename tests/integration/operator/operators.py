@@ -1,0 +1,70 @@
+"""Operators as processes: started with the rights of an installation, killed in any way."""
+
+import json
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+from tests.integration.operator.cluster import eventually
+
+PROGRAM = Path(__file__).with_name("mortal.py")
+END_S = 10.0
+
+
+class RunningOperator:
+    """One operator; its log lines are in a file.
+
+    Args:
+        kubeconfig: with whose rights it runs.
+        log: where its lines go.
+        options: more of the command line.
+        dies_after: it kills itself, with SIGKILL, as soon as so many writes were answered.
+    """
+
+    def __init__(self, kubeconfig: Path, log: Path, *options: str, dies_after: int | None = None) -> None:
+        self._log = log
+        with log.open("ab") as stderr:
+            self.process = subprocess.Popen(
+                [
+                    sys.executable,
+                    str(PROGRAM),
+                    str(dies_after or 0),
+                    "operator",
+                    f"--kubeconfig={kubeconfig}",
+                    "--metrics-address=127.0.0.1:0",
+                    *options,
+                ],
+                stderr=stderr,
+                stdin=subprocess.DEVNULL,
+            )
+
+    def lines(self) -> list[dict[str, Any]]:
+        """Return its log lines."""
+        return [json.loads(line) for line in self._log.read_text().splitlines()]
+
+    def said(self, event: str) -> list[dict[str, Any]]:
+        """Return its log lines with a message."""
+        return [line for line in self.lines() if line["event"] == event]
+
+    def ask(self, path: str) -> str:
+        """Return what it answers on its own port."""
+        [started] = eventually(lambda: self.said("started"))
+        with urllib.request.urlopen(f"http://{started['address']}{path}", timeout=END_S) as answer:
+            return answer.read().decode()
+
+    def wait(self, deadline_s: float = END_S) -> int:
+        """Return its exit code once it has ended."""
+        return self.process.wait(deadline_s)
+
+    def stop(self) -> int:
+        """End it as Kubernetes does, and return its exit code."""
+        self.process.send_signal(signal.SIGTERM)
+        return self.wait()
+
+    def kill(self) -> None:
+        """End it as a power failure does."""
+        self.process.kill()
+        self.process.wait(END_S)

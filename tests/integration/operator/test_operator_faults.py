@@ -1,0 +1,153 @@
+"""An operator may be killed at any write, be there twice, or be replaced: the end is the same."""
+
+import json
+import threading
+import time
+
+import pytest
+
+from palaestra.cluster.resources import JOBS, LEASES, PODS
+from palaestra.manifests import NAME, NAMESPACE
+from palaestra_sim.protocol.status import Termination
+from tests.integration.operator.cluster import eventually
+
+DONE = Termination(step=20, reason="Completed", success_rate=0.9)
+WRITES = 7  # of one replica that succeeds: accepted, policy, worlds, claim, Job, running, succeeded
+END_S = 2.0
+LEASE_S = 15.0
+
+
+def creations(control_plane, namespace):
+    """Return how many objects of each kind were created in a namespace, by whomever."""
+    counts = {}
+    for line in control_plane.audit_log.read_text().splitlines():
+        event = json.loads(line)
+        target = event.get("objectRef", {})
+        made = event["verb"] == "create" and event.get("responseStatus", {}).get("code") == 201
+        if made and target.get("namespace") == namespace and "subresource" not in target:
+            counts[target["resource"]] = counts.get(target["resource"], 0) + 1
+    return counts
+
+
+@pytest.mark.parametrize("write", range(1, WRITES + 1))
+def test_killed_after_any_write_it_ends_the_same(write, place, start, control_plane):
+    """Compared are what was created, by the API server's own record, and the end."""
+    mortal = start(dies_after=write)
+    successor = threading.Thread(target=lambda: (mortal.wait(60), start()))
+    successor.start()
+    place.train()
+
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+    place.end(pod, word=DONE)
+    place.until("Succeeded")
+    successor.join(60)
+
+    assert mortal.process.returncode == -9
+    made = creations(control_plane, place.name)
+    assert {kind: made.get(kind) for kind in ("jobs", "pods", "networkpolicies")} == {
+        "jobs": 1,
+        "pods": 1,
+        "networkpolicies": None,  # applied, which is a patch
+    }
+    assert sorted(each.split("/")[0] for each in place.children()) == [
+        "ConfigMap",
+        "Job",
+        "NetworkPolicy",
+        "PersistentVolumeClaim",
+    ]
+
+
+def test_two_operators_at_once_make_no_second_pod(place, start, control_plane):
+    """Safety comes from names, not from locks: both believe that they lead."""
+    start()
+    start()
+    for i in range(3):
+        place.train(f"job-{i}x", replicas=2)
+
+    for i in range(3):
+        for pod in place.pods(f"job-{i}x", count=2):
+            place.run(pod)
+    for i in range(3):
+        place.until("Running", f"job-{i}x")
+
+    made = creations(control_plane, place.name)
+    assert (made["jobs"], made["pods"], made["persistentvolumeclaims"]) == (6, 6, 6)
+
+
+def test_a_dead_leader_is_followed(place, start):
+    """Nobody gives the Lease back: it runs out."""
+    first = start(elect=True)
+    eventually(lambda: first.said("leads"))
+    second = start(elect=True)
+    eventually(lambda: second.said("started"))
+
+    first.kill()
+    place.train()
+
+    assert place.pods(deadline_s=3 * LEASE_S)
+    assert second.said("leads")
+
+
+def test_it_ends_within_two_seconds_of_sigterm_and_gives_the_lease_back(place, start):
+    """A node that is drained does not wait for the operator, nor does its successor."""
+    operator = start(elect=True)
+    place.train()
+    place.pods()
+
+    began = time.monotonic()
+    code = operator.stop()
+
+    assert code == 0
+    assert time.monotonic() - began < END_S
+    assert not place.api.get(LEASES, NAMESPACE, NAME)["spec"].get("holderIdentity")
+
+
+def test_an_upgrade_touches_nothing_of_a_running_job(place, start):
+    """Images are fixed when a job is accepted; a new release is for new jobs."""
+    old = start("--trainer-image=trainer:1")
+    place.train()
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+    before, job = place.children(), place.get(JOBS, "job-0")
+    old.stop()
+
+    new = start("--trainer-image=trainer:2")
+    place.train("later")
+    [later] = place.pods("later")
+
+    assert place.children() == before
+    assert place.get(JOBS, "job-0")["metadata"]["generation"] == job["metadata"]["generation"]
+    assert [each["metadata"]["uid"] for each in place.all(PODS, "job")] == [pod["metadata"]["uid"]]
+    assert later["spec"]["containers"][0]["image"] == "trainer:2"
+    assert new.process.poll() is None
+
+
+def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, start):
+    """`kubectl delete job` of a running replica is a restart, not an upgrade."""
+    start("--trainer-image=trainer:1")
+    place.train()
+    place.pods()
+    start("--trainer-image=trainer:2")
+    before = place.get(JOBS, "job-0")["metadata"]["uid"]
+
+    place.api.delete(JOBS, place.name, "job-0")
+    eventually(
+        lambda: (place.get(JOBS, "job-0") or {"metadata": {"uid": before}})["metadata"]["uid"] != before
+    )
+
+    [container] = place.get(JOBS, "job-0")["spec"]["template"]["spec"]["containers"]
+    assert container["image"] == "trainer:1"
+
+
+def test_a_job_that_cannot_be_read_delays_no_other(place, start):
+    """One mistake that an API server lets through is told, and everything else goes on."""
+    start("--workers=1")
+    place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
+    place.train("right")
+
+    assert place.pods("right")
+    assert place.until("Failed", "wrong")
+    assert place.condition("Accepted", "wrong")["reason"] == "InvalidSpec"

@@ -1,0 +1,141 @@
+"""A TrainingJob from apply to its end, at a real API server, with a kubelet that is played."""
+
+from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, TRAINING_JOBS
+from palaestra_sim.protocol.status import Termination
+from tests.integration.operator.cluster import eventually, stranger, world_map, world_of
+
+DONE = Termination(step=20, reason="Completed", success_rate=0.9)
+
+
+def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
+    """What `kubectl apply` and `kubectl get tj -w` show."""
+    start()
+    place.train(replicas=2)
+
+    pods = place.pods(count=2)
+    kinds = sorted(each.split("/")[0] for each in place.children())
+    assert kinds == ["ConfigMap"] * 2 + ["Job"] * 2 + ["NetworkPolicy"] + ["PersistentVolumeClaim"] * 2
+    for pod in pods:
+        place.run(pod)
+    eventually(lambda: place.status().get("running") == "2/2")
+    for pod in pods:
+        place.end(pod, word=DONE)
+
+    status = place.until("Succeeded")
+    assert place.condition("Succeeded")["status"] == "True"
+    assert status["successRate"] == 0.9
+    assert status["step"] == 20
+    assert {"Accepted", "Succeeded"} <= place.events()
+
+
+def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(place, start):
+    """`kubectl delete job` of something finished tidies up; it does not start hours of work."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.run(pod)
+    place.end(pod, word=DONE)
+    place.until("Succeeded")
+
+    place.api.delete(JOBS, place.name, "job-0", propagation="Foreground")
+    eventually(lambda: place.get(JOBS, "job-0") is None)
+    place.train("later")
+    place.pods("later")
+
+    assert place.get(JOBS, "job-0") is None
+
+
+def test_a_deleted_job_leaves_its_claim_and_nothing_else(place, start):
+    """The run outlives the job; owner references take the rest, no finalizer of ours is needed."""
+    start()
+    made = place.train()
+    place.pods()
+
+    place.api.delete(TRAINING_JOBS, place.name, "job")
+    eventually(lambda: list(map(claim_or_other, place.children())) == ["claim"])
+
+    assert "finalizers" not in made["metadata"]
+    assert place.get(TRAINING_JOBS, "job") is None
+
+
+def claim_or_other(name):
+    """Return `claim` for the name of a claim."""
+    return "claim" if name.startswith("PersistentVolumeClaim/") else name
+
+
+def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
+    """`kubectl patch tj job --type=merge -p '{"spec":{"suspend":true}}'`."""
+    start()
+    place.train()
+    place.pods()
+    before = place.children()
+
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": True}})
+    place.until("Suspended")
+    assert place.get(JOBS, "job-0")["spec"]["suspend"] is True
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": False}})
+
+    place.pods()
+    assert place.children() == before
+
+
+def test_a_job_of_another_controller_is_left_alone(place, start):
+    """`managedBy` says whose it is."""
+    start()
+    place.train("theirs", managedBy="example.com/other")
+    place.train("ours")
+    place.pods("ours")
+
+    assert place.children("theirs") == {}
+    assert place.status("theirs") == {}
+
+
+def test_a_world_that_is_missing_is_told_and_the_job_starts_when_it_is_there(place, start):
+    """Order of `kubectl apply` does not matter."""
+    start()
+    place.train(**world_of("world"))
+    eventually(lambda: place.condition("Accepted").get("reason") == "WorldMissing")
+    assert place.all(JOBS, "job") == []
+
+    place.create(CONFIG_MAPS, world_map())
+
+    assert place.pods()
+
+
+def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
+    """Writing a TrainingJob must not open what its author could not open before."""
+    start()
+    world = world_map()
+    del world["metadata"]["labels"]
+    place.create(CONFIG_MAPS, world)
+
+    place.train(**world_of("world"))
+
+    eventually(lambda: place.condition("Accepted").get("reason") == "ConfigMapNotForJobs")
+    assert place.all(JOBS, "job") == []
+
+
+def test_a_name_that_is_taken_is_told_and_the_job_starts_when_it_is_free(place, start):
+    """A Job of somebody else is neither used nor touched."""
+    start()
+    place.create(JOBS, stranger("job-0"))
+
+    place.train()
+    eventually(lambda: "NameTaken" in str(place.status()))
+    assert place.get(JOBS, "job-0")["metadata"].get("ownerReferences") is None
+    place.api.delete(JOBS, place.name, "job-0")
+
+    assert place.pods()
+
+
+def test_ttl_deletes_the_job_and_keeps_the_run(place, start):
+    """`ttlSecondsAfterFinished` is about the object; the claim is somebody's result."""
+    start()
+    place.train(ttlSecondsAfterFinished=1)
+    [pod] = place.pods()
+    place.run(pod)
+    place.end(pod, word=DONE)
+
+    eventually(lambda: place.get(TRAINING_JOBS, "job") is None)
+
+    assert len(place.all(CLAIMS, "job")) == 1

@@ -1,0 +1,163 @@
+"""What others refuse, what is not there, and what a job may not open; each is told with its reason."""
+
+import pytest
+
+from palaestra.cluster import Resource
+from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINING_JOBS
+from palaestra.manifests import NAME, NAMESPACE, SECRETS_ROLE
+from tests.integration.operator.cluster import eventually
+
+QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
+BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")
+TOKEN = {"name": "TOKEN", "secretKeyRef": {"name": "token", "key": "token"}}
+
+
+def quota(**hard):
+    """Return a quota that is spent from the start."""
+    limits = {name.replace("_", "."): "0" for name in hard}
+    return {
+        "apiVersion": "v1",
+        "kind": "ResourceQuota",
+        "metadata": {"name": "none-left"},
+        "spec": {"hard": limits},
+    }
+
+
+def limited(place, obj):
+    """Create a quota, and wait until the API server goes by it."""
+    place.create(QUOTAS, obj)
+    eventually(lambda: place.get(QUOTAS, "none-left").get("status", {}).get("hard"))
+
+
+def test_pods_that_are_refused_are_told_in_the_words_of_the_api_server(place, start):
+    """Only the Job's events tell; nobody thinks of looking there."""
+    limited(place, quota(pods=True))
+    start()
+
+    place.train()
+
+    eventually(lambda: place.status().get("replicas", [{}])[0].get("reason") == "PodsRefused")
+    assert "exceeded quota: none-left" in place.status()["replicas"][0]["message"]
+
+
+def test_a_claim_that_is_refused_is_told_and_made_when_there_is_room(place, start):
+    """A quota on volumes is spent sooner than one on pods."""
+    limited(place, quota(persistentvolumeclaims=True))
+    start()
+    place.train()
+    eventually(lambda: "PodsRefused" in place.events())
+    assert place.all(JOBS, "job") == []
+    assert "Planned" not in {each["reason"] for each in place.about() if "Job" in each["message"]}
+
+    place.api.delete(QUOTAS, place.name, "none-left")
+
+    assert place.pods(deadline_s=60)
+
+
+def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed):
+    """RBAC knows no labels, so a person binds the role where jobs may use Secrets."""
+    start()
+    secret = {"metadata": {"name": "token", "labels": {"palaestra.dev/for-jobs": "true"}}}
+    place.create(SECRETS, {"apiVersion": "v1", "kind": "Secret", "stringData": {"token": "x"}, **secret})
+    place.train(trainer={"env": [TOKEN]})
+    eventually(lambda: place.condition("Accepted").get("reason") == "SecretNotForJobs")
+
+    installed.create(
+        BINDINGS,
+        {
+            "apiVersion": BINDINGS.api_version,
+            "kind": BINDINGS.kind,
+            "metadata": {"name": SECRETS_ROLE, "namespace": place.name},
+            "roleRef": {"apiGroup": "rbac.authorization.k8s.io", "kind": "ClusterRole", "name": SECRETS_ROLE},
+            "subjects": [{"kind": "ServiceAccount", "name": NAME, "namespace": NAMESPACE}],
+        },
+    )
+
+    [pod] = place.pods(deadline_s=60)
+    assert "valueFrom" in str(pod["spec"]["containers"][0]["env"])
+
+
+def test_the_content_of_a_secret_is_never_asked_for(place, start, control_plane):
+    """What is not read cannot leak: the API server is asked for metadata."""
+    del control_plane
+    start()
+    place.train(trainer={"env": [TOKEN]})
+
+    eventually(lambda: place.condition("Accepted").get("reason") in {"SecretMissing", "SecretNotForJobs"})
+    assert place.all(JOBS, "job") == []
+
+
+def test_a_queue_without_kueue_is_told(place, start):
+    """Otherwise the job would be Suspended for ever, and nobody would know why."""
+    start()
+
+    place.train(scheduling={"queueName": "robots"})
+
+    eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")
+    assert place.all(JOBS, "job") == []
+
+
+@pytest.fixture
+def kueue(installed):
+    """A cluster that has heard of Kueue; the test plays it."""
+    kinds = {
+        "kind": "LocalQueue",
+        "listKind": "LocalQueueList",
+        "plural": "localqueues",
+        "singular": "localqueue",
+    }
+    schema = {"openAPIV3Schema": {"type": "object", "x-kubernetes-preserve-unknown-fields": True}}
+    definition = {
+        "apiVersion": "apiextensions.k8s.io/v1",
+        "kind": "CustomResourceDefinition",
+        "metadata": {"name": "localqueues.kueue.x-k8s.io"},
+        "spec": {
+            "group": "kueue.x-k8s.io",
+            "names": kinds,
+            "scope": "Namespaced",
+            "versions": [{"name": "v1beta1", "served": True, "storage": True, "schema": schema}],
+        },
+    }
+    # A name of a group that belongs to Kubernetes' own projects needs their approval.
+    approval = {"api-approved.kubernetes.io": "unapproved, plays Kueue in a test"}
+    definition["metadata"]["annotations"] = approval
+    installed.create(DEFINITIONS, definition)
+    eventually(lambda: installed.serves("kueue.x-k8s.io"))
+    yield
+    installed.delete(DEFINITIONS, None, "localqueues.kueue.x-k8s.io")
+    eventually(lambda: not installed.serves("kueue.x-k8s.io"))
+
+
+@pytest.mark.usefixtures("kueue")
+def test_what_kueue_does_to_a_job_is_never_undone(place, start):
+    """Suspension, and the nodes of the quota that it was admitted to, are Kueue's alone."""
+    operator = start()
+    place.train(scheduling={"queueName": "robots"})
+    eventually(lambda: place.get(JOBS, "job-0"))
+    place.until("Suspended")
+    assert place.get(JOBS, "job-0")["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] == "robots"
+
+    nodes = {"template": {"spec": {"nodeSelector": {"flavour": "large"}}}}
+    place.api.merge(JOBS, place.name, "job-0", {"spec": {"suspend": False, **nodes}})
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+    place.api.merge(JOBS, place.name, "job-0", {"spec": {"suspend": True}})
+    place.until("Suspended")
+
+    assert place.get(JOBS, "job-0")["spec"]["suspend"] is True
+    assert place.get(JOBS, "job-0")["spec"]["template"]["spec"]["nodeSelector"] == {"flavour": "large"}
+    assert operator.said("suspended") == operator.said("resumed") == []
+
+
+@pytest.mark.parametrize("field", ["seed", "replicas"])
+def test_the_api_server_refuses_to_change_a_running_job(field, place, start):
+    """A run is prolonged by a new job, not by editing this one."""
+    start()
+    place.train()
+    [pod] = place.pods()
+
+    with pytest.raises(Exception, match=field):
+        place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {field: 7}})
+
+    assert [each["metadata"]["uid"] for each in place.all(PODS, "job")] == [pod["metadata"]["uid"]]

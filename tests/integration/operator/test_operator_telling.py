@@ -1,0 +1,111 @@
+"""What the operator tells: progress from the trainers, metrics, and how little it asks for."""
+
+import http.server
+import json
+import threading
+from datetime import UTC, datetime
+
+import pytest
+
+from palaestra.manifests import NAME, NAMESPACE
+from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
+from tests.integration.operator.cluster import eventually
+
+USER = f"system:serviceaccount:{NAMESPACE}:{NAME}"
+ADDRESS = "127.90.90.1"  # loopback, and nobody else's
+WRITTEN_S = 60.0  # asked for every 10 s, written every 30 s
+STATUS = TrainerStatus(
+    step=1200,
+    target=5000,
+    episodes=7,
+    phase="collecting",
+    success_rate=0.25,
+    steps_per_second=31.5,
+    simulators=(SimulatorStatus(name="collect-0", role="Collect", state="ready", restarts=2),),
+    last_checkpoint=CheckpointStatus(step=1000, time="2026-01-31T12:00:00Z"),
+)
+
+
+@pytest.fixture
+def trainer():
+    """A trainer that answers /status at the address of a pod."""
+
+    class Answer(http.server.BaseHTTPRequestHandler):
+        def do_GET(self):
+            at = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+            body = json.dumps(STATUS.to_json() | {"last_progress": at}).encode()
+            self.send_response(200)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_):
+            pass
+
+    with http.server.ThreadingHTTPServer((ADDRESS, 9090), Answer) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield ADDRESS
+        server.shutdown()
+        thread.join()
+
+
+def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):
+    """`kubectl get tj` shows Step and Success while it runs."""
+    start()
+    place.train()
+    [pod] = place.pods()
+
+    place.run(pod, trainer)
+    replica = eventually(
+        lambda: next((each for each in place.status()["replicas"] if each.get("step")), None),
+        WRITTEN_S,
+    )
+
+    assert (replica["step"], replica["target"], replica["successRate"]) == (1200, 5000, 0.25)
+    assert replica["simulators"][0]["restarts"] == 2
+    assert replica["lastCheckpoint"]["step"] == 1000
+    assert place.status()["step"] == 1200
+
+
+def test_the_metrics_count_jobs_by_phase(place, start):
+    """No job's name among the labels."""
+    operator = start()
+    place.train()
+    place.pods()
+
+    metrics = operator.ask("/metrics")
+
+    assert 'palaestra_jobs{phase="Pending"} 1.0' in metrics
+    assert 'palaestra_operator_requests_total{code="200",resource="jobs",verb="create"} 1.0' in metrics
+    assert operator.ask("/readyz") == "ok\n"
+    assert operator.ask("/healthz") == "ok\n"
+
+
+def test_log_lines_are_constant_messages_with_fields(place, start):
+    """`grep applied`, and a log store can count by kind."""
+    operator = start()
+    place.train()
+    place.pods()
+
+    kinds = [each["kind"] for each in operator.said("applied")]
+    assert kinds == ["NetworkPolicy", "ConfigMap", "PersistentVolumeClaim", "Job"]
+    assert operator.said("applied")[0]["job"] == [place.name, "job"]
+
+
+def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_plane):
+    """install.yaml's roles are enough; that they are no more is compared in the unit tests."""
+    operator = start()
+    place.train()
+    place.pods()
+    operator.stop()
+
+    asked = [
+        event
+        for line in control_plane.audit_log.read_text().splitlines()
+        if (event := json.loads(line))["user"]["username"] == USER
+        and event.get("objectRef", {}).get("namespace") == place.name
+    ]
+    assert asked
+    refused = [each for each in asked if each.get("responseStatus", {}).get("code") == 403]
+    assert not refused

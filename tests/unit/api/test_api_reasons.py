@@ -1,0 +1,62 @@
+"""Every reason has its sentences, in one file and in one table."""
+
+import re
+import string
+
+import pytest
+
+from palaestra.api.reason_table import page, table
+from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason, say
+
+
+def test_every_reason_has_a_row() -> None:
+    """What it means and what to do."""
+    assert set(ROWS) == set(Reason)
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_a_reason_is_one_word_for_programs(reason) -> None:
+    """As Kubernetes asks of the reasons of conditions."""
+    assert re.fullmatch("[A-Z][A-Za-z]{2,39}", reason)
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_a_message_is_filled_in_and_stays_within_its_bounds(reason) -> None:
+    """However long the facts are that others tell."""
+    fields = {name for _, name, _, _ in string.Formatter().parse(ROWS[reason].message) if name}
+
+    message = say(reason, **{name: f"\n{name}\x00 {'x' * 5000}" for name in fields})
+
+    assert message.isprintable()
+    assert len(message) <= LONGEST_MESSAGE
+
+
+def test_a_message_that_lacks_a_fact_is_a_mistake_of_ours() -> None:
+    """It would tell people about braces."""
+    with pytest.raises(KeyError):
+        say(Reason.IMAGE_PULL)
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_a_row_is_one_line_of_a_table(reason) -> None:
+    """A bar or a line break would tear it."""
+    row = ROWS[reason]
+
+    assert row.meaning
+    assert row.remedy
+    assert not set("|\n") & set(row.meaning + row.remedy)
+
+
+def test_operations_has_a_row_for_each_reason(repository) -> None:
+    """Whoever reads a reason in a status finds there what to do."""
+    text = (repository / "docs" / "operations.md").read_text()
+
+    assert table() in text
+    assert page(text) == text
+    assert all(f"| {reason} |" in text for reason in Reason)
+
+
+def test_a_page_without_its_marks_is_told_so() -> None:
+    """Nobody would miss a table that is silently not made."""
+    with pytest.raises(ValueError, match=r"no <!-- generated from the reasons.*; put both in"):
+        page("# Operations")

@@ -1,0 +1,261 @@
+"""A scene: one TrainingJob, what an API server holds of it, and a clock that only tests move.
+
+`scene.step()` is one pass of the loop. What is decided is carried out on the scene's own objects, as an
+API server would; what Kubernetes does by itself (pods, ends of Jobs) a test says with the scene's verbs.
+"""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import ReplicaStatus, Status
+from palaestra.decide import Create, Decision, Delete, accept, as_data, decide, prepare
+from palaestra.observe import Objects, Polled, observe, references
+from palaestra.plan import ClusterLayout, Images
+from palaestra_sim.protocol.status import SimulatorStatus, Termination, TrainerStatus
+
+# How long an example takes says how busy the machine is, not whether a claim holds.
+settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("unhurried")
+
+UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
+START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
+LISTS = {
+    "Job": "jobs",
+    "ConfigMap": "config_maps",
+    "PersistentVolumeClaim": "claims",
+    "NetworkPolicy": "policies",
+}
+
+
+class Scene:
+    """One TrainingJob `job` in an API server's memory."""
+
+    def __init__(self, **spec: Any) -> None:
+        self.raw: dict[str, Any] = {
+            "apiVersion": "palaestra.dev/v1alpha1",
+            "kind": "TrainingJob",
+            "metadata": {"name": "job", "namespace": "default", "uid": UID, "generation": 1},
+            "spec": spec,
+        }
+        self.now = START
+        self.layout = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
+        self.objects: dict[str, list[dict[str, Any]]] = {
+            name: [] for name in (*LISTS.values(), "pods", "events")
+        }
+        self.polled: dict[str, Polled] = {}
+        self.there: dict[tuple[str, str], dict[str, Any]] = {}
+        self.kueue = False
+        self.deleted = False
+        self.pods_made = 0
+
+    @property
+    def status(self) -> Status:
+        """The status that was written last."""
+        return accept(self.raw).status
+
+    def replica(self, index: int = 0) -> ReplicaStatus:
+        """Return what the status says of a replica."""
+        return self.status.replicas[index]
+
+    def job(self, index: int = 0) -> dict[str, Any]:
+        """Return the Job of a replica."""
+        return next(each for each in self.objects["jobs"] if each["metadata"]["name"] == f"job-{index}")
+
+    def decide(self) -> Decision:
+        """Return the decision as things are; nothing is changed."""
+        job = accept(deepcopy(self.raw))
+        sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
+        objects = Objects(**deepcopy(self.objects), polled=self.polled, sources=sources, kueue=self.kueue)
+        observed = observe(job, objects)
+        return decide(job, observed, prepare(job, observed, self.layout), self.now)
+
+    def step(self, seconds: float = 0) -> Decision:
+        """Let time pass, decide once and carry it out."""
+        self.pass_(seconds)
+        decision = self.decide()
+        for action in decision.actions:
+            self._do(action)
+        self.raw["status"] = as_data(decision.status)
+        return decision
+
+    def settle(self, seconds: float = 0) -> Decision:
+        """Let time pass and decide until nothing is left to do; return all of it as one decision."""
+        all_ = self.step(seconds)
+        for _ in range(10):
+            before = deepcopy(self.raw["status"])
+            again = self.step()
+            if not again.actions and self.raw["status"] == before:
+                return all_
+            all_ = replace(again, actions=all_.actions + again.actions, events=all_.events + again.events)
+        raise AssertionError("decides differently each time")
+
+    def pass_(self, seconds: float) -> None:
+        """Let time pass."""
+        self.now += timedelta(seconds=seconds)
+
+    def stamp(self, seconds: float = 0) -> str:
+        """Return a moment, by default now, as an API server writes it."""
+        return (self.now + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+    def new_pod(self, index: int = 0, uid: str | None = None) -> dict[str, Any]:
+        """Make the next pod of a replica, which a node has taken."""
+        number, self.pods_made = self.pods_made, self.pods_made + 1
+        template = deepcopy(self.job(index)["spec"]["template"])
+        pod = {
+            "kind": "Pod",
+            "metadata": {
+                **template["metadata"],
+                "name": f"job-{index}-{number}",
+                "uid": uid or f"pod-{number}",
+                "creationTimestamp": self.stamp(),
+            },
+            "spec": {**template["spec"], "nodeName": "node-1"},
+            "status": {"phase": "Pending", "startTime": self.stamp()},
+        }
+        self.objects["pods"].append(pod)
+        return pod
+
+    def running_pod(self, index: int = 0) -> dict[str, Any]:
+        """Make the next pod of a replica, of which every container runs."""
+        pod = self.new_pod(index)
+        pod["status"] |= {"phase": "Running", "initContainerStatuses": [], "containerStatuses": []}
+        for container in pod["spec"]["initContainers"]:
+            self.container(pod, container["name"], running=True)
+        self.container(pod, "trainer", running=True)
+        return pod
+
+    def container(self, pod: dict[str, Any], name: str, **state: Any) -> None:
+        """Set the state of a container: running, waiting="Reason: words", code, reason, message, restarts."""
+        field = "containerStatuses" if name == "trainer" else "initContainerStatuses"
+        entry: dict[str, Any] = {"name": name, "restartCount": state.get("restarts", 0), "state": {}}
+        ended = {
+            "exitCode": state.get("code", 1),
+            "reason": state.get("reason", "Error"),
+            "message": state.get("message", ""),
+            "finishedAt": self.stamp(),
+        }
+        if state.get("running"):
+            entry |= {"started": True, "state": {"running": {"startedAt": self.stamp()}}}
+        elif "waiting" in state:
+            reason, _, words = state["waiting"].partition(": ")
+            entry["state"] = {"waiting": {"reason": reason, "message": words}}
+        else:
+            entry["state"] = {"terminated": ended}
+        if "code" in state and entry["state"].keys() != {"terminated"}:
+            entry["lastState"] = {"terminated": ended}
+        others = [each for each in pod["status"].get(field, ()) if each["name"] != name]
+        pod["status"][field] = [*others, entry]
+
+    def end(self, pod: dict[str, Any], code: int, message: str = "", **state: Any) -> None:
+        """End a pod by the exit of its trainer."""
+        self.container(pod, "trainer", code=code, message=message, **state)
+        pod["status"]["phase"] = "Failed" if code else "Succeeded"
+
+    def take(self, pod: dict[str, Any], words: str = "preempted") -> None:
+        """Let the cluster take a pod: its trainer was interrupted."""
+        self.end(pod, 75)
+        pod["status"]["conditions"] = [
+            {"type": "DisruptionTarget", "status": "True", "reason": "Preempted", "message": words}
+        ]
+
+    def end_job(self, kind: str, index: int = 0, reason: str = "", message: str = "") -> None:
+        """Let the Job of a replica end: kind is Complete or Failed."""
+        self.job(index).setdefault("status", {})["conditions"] = [
+            {"type": kind, "status": "True", "reason": reason, "message": message,
+             "lastTransitionTime": self.stamp()}
+        ]  # fmt: skip
+
+    def count_failures(self, number: int, index: int = 0) -> None:
+        """Let the Job of a replica book failures."""
+        self.job(index).setdefault("status", {})["failed"] = number
+
+    def poll(self, pod: dict[str, Any], **status: Any) -> None:
+        """Let the trainer of a pod answer, now."""
+        told = {"step": 0, "target": 100, "episodes": 0, "phase": "training", "attempt": 1} | status
+        self.polled[pod["metadata"]["uid"]] = Polled(status=TrainerStatus(**told), at=self.now)
+
+    def _do(self, action: Any) -> None:
+        if isinstance(action, Create):
+            created = deepcopy(dict(action.object))
+            created["metadata"]["uid"] = f"uid-{created['metadata']['name']}"
+            assert created not in self.objects[LISTS[created["kind"]]]
+            self.objects[LISTS[created["kind"]]].append(created)
+        elif isinstance(action, Delete):
+            self.deleted = True
+        else:
+            _merge(
+                next(it for it in self.objects["jobs"] if it["metadata"]["name"] == action.job), action.patch
+            )
+
+
+def _merge(target: dict[str, Any], patch: dict[str, Any]) -> None:
+    for key, value in patch.items():
+        if isinstance(value, dict):
+            _merge(target.setdefault(key, {}), value)
+        else:
+            target[key] = value
+
+
+@pytest.fixture(scope="session")
+def make_scene() -> Callable[..., Scene]:
+    """`make_scene(replicas=2)`: a job that nobody has looked at; keywords are fields of its spec."""
+    return Scene
+
+
+@pytest.fixture(scope="session")
+def accepted() -> Callable[..., Scene]:
+    """`accepted(replicas=2)`: a job whose objects were created; it has no pod yet."""
+
+    def make(**spec: Any) -> Scene:
+        scene = Scene(**spec)
+        scene.settle()
+        return scene
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def training() -> Callable[..., tuple[Scene, dict[str, Any]]]:
+    """`training()`: a job that trains in its first pod, and that pod."""
+
+    def make(**spec: Any) -> tuple[Scene, dict[str, Any]]:
+        scene = Scene(**spec)
+        scene.settle()
+        pod = scene.running_pod()
+        scene.settle()
+        return scene, pod
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def last_word() -> Callable[..., str]:
+    """`last_word(step=5)`: a termination message."""
+
+    def write(**word: Any) -> str:
+        return Termination(**({"step": 0, "reason": "Unexpected: it"} | word)).to_message()
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def simulator() -> Callable[..., SimulatorStatus]:
+    """`simulator(state="failed")`: what a trainer says of collect-0."""
+
+    def make(**told: Any) -> SimulatorStatus:
+        return SimulatorStatus(**({"name": "collect-0", "role": "Collect", "state": "ready"} | told))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def reasons() -> Callable[[Decision], list[Reason]]:
+    """`reasons(decision)`: of its events."""
+    return lambda decision: [each.reason for each in decision.events]

@@ -1,0 +1,225 @@
+"""Attempts and restarts: exact, whatever was seen of what happened, and never falling."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.decide import Stop
+
+
+def restarts(scene):
+    """Return attempt, and restarts by trainer, disruption and suspension."""
+    replica = scene.replica()
+    counts = replica.restarts
+    return replica.attempt, counts.trainer, counts.disruption, counts.suspension
+
+
+def test_a_failure_is_a_restart_once_another_pod_is_there(training, last_word):
+    """The last failure of all is none."""
+    scene, pod = training()
+    scene.end(pod, 70, last_word())
+    scene.count_failures(1)
+    scene.settle(5)
+    before = restarts(scene)
+
+    scene.pass_(5)
+    scene.running_pod()
+    scene.settle(5)
+
+    assert (before, restarts(scene)) == ((1, 0, 0, 0), (2, 1, 0, 0))
+
+
+def test_a_pod_that_was_taken_is_a_disruption(training):
+    """It does not count against backoffLimit."""
+    scene, pod = training()
+    scene.take(pod)
+    scene.pass_(5)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 1, 0)
+
+
+def test_a_pod_that_somebody_deleted_is_a_disruption_too(training):
+    """It is gone without a trace, and another is there."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.pass_(5)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 1, 0)
+
+
+def test_a_failed_pod_that_somebody_tidied_away_is_still_a_failure(training):
+    """The Job has booked it."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.count_failures(1)
+    scene.pass_(5)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 1, 0, 0)
+
+
+def test_a_job_that_is_seen_late_is_not_needed(training, last_word):
+    """The pods tell themselves; the two come by two watches."""
+    scene, pod = training()
+    scene.end(pod, 70, last_word())
+    scene.pass_(15)
+    scene.running_pod()
+    scene.settle()
+    assert restarts(scene) == (2, 1, 0, 0)
+
+    scene.count_failures(1)
+    scene.settle()
+
+    assert restarts(scene) == (2, 1, 0, 0)
+
+
+def test_a_pod_that_is_seen_late_is_not_needed_either(training):
+    """The Job's count waits for the pod that replaces."""
+    scene, pod = training()
+    scene.count_failures(1)
+    scene.settle()
+    assert restarts(scene) == (1, 0, 0, 0)
+
+    scene.end(pod, 70)
+    scene.settle()
+    scene.pass_(15)
+    scene.running_pod()
+    scene.settle()
+
+    assert restarts(scene) == (2, 1, 0, 0)
+
+
+def test_what_happened_while_nobody_looked_is_counted(training, last_word):
+    """The failed pods stay; the run directory's record tells of those that do not."""
+    scene, pod = training()
+    scene.end(pod, 70, last_word())
+    scene.count_failures(1)
+    scene.pass_(30)
+    scene.take(scene.running_pod())
+    scene.pass_(30)
+    newest = scene.running_pod()
+    scene.poll(newest, attempt=5)
+
+    scene.settle()
+
+    assert restarts(scene) == (5, 1, 3, 0)
+
+
+def test_a_record_that_cannot_be_true_is_not_believed(training):
+    """A pod may write what it likes."""
+    scene, pod = training()
+    scene.poll(pod, attempt=2**53)
+
+    scene.settle()
+
+    assert scene.replica().attempt == 1
+
+
+def test_restarts_of_simulators_add_up_over_attempts(training, last_word, simulator):
+    """A trainer counts within its attempt; its last word has what the last poll had not."""
+    scene, pod = training()
+    scene.poll(pod, simulators=(simulator(restarts=2), simulator(name="evaluate-0", restarts=1)))
+    scene.settle()
+    assert scene.replica().restarts.simulator == 3
+
+    scene.polled.clear()
+    scene.end(pod, 75, last_word(restarts=4))
+    scene.settle(5)
+    assert scene.replica().restarts.simulator == 4
+
+    newest = scene.running_pod()
+    scene.settle(5)
+    scene.poll(newest, attempt=2, simulators=(simulator(restarts=1),))
+    scene.settle()
+
+    assert scene.replica().restarts.simulator == 5
+    assert scene.replica().simulator_restarts == 1
+
+
+def test_the_last_words_of_pods_that_nobody_saw_run_are_added(training, last_word, simulator):
+    """They lie in the pods that failed."""
+    scene, pod = training()
+    scene.poll(pod, simulators=(simulator(restarts=1),))
+    scene.settle()
+    scene.end(pod, 70, last_word(restarts=2))
+    scene.pass_(15)
+    scene.end(scene.running_pod(), 70, last_word(restarts=3))
+    scene.pass_(15)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert scene.replica().restarts.simulator == 5
+
+
+def test_a_new_attempt_does_not_show_step_0(training, last_word):
+    """Until it has looked into its run directory it knows no better; the status does."""
+    scene, pod = training()
+    scene.end(pod, 75, last_word(step=50, attempt=1))
+    scene.settle(5)
+    newest = scene.running_pod()
+    scene.poll(newest, step=0, phase="starting", attempt=None)
+    scene.settle(5)
+    assert scene.replica().step == 50
+
+    scene.poll(newest, step=40, phase="starting", attempt=2)
+    scene.settle()
+
+    assert (scene.replica().step, scene.replica().furthest_step) == (40, 50)
+
+
+ENDS = ("failure", "taken", "deleted", "suspended")
+
+
+@given(st.lists(st.tuples(st.sampled_from(ENDS), st.booleans()), max_size=6))
+def test_the_counts_are_those_of_what_happened(accepted, lives):
+    """Each pod of a replica ends somehow, and an operator looks after some of them only.
+
+    What is deleted while nobody looks leaves its trace in the run directory's record.
+    """
+    scene = accepted(backoffLimit=100)
+    truth = dict.fromkeys(ENDS, 0)
+    failures = 0
+    for number, (end, looks) in enumerate(lives):
+        pod = scene.running_pod()
+        scene.poll(pod, attempt=number + 1, step=number + 1)
+        if looks or end == "suspended":
+            scene.settle(5)
+        failures += _end(scene, pod, end, failures)
+        truth[end] += 1
+        scene.pass_(15)
+        if looks:
+            scene.settle()
+        scene.pass_(1)
+    scene.poll(scene.running_pod(), attempt=len(lives) + 1, step=len(lives) + 1)
+
+    decision = scene.settle(1)
+
+    assert not [each for each in decision.actions if isinstance(each, Stop)]
+    counts = restarts(scene)
+    assert counts == (len(lives) + 1, truth["failure"], truth["taken"] + truth["deleted"], truth["suspended"])
+
+
+def _end(scene, pod, end, failures):
+    """Let a pod end; return how many failures the Job books for it."""
+    if end == "failure":
+        scene.end(pod, 70)
+        scene.count_failures(failures + 1)
+        return 1
+    if end == "taken":
+        scene.take(pod)
+        return 0
+    scene.objects["pods"].remove(pod)
+    if end == "suspended":
+        scene.pass_(5)
+        status = scene.job().setdefault("status", {})
+        resumed = {"type": "Suspended", "status": "False", "lastTransitionTime": scene.stamp()}
+        status["conditions"] = [resumed]
+    return 0

@@ -1,0 +1,168 @@
+"""How a replica ended, by the exit code of its trainer, its last word, and the Job's own words."""
+
+import pytest
+
+from palaestra.api.status import Phase
+
+
+@pytest.mark.parametrize(
+    ("code", "reason", "begin"),
+    [
+        (2, "ConfigurationRefused", "the trainer refuses its configuration (exit code 2): Why: because"),
+        (80, "FaultBudgetSpent", "the simulators broke too often (exit code 80): Why: because"),
+        (81, "Diverged", "the learner diverged (exit code 81): Why: because"),
+    ],
+)
+def test_an_exit_code_that_forbids_another_try_is_the_reason(training, last_word, code, reason, begin):
+    """With the trainer's last word."""
+    scene, pod = training()
+    scene.end(pod, code, last_word(step=40, reason="Why: because"))
+    scene.end_job("Failed", 0, "PodFailurePolicy", "Container trainer ... matching FailJob rule")
+
+    scene.settle()
+
+    assert (scene.status.phase, scene.replica().reason) == (Phase.FAILED, reason)
+    assert scene.replica().message == begin
+    assert scene.replica().step == 40
+    assert scene.replica().restarts.trainer == 0
+
+
+def test_the_exit_code_is_read_from_the_jobs_words_when_the_pod_is_gone(training):
+    """Somebody may have tidied up."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    words = (
+        "Container trainer for pod default/job-0-x failed with exit code 81 matching FailJob rule at index 2"
+    )
+    scene.end_job("Failed", 0, "PodFailurePolicy", words)
+
+    scene.settle()
+
+    assert scene.replica().reason == "Diverged"
+
+
+def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
+    """A limit of n is n + 1 pods, attempts 1 to n + 1."""
+    scene = accepted(backoffLimit=2)
+    attempts = []
+    for number in (1, 2, 3):
+        pod = scene.running_pod()
+        scene.settle(15)
+        attempts.append(scene.replica().attempt)
+        scene.end(pod, 70, last_word(reason=f"Unexpected: error {number}"))
+        scene.count_failures(number)
+        scene.settle(15)
+    scene.end_job("Failed", 0, "BackoffLimitExceeded", "Job has reached the specified backoff limit")
+    scene.settle()
+
+    assert attempts == [1, 2, 3]
+    assert scene.replica().reason == "BackoffLimitSpent"
+    assert scene.replica().message == (
+        "3 pods failed, as many as backoffLimit allows; the last: exit code 70, Unexpected: error 3"
+    )
+    assert scene.replica().restarts.trainer == 2
+
+
+@pytest.mark.parametrize(
+    ("failures", "words"), [(1, "memory; raise"), (4, "memory in the last of 4 pods; raise")]
+)
+def test_a_trainer_that_was_killed_for_its_memory_is_told_so(training, failures, words):
+    """Exit code 137 alone says nothing to anybody."""
+    scene, pod = training()
+    scene.end(pod, 137, reason="OOMKilled")
+    scene.count_failures(failures)
+    scene.end_job("Failed", 0, "BackoffLimitExceeded")
+
+    scene.settle()
+
+    assert scene.replica().reason == "TrainerOutOfMemory"
+    assert words in scene.replica().message
+
+
+@pytest.mark.parametrize("word", [True, False])
+def test_a_trainer_that_stalled_each_time_is_told_so(training, last_word, word):
+    """Its watchdog ends it with 82."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    scene.end(pod, 82, last_word(reason="Stalled: collect-0 hangs") if word else "")
+    scene.end_job("Failed", 0, "BackoffLimitExceeded")
+
+    scene.settle()
+
+    what = "Stalled: collect-0 hangs" if word else "no environment step for 60 s"
+    assert scene.replica().message == f"{what}; read the stacks in the trainer's log"
+
+
+def test_an_eviction_for_storage_is_told_in_the_kubelets_words(training):
+    """The pod's own status has them."""
+    scene, pod = training()
+    words = "Usage of EmptyDir volume exceeds the limit; ephemeral-storage"
+    pod["status"] |= {"phase": "Failed", "reason": "Evicted", "message": words}
+    scene.end_job("Failed", 0, "BackoffLimitExceeded")
+
+    scene.settle()
+
+    assert scene.replica().reason == "EphemeralStorage"
+    assert words in scene.replica().message
+
+
+def test_whoever_else_ended_the_job_is_quoted(training):
+    """As a person who has set a deadline on the Job."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.end_job("Failed", 0, "DeadlineExceeded", "Job was active longer than specified deadline")
+
+    scene.settle()
+
+    assert scene.replica().message == (
+        "the Job failed: DeadlineExceeded: Job was active longer than specified deadline"
+    )
+
+
+def test_a_job_fails_when_that_is_certain(training, last_word):
+    """FailureTarget comes before Failed, which waits for pods that a lost node never ends."""
+    scene, pod = training()
+    scene.end(pod, 2, last_word())
+    scene.end_job("FailureTarget", 0, "PodFailurePolicy")
+
+    scene.settle()
+
+    assert scene.status.phase is Phase.FAILED
+
+
+def test_why_it_was_stopped_comes_before_what_followed(training, last_word):
+    """The pod of a stopped Job is interrupted, and its Job exceeds a deadline of one second."""
+    scene, pod = training(activeDeadlineSeconds=60)
+    scene.step(60)
+    scene.end(pod, 75, last_word(reason="Interrupted: SIGTERM received"))
+    scene.end_job("Failed", 0, "DeadlineExceeded")
+
+    scene.settle()
+
+    assert scene.replica().reason == "DeadlineExceeded"
+    assert scene.replica().message.startswith("the job was active for 60 s")
+
+
+def test_a_mark_that_nobody_knows_stops_all_the_same(training):
+    """A person may have written it, or a newer release."""
+    scene, _ = training()
+    scene.job()["metadata"]["annotations"] = {"palaestra.dev/stopped": "Weather: rain"}
+
+    scene.settle()
+
+    assert (scene.replica().phase, scene.replica().reason) == (Phase.FAILED, "JobFailed")
+    assert scene.replica().message == "rain"
+
+
+def test_what_the_trainer_said_last_stays_in_the_status(training, last_word, simulator):
+    """The final truth does not hang on polling; the rate of what has ended is none."""
+    scene, pod = training()
+    scene.poll(pod, step=50, target=100, mean_return=1.5, steps_per_second=20.0, simulators=(simulator(),))
+    scene.settle(1)
+    scene.end(pod, 0, last_word(step=100, success_rate=0.9))
+    scene.end_job("Complete")
+
+    scene.settle(1)
+
+    replica = scene.replica()
+    assert (replica.step, replica.target, replica.success_rate) == (100, 100, 0.9)
+    assert (replica.mean_return, replica.steps_per_second) == (1.5, None)

@@ -1,0 +1,156 @@
+"""The status as people read it: columns, conditions, events."""
+
+import pytest
+
+from palaestra.api.status import ConditionStatus, Phase
+from palaestra.decide import accept, prepare
+from palaestra.observe import Objects, observe
+from palaestra_sim.protocol.status import CheckpointStatus
+
+
+def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
+    """A job is as far as its last replica."""
+    scene = accepted(replicas=3)
+    for index, (step, rate) in enumerate([(30, 0.9), (20, 0.5)]):
+        scene.poll(scene.running_pod(index), step=step, success_rate=rate)
+
+    scene.settle()
+
+    assert (scene.status.running, scene.status.step, scene.status.success_rate) == ("2/3", 20, 0.5)
+
+
+def test_what_is_not_known_is_absent_and_never_zero(training):
+    """A rate of 0 would be believed."""
+    scene, _ = training()
+
+    status, replica = scene.status, scene.replica()
+    assert (status.step, status.success_rate, replica.step, replica.steps_per_second) == (None,) * 4
+
+
+def test_what_a_trainer_no_longer_answers_stays_but_for_its_speed(training):
+    """Unknown is unknown; the last known step is still the last known step."""
+    scene, pod = training()
+    scene.poll(pod, step=30, steps_per_second=20.0, mean_return=1.0)
+    scene.settle()
+    scene.polled.clear()
+
+    scene.settle()
+
+    assert (scene.replica().step, scene.replica().mean_return) == (30, 1.0)
+    assert scene.replica().steps_per_second is None
+
+
+def test_simulators_and_checkpoints_are_told(training, simulator):
+    """With their last faults, on one line."""
+    scene, pod = training()
+    scene.poll(pod, simulators=(simulator(state="failed", last_fault="collect-0:\ngone", restarts=2),))
+
+    scene.settle()
+
+    (told,) = scene.replica().simulators
+    assert (told.name, told.state, told.restarts, told.last_fault) == (
+        "collect-0", "failed", 2, "collect-0: gone",
+    )  # fmt: skip
+
+
+def test_a_checkpoint_is_told_with_its_step_and_its_time(training):
+    """As the trainer wrote it; a time that no calendar of ours has is none."""
+    scene, pod = training()
+    scene.poll(pod, last_checkpoint=CheckpointStatus(step=5, time="2026-01-31T11:59:00+01:00"))
+    scene.settle()
+    scene.poll(pod, last_checkpoint=CheckpointStatus(step=9, time="0001-01-01T00:00:00+23:59"))
+
+    scene.settle()
+
+    told = scene.replica().last_checkpoint
+    assert (told.step, told.time.isoformat()) == (5, "2026-01-31T10:59:00+00:00")
+
+
+def test_a_trainer_that_has_ended_leaves_its_replica_running_until_its_pod_has(training, last_word):
+    """Its simulators are still being stopped; nothing is retried, and nothing starts."""
+    scene, pod = training()
+    scene.container(pod, "trainer", code=0, message=last_word(step=100))
+
+    scene.settle()
+
+    assert scene.replica().phase is Phase.RUNNING
+    assert scene.replica().message == "attempt 1 has ended, its simulators are stopped"
+
+
+def test_a_condition_keeps_the_time_at_which_it_last_changed(training):
+    """A new message is no transition."""
+    scene, pod = training()
+    before = scene.status.conditions[1]
+    scene.poll(pod, step=1)
+    scene.settle(60)
+
+    assert scene.status.conditions[1].last_transition_time == before.last_transition_time
+    assert scene.status.conditions[1].status is ConditionStatus.TRUE
+
+
+def test_the_start_is_that_of_the_first_pod_and_stays(training):
+    """Also when that pod is long gone."""
+    scene, _ = training()
+    first = scene.status.start_time
+    scene.objects["pods"].clear()
+    scene.pass_(60)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert first is not None
+    assert scene.status.start_time == first
+
+
+def test_an_ephemeral_run_is_named_in_a_condition(accepted):
+    """It is a choice that somebody may have made by mistake."""
+    scene = accepted(storage={"ephemeral": True})
+
+    assert scene.status.conditions[0].message.endswith("; the run is ephemeral and goes with its pod")
+
+
+def test_each_action_and_each_change_is_one_event(make_scene):
+    """Creating the objects of a replica is one; nothing is told twice."""
+    scene = make_scene()
+
+    told = [(each.reason.value, each.replica) for each in scene.settle().events]
+
+    assert told == [("Accepted", None), ("Starting", 0), ("Planned", None), ("Planned", 0)]
+
+
+def test_suspending_and_resuming_are_told_once_each(training):
+    """By the action, not again by the status that follows."""
+    scene, _ = training()
+    scene.raw["spec"]["suspend"] = True
+    suspended = [each.reason.value for each in scene.settle().events]
+    scene.raw["spec"]["suspend"] = False
+    scene.objects["pods"].clear()
+
+    resumed = [each.reason.value for each in scene.settle().events]
+
+    assert suspended == ["Suspended"]
+    assert resumed == ["Resumed", "Starting"]
+
+
+@pytest.mark.parametrize("replicas", [1, 2])
+def test_a_job_whose_replicas_all_fail_alike_says_why(accepted, last_word, replicas):
+    """Not only that they failed."""
+    scene = accepted(replicas=replicas)
+    for index in range(replicas):
+        scene.end(scene.running_pod(index), 81, last_word(reason="Diverged: NaN"))
+        scene.end_job("Failed", index, "PodFailurePolicy")
+
+    scene.settle()
+
+    failed = scene.status.conditions[-1]
+    assert (scene.status.phase, failed.reason) == (Phase.FAILED, "Diverged")
+    assert "the learner diverged (exit code 81): Diverged: NaN" in failed.message
+
+
+def test_nothing_is_planned_where_nothing_is_missing(training):
+    """Two hundred jobs are looked at every ten seconds; their worlds are generated once."""
+    scene, _ = training()
+    job = accept(scene.raw)
+    prepared = prepare(job, observe(job, Objects(**scene.objects)), scene.layout)
+
+    assert (prepared.plan, prepared.hold) == (None, None)

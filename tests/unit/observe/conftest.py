@@ -1,0 +1,53 @@
+"""A job and the raw objects of its one replica, as an API server holds them."""
+
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+import pytest
+
+from palaestra.api import TrainingJob, validate
+from palaestra.observe import Objects, Observed, observe
+from palaestra.plan import ClusterLayout, Images, plan
+
+UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
+
+
+def _make_job(**spec: Any) -> TrainingJob:
+    return validate(
+        {
+            "apiVersion": "palaestra.dev/v1alpha1",
+            "kind": "TrainingJob",
+            "metadata": {"name": "job", "uid": UID},
+            "spec": spec,
+        }
+    )
+
+
+@pytest.fixture
+def make_job() -> Callable[..., TrainingJob]:
+    """Return a builder: keywords are fields of the spec, in camelCase."""
+    return _make_job
+
+
+@pytest.fixture
+def raw_job() -> dict[str, Any]:
+    """Return the batch/v1 Job of the replica."""
+    planned = plan(_make_job(), ClusterLayout(images=Images.of_release("1")))
+    job = deepcopy(dict(planned.replicas[0].job))
+    job["metadata"]["uid"] = "job-uid"
+    return job
+
+
+@pytest.fixture
+def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
+    """Return a pod of it that nobody has started."""
+    template = deepcopy(raw_job["spec"]["template"])
+    named = {"name": "job-0-x", "uid": "pod-1", "creationTimestamp": "2026-01-31T12:00:00Z"}
+    return {"kind": "Pod", **template, "metadata": {**template["metadata"], **named}, "status": {}}
+
+
+@pytest.fixture
+def look() -> Callable[..., Observed]:
+    """`look(pods=[...])`: what is observed of the job."""
+    return lambda **objects: observe(_make_job(), Objects(**objects))

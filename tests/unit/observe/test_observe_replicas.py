@@ -1,0 +1,159 @@
+"""What belongs to a replica, and what is only called so."""
+
+from copy import deepcopy
+from datetime import UTC, datetime
+
+import pytest
+
+from palaestra.observe import JobEnd, Objects, Polled, observe, trimmed
+from palaestra_sim.protocol.status import TrainerStatus
+
+NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
+
+
+def test_every_replica_of_the_spec_is_there(make_job):
+    """Also one of which nothing is."""
+    seen = observe(make_job(replicas=3), Objects())
+
+    assert [each.index for each in seen.replicas] == [0, 1, 2]
+    assert all(each.job is None and each.pod is None for each in seen.replicas)
+
+
+def test_a_job_is_ours_by_the_uid_of_its_owner(look, raw_job):
+    """Names are used again; uids are not."""
+    other = deepcopy(raw_job)
+    other["metadata"]["ownerReferences"][0]["uid"] = "another"
+
+    ours, theirs = look(jobs=[raw_job]).replicas[0], look(jobs=[other]).replicas[0]
+
+    assert (ours.job.name, ours.obstacle) == ("job-0", None)
+    assert (theirs.job, theirs.obstacle.name, theirs.obstacle.deleting) == (None, "job-0", False)
+
+
+def test_pods_of_a_job_of_the_same_name_are_not_ours(look, raw_pod):
+    """The TrainingJob before this one was called the same; its pods may still be ending."""
+    raw_pod["metadata"]["labels"]["palaestra.dev/job-uid"] = "another"
+
+    assert look(pods=[raw_pod]).replicas[0].pod is None
+
+
+def test_the_newest_pod_is_the_last(look, raw_pod):
+    """In a list of an API server's they come in any order."""
+    newer = deepcopy(raw_pod)
+    newer["metadata"] |= {"name": "a", "uid": "pod-2", "creationTimestamp": "2026-01-31T12:00:09Z"}
+
+    replica = look(pods=[newer, raw_pod]).replicas[0]
+
+    assert [each.uid for each in replica.pods] == ["pod-1", "pod-2"]
+    assert replica.pod.uid == "pod-2"
+
+
+def test_of_two_pods_of_one_second_the_one_that_goes_on_is_newer(look, raw_pod):
+    """One at a time: the other has ended before this one was made."""
+    ended = deepcopy(raw_pod)
+    ended["metadata"] |= {"name": "zzz", "uid": "pod-2"}
+    ended["status"] = {"phase": "Failed"}
+
+    assert look(pods=[raw_pod, ended]).replicas[0].pod.uid == "pod-1"
+
+
+def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
+    """And to nobody once that has ended: its last word says more."""
+    answer = Polled(status=TrainerStatus(step=1, target=2, episodes=0, phase="training"), at=NOW)
+    other = look(pods=[raw_pod], polled={"another": answer}).replicas[0]
+    alive = look(pods=[raw_pod], polled={"pod-1": answer}).replicas[0]
+    raw_pod["status"]["phase"] = "Succeeded"
+    ended = look(pods=[raw_pod], polled={"pod-1": answer}).replicas[0]
+
+    assert (other.polled, alive.polled, ended.polled) == (None, answer, None)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "end"),
+    [
+        ([], None),
+        ([{"type": "Failed", "status": "False"}], None),
+        ([{"type": "Complete", "status": "True"}], JobEnd.COMPLETE),
+        ([{"type": "SuccessCriteriaMet", "status": "True"}], JobEnd.COMPLETE),
+        ([{"type": "FailureTarget", "status": "True"}], JobEnd.FAILED),
+        ([{"type": "FailureTarget", "status": "True"}, {"type": "Failed", "status": "True"}], JobEnd.FAILED),
+    ],
+)
+def test_the_end_of_a_job_is_in_its_conditions(look, raw_job, conditions, end):
+    """What is certain is enough; a lost node keeps the last pod from ending."""
+    raw_job["status"] = {"conditions": conditions}
+
+    assert look(jobs=[raw_job]).replicas[0].job.end is end
+
+
+def test_failures_that_are_about_to_be_booked_count(look, raw_job):
+    """The Job controller books them in two steps."""
+    raw_job["status"] = {"failed": 2, "uncountedTerminatedPods": {"failed": ["uid-3"]}}
+
+    assert look(jobs=[raw_job]).replicas[0].job.failures == 3
+
+
+def test_the_last_refusal_of_a_pod_is_kept(look, raw_job):
+    """Of this Job, by its uid: the Job before it had the same name."""
+
+    def event(words, second, uid="job-uid"):
+        return {
+            "reason": "FailedCreate",
+            "message": words,
+            "involvedObject": {"uid": uid},
+            "lastTimestamp": f"2026-01-31T12:00:0{second}Z",
+        }
+
+    events = [event("first", 1), event("last", 3), event("of another", 5, "other")]
+
+    assert look(jobs=[raw_job], events=events).replicas[0].refused.message == "last"
+
+
+def test_an_event_in_series_is_as_late_as_its_last(look, raw_job):
+    """As the newer events API writes it."""
+    event = {
+        "reason": "FailedCreate",
+        "message": "quota",
+        "involvedObject": {"uid": "job-uid"},
+        "eventTime": "2026-01-31T12:00:00.123456Z",
+        "series": {"lastObservedTime": "2026-01-31T13:00:00.000000Z"},
+    }
+
+    assert look(jobs=[raw_job], events=[event]).replicas[0].refused.at.hour == 13
+
+
+def test_what_is_there_is_known_by_kind_and_name(make_job):
+    """A ConfigMap and a claim may have the same name."""
+    named = {"metadata": {"name": "x"}}
+
+    seen = observe(make_job(), Objects(claims=[named], policies=[named]))
+
+    assert seen.present == {("PersistentVolumeClaim", "x"), ("NetworkPolicy", "x")}
+
+
+def test_of_other_kinds_only_who_wrote_them_is_forgotten():
+    """Events are read field by field."""
+    event = {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x", "managedFields": [1]}}
+
+    assert trimmed(event) == {"kind": "Event", "reason": "FailedCreate", "metadata": {"name": "x"}}
+
+
+def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
+    """Trimming takes away what nobody reads, and that is most of it."""
+    raw_job |= {"status": {"failed": 1}}
+    raw_job["metadata"] |= {
+        "annotations": {"palaestra.dev/stopped": "Stalled: it", "other": "x"},
+        "managedFields": [{"manager": "palaestra-operator"}],
+    }
+    raw_pod["status"] = {
+        "phase": "Running",
+        "containerStatuses": [
+            {"name": "trainer", "state": {"running": {"startedAt": "2026-01-31T12:00:05Z"}}}
+        ],
+    }
+    config_map = {"kind": "ConfigMap", "metadata": {"name": "x"}, "data": {"training.yaml": "x" * 1000}}
+    whole = {"jobs": [raw_job], "pods": [raw_pod], "config_maps": [config_map]}
+    small = {name: [trimmed(each) for each in objects] for name, objects in whole.items()}
+
+    assert look(**small) == look(**whole)
+    assert len(str(small)) < len(str(whole)) / 2

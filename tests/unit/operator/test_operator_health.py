@@ -1,0 +1,98 @@
+"""The operator's own port: what kubelets and Prometheus read."""
+
+import socket
+import urllib.error
+import urllib.request
+from importlib.metadata import version
+
+import pytest
+
+from palaestra.errors import PalaestraError
+from palaestra.operator.health import HealthServer
+from palaestra.operator.metrics import Metrics
+from palaestra.operator.options import address
+
+WAIT_S = 10.0
+
+
+@pytest.fixture
+def told():
+    """What is wrong by now; empty: nothing."""
+    return []
+
+
+@pytest.fixture
+def ask(told):
+    """A function that returns status and text of a path."""
+    metrics = Metrics()
+    metrics.request("list", "pods", 200, 0.01)
+    metrics.watch(depth=lambda: 3, leads=lambda: True, phases=lambda: ["Running", "Running", "Failed"])
+    trouble = lambda: told[0] if told else None  # noqa: E731 - both questions get the same answer
+    server = HealthServer(("127.0.0.1", 0), healthy=trouble, ready=trouble, metrics=metrics.text)
+
+    def get(path):
+        try:
+            with urllib.request.urlopen(f"http://{server.shown}{path}", timeout=WAIT_S) as answer:
+                return answer.status, answer.read().decode()
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code, error.read().decode()
+
+    yield get
+    server.shutdown()
+    server.server_close()
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/readyz"])
+def test_a_probe_fails_with_the_reason(path, ask, told):
+    """`kubectl describe pod` shows what is wrong."""
+    assert ask(path) == (200, "ok\n")
+
+    told.append("not read yet: pods")
+
+    assert ask(path) == (503, "not read yet: pods\n")
+
+
+def test_nothing_else_is_served(ask):
+    """No index, no file, no profile."""
+    assert ask("/../etc/passwd")[0] == 404
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'palaestra_operator_requests_total{code="200",resource="pods",verb="list"} 1.0',
+        "palaestra_operator_queue_depth 3.0",
+        "palaestra_operator_leader 1.0",
+        'palaestra_jobs{phase="Running"} 2.0',
+        'palaestra_jobs{phase="Succeeded"} 0.0',
+        'palaestra_operator_build_info{version="VERSION"} 1.0',
+    ],
+)
+def test_what_the_operator_counts(line, ask):
+    """Labels are bounded: no job's name is among them."""
+    line = line.replace("VERSION", version("palaestra"))
+
+    assert line in ask("/metrics")[1].splitlines()
+
+
+def test_an_address_that_is_taken_is_told_with_the_option():
+    """Two operators on one machine."""
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        where = taken.getsockname()[:2]
+
+        with pytest.raises(PalaestraError, match=r"--metrics-address: .*: Address already in use; choose"):
+            HealthServer(where, healthy=str, ready=str, metrics=bytes)
+
+
+@pytest.mark.parametrize("text", ["8080", ":8080", "localhost:", "localhost:http", "localhost:65536"])
+def test_what_is_no_address_is_refused(text):
+    """With what one looks like."""
+    with pytest.raises(PalaestraError, match=r"write it as 0\.0\.0\.0:8080"):
+        address(text)
+
+
+def test_an_address_may_be_of_either_kind():
+    """IPv6 has brackets."""
+    assert address("[::1]:8080") == ("::1", 8080)
+    assert address("0.0.0.0:0") == ("0.0.0.0", 0)

@@ -1,0 +1,112 @@
+"""Workers: what happens to a key whose reconciling goes wrong, and to the others."""
+
+import threading
+
+import pytest
+from prometheus_client import CollectorRegistry, Histogram
+
+from palaestra.cluster import Conflict, WorkQueue
+from palaestra.cluster.backoff import Backoff
+from palaestra.operator.workers import Workers
+from palaestra.operator.writing import NotLeading
+
+WAIT_S = 10.0
+GOOD, BAD = ("robots", "good"), ("robots", "bad")
+
+
+class Desk:
+    """One worker over a queue whose retries come soon, and what it did."""
+
+    def __init__(self, reconcile):
+        self.queue = WorkQueue(again=Backoff(first_s=0.01, cap_s=0.01))
+        self.gate = threading.Event()
+        self.registry = CollectorRegistry()
+        seconds = Histogram("seconds", "Time", ["result"], registry=self.registry)
+        self.workers = Workers(self.queue, reconcile, gate=self.gate, seconds=seconds, count=1)
+        self.workers.start()
+
+    def counted(self, result):
+        """Return how often reconciling ended so."""
+        return self.registry.get_sample_value("seconds_count", {"result": result}) or 0
+
+
+@pytest.fixture
+def desk():
+    """A function that opens a desk; it is closed afterwards."""
+    desks = []
+
+    def begin(reconcile, *, opened=True):
+        desks.append(Desk(reconcile))
+        if opened:
+            desks[-1].gate.set()
+        return desks[-1]
+
+    yield begin
+    for each in desks:
+        each.workers.stop(WAIT_S)
+
+
+@pytest.mark.parametrize(
+    ("trouble", "result"),
+    [
+        (ValueError("a mistake of ours"), "error"),
+        (Conflict(409, "Conflict", "somebody else wrote"), "conflict"),
+        (NotLeading("the Lease has passed on"), "conflict"),
+    ],
+)
+def test_a_bad_key_delays_no_other(trouble, result, desk):
+    """With one worker only: it lives on, and takes the next."""
+    done = threading.Event()
+
+    def reconcile(key):
+        if key == BAD:
+            raise trouble
+        done.set()
+
+    at_work = desk(reconcile)
+    at_work.queue.add(BAD)
+    at_work.queue.add(GOOD)
+
+    assert done.wait(WAIT_S)
+    assert at_work.workers.trouble() is None
+    assert at_work.counted(result) >= 1
+
+
+def test_a_key_that_failed_is_tried_again(desk):
+    """Whatever it was may have passed."""
+    tries = threading.Semaphore(0)
+
+    def reconcile(key):
+        del key
+        tries.release()
+        raise ValueError
+
+    desk(reconcile).queue.add(BAD)
+
+    assert all(tries.acquire(timeout=WAIT_S) for _ in range(3))
+
+
+def test_a_key_is_looked_at_again_when_time_may_have_changed_something(desk):
+    """Deadlines pass without anybody writing anything."""
+    looks = threading.Semaphore(0)
+
+    def reconcile(key):
+        del key
+        looks.release()
+        return 0.01
+
+    desk(reconcile).queue.add(GOOD)
+
+    assert all(looks.acquire(timeout=WAIT_S) for _ in range(3))
+
+
+def test_nothing_is_begun_while_another_leads(desk):
+    """The key waits; it is not lost."""
+    done = threading.Event()
+    at_work = desk(lambda _: done.set(), opened=False)
+    at_work.queue.add(GOOD)
+    assert not done.is_set()
+
+    at_work.gate.set()
+
+    assert done.wait(WAIT_S)

@@ -1,0 +1,43 @@
+"""The merge patch of a status: what it changes, and what it leaves alone."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra.operator.writing import difference
+
+LEAVES = st.integers() | st.text(max_size=3) | st.lists(st.integers(), max_size=2)
+OBJECTS = st.recursive(
+    st.dictionaries(st.sampled_from("abc"), LEAVES, max_size=3),
+    lambda inner: st.dictionaries(st.sampled_from("abc"), LEAVES | inner, max_size=3),
+    max_leaves=8,
+)
+
+
+def merged(target, patch):
+    """Return what an API server makes of a merge patch (RFC 7386)."""
+    if not isinstance(patch, dict):
+        return patch
+    result = dict(target) if isinstance(target, dict) else {}
+    for key, value in patch.items():
+        if value is None:
+            result.pop(key, None)
+        else:
+            result[key] = merged(result.get(key), value)
+    return result
+
+
+@given(OBJECTS, OBJECTS)
+def test_a_patch_makes_the_old_status_into_the_new(old, new):
+    """Also what is gone: a merge patch that leaves a field out would keep it for ever."""
+    assert merged(old, difference(old, new)) == new
+
+
+@given(OBJECTS)
+def test_a_status_that_did_not_change_needs_no_patch(status):
+    """An empty patch is no write."""
+    assert difference(status, status) == {}
+
+
+def test_a_job_without_a_status_gets_all_of_it():
+    """The API server shows none before the first write."""
+    assert difference(None, {"phase": "Pending"}) == {"phase": "Pending"}

@@ -1,0 +1,98 @@
+"""Who may talk to the pods of a job."""
+
+import pytest
+
+from palaestra.plan import ClusterLayout, Images, LocalLayout, PlanError, plan
+
+IMAGES = Images.of_release("1")
+
+
+def policy(planned):
+    """Return the spec of the NetworkPolicy."""
+    return planned.network_policy["spec"]
+
+
+def test_a_laptop_needs_no_policy(make_job):
+    """Everything is on loopback there, and no pod has a network of its own."""
+    planned = plan(make_job(), LocalLayout(images=IMAGES, job_directory="/runs/job"))
+
+    assert planned.network_policy is None
+
+
+def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
+    """One policy for all replicas, by the label that their pods carry."""
+    planned = in_cluster(replicas=2)
+    selected = policy(planned)["podSelector"]["matchLabels"]
+
+    templates = [each.job["spec"]["template"]["metadata"]["labels"] for each in planned.replicas]
+    assert selected == {"palaestra.dev/job": "job"}
+    assert all(selected.items() <= labels.items() for labels in templates)
+
+
+def test_metrics_status_and_live_views_are_open_to_the_operator_and_to_monitoring(make_job):
+    """To pods of the operator, not to all of its namespace; ROS and the control ports to nobody."""
+    layout = ClusterLayout(images=IMAGES, operator_namespace="ops", monitoring_namespace="eyes")
+    (rule,) = plan(make_job(), layout).network_policy["spec"]["ingress"]
+
+    assert rule["from"] == [
+        {
+            "namespaceSelector": {"matchLabels": {"kubernetes.io/metadata.name": "ops"}},
+            "podSelector": {"matchLabels": {"palaestra.dev/operator": "true"}},
+        },
+        {"namespaceSelector": {"matchLabels": {"kubernetes.io/metadata.name": "eyes"}}},
+    ]
+    assert rule["ports"] == [
+        {"protocol": "TCP", "port": 9090},
+        {"protocol": "TCP", "port": 7200, "endPort": 7299},
+    ]
+
+
+def test_every_port_that_is_opened_is_one_that_a_container_declares(in_cluster):
+    """A policy for other ports than the pods' would look like one that works."""
+    roles = {"collect": "Collect", "evaluate": "Evaluate"}
+    planned = in_cluster(simulators=[{"name": name, "role": roles[name], "count": 16} for name in roles])
+    spec = planned.replicas[0].job["spec"]["template"]["spec"]
+    declared = {
+        port["containerPort"]
+        for container in (*spec["initContainers"], *spec["containers"])
+        for port in container.get("ports", ())
+    }
+
+    opened = [
+        range(port["port"], port.get("endPort", port["port"]) + 1)
+        for port in policy(planned)["ingress"][0]["ports"]
+    ]
+
+    assert declared
+    assert all(any(port in ports for ports in opened) for port in declared)
+
+
+@pytest.mark.parametrize(
+    ("network", "types", "egress"),
+    [({}, ["Ingress"], None), ({"egress": "Closed"}, ["Ingress", "Egress"], [])],
+)
+def test_egress_is_free_unless_the_job_closes_it(in_cluster, network, types, egress):
+    """No rule at all means nothing at all, once the policy is about egress."""
+    spec = policy(in_cluster(network=network))
+
+    assert spec["policyTypes"] == types
+    assert spec.get("egress") == egress
+
+
+def test_a_job_that_is_made_again_has_a_policy_of_its_own(make_job):
+    """The old one is collected with the old job, whenever that happens."""
+    layout = ClusterLayout(images=IMAGES)
+    names = {
+        plan(make_job(uid=uid), layout).network_policy["metadata"]["name"] for uid in ("aaaa-1", "bbbb-1")
+    }
+
+    assert names == {"job-aaaa-1", "job-bbbb-1"}
+
+
+def test_a_job_without_a_uid_has_no_policy(make_job):
+    """It would be owned by no object."""
+    job = make_job()
+    nobody = job.model_copy(update={"metadata": job.metadata.model_copy(update={"uid": None})})
+
+    with pytest.raises(PlanError, match=r"^metadata.uid: "):
+        plan(nobody, ClusterLayout(images=IMAGES))
