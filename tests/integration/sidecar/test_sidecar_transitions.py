@@ -33,6 +33,17 @@ def test_a_life_that_goes_well(sidecar, waits) -> None:
     assert (ended.pid, ended.starts, ended.faults) == (None, 1, 0)
 
 
+def test_a_simulator_is_told_which_start_it_is(sidecar) -> None:
+    """One that fails by chance must not fail at the same step again and again."""
+    it = sidecar("import os; print('start', os.environ['PALAESTRA_SIMULATOR_START'])")
+
+    it.request("/start")
+    it.until(FAILED)
+    it.request("/start")
+
+    it.until_said("start 2")
+
+
 def test_a_start_is_answered_before_the_simulator_is_there(sidecar, waits) -> None:
     """The trainer starts several at once and has a deadline for each."""
     state = sidecar(waits).request("/start")

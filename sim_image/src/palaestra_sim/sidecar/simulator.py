@@ -138,9 +138,14 @@ class Simulator:
     def _spawn(self, _: _Message) -> None:
         self.state = replace(self.state, starts=self.state.starts + 1)
         try:
-            self._process = Process.start(self._command, self._report)
+            self._process = Process.start(self._numbered(), self._report)
         except OSError as error:
             self._report(Ended(problem=f"it could not be run: {error.strerror}"))
+
+    def _numbered(self) -> Command:
+        """Return the command, told which start this is: a stub that fails by chance draws anew each time."""
+        environment = {**self._command.environment, "PALAESTRA_SIMULATOR_START": str(self.state.starts)}
+        return replace(self._command, environment=environment)
 
     def _wait(self, message: _Message) -> None:
         self._end_within(message.deadline_s)

@@ -7,11 +7,13 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 from palaestra_sim.errors import SimError
+from palaestra_sim.stub import faults
 from palaestra_sim.stub.options import StubOptions
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.simulation import Mode
@@ -27,8 +29,12 @@ _NO_MASTER = 1
 _EPILOG = """\
 Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes nothing.
 
+faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/simulators.md has them all.
+PALAESTRA_STUB_FAULTS takes them with blanks between, PALAESTRA_STUB_FAULT_SEED what --fault-seed does,
+PALAESTRA_SIMULATOR_START what --fault-life does.
+
 exit codes: 0 after SIGTERM; what `simulation_quit` says; 1 the ROS master does not answer, or not any more;
-2 the world or the options cannot be used
+2 the world or the options cannot be used; what a fault says
 """
 
 
@@ -52,8 +58,11 @@ class _Process:
     """The loop, the nodes in it, and the simulator between them."""
 
     def __init__(self, options: argparse.Namespace) -> None:
+        self._ordered = faults.read_options(options, os.environ)
+        self._course = None if self._ordered is None else faults.begin(self._ordered, options.world)
         self._loop = Loop()
         self._master_uri = os.environ.get("ROS_MASTER_URI", "http://localhost:11311")
+        self._new_node = self._node_maker()
         self._nodes: dict[str, RosNode] = {}
         self._exit_code = 0
         self._simulator = Simulator(
@@ -66,23 +75,64 @@ class _Process:
             ),
             mode=_MODES[options.mode],
         )
-        self._simulator.on_quit(self._end)
+        self._simulator.on_quit(self.end)
 
     def run(self) -> int:
         """Serve until the end; return the exit code."""
         self._loop.wake_on_signals()
         for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, lambda *_: self._loop.post(lambda: self._end(0)))
-        self._simulator.start()
-        log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
-        self._loop.later(_CHECK_MASTER_S, self._check_master)
+            signal.signal(number, lambda *_: self._loop.post(lambda: self.end(0)))
+        if self._course is None:
+            self._start()
+        else:
+            self._start_as_ordered(self._course)
         self._loop.run()
         self._simulator.close()
         self._loop.close()
         return self._exit_code
 
+    def end(self, status: int) -> None:
+        """Let `run` return that exit code, once everything is closed in good order."""
+        self._exit_code = status
+        self._loop.stop()
+
+    def lose_master(self) -> None:
+        """End as if the ROS master did not answer any more."""
+        log.warning("no ROS master at %s: a fault", self._master_uri)
+        for node in self._nodes.values():
+            if isinstance(node, faults.FaultyNode):
+                node.lose_master()
+        self.end(_NO_MASTER)
+
+    def lose_names(self) -> None:
+        """Let the master forget every name, and go on."""
+        for name in self._simulator.controllers:
+            self._nodes[name].unregister()
+
+    def _start(self) -> None:
+        self._simulator.start()
+        log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
+        self._loop.later(_CHECK_MASTER_S, self._check_master)
+
+    def _start_as_ordered(self, course: faults.Course) -> None:
+        """Start with the faults of a course: late, or not at all."""
+        log.info("faults: %s", self._ordered)
+        refused, delay_s = course.start()
+        if refused is None:
+            self._loop.later(delay_s, self._start)
+        else:
+            log.error("fault: %s", refused.text)
+            self._loop.later(0.0, lambda: self.end(refused.code))
+
+    def _node_maker(self) -> Callable[[str], RosNode]:
+        """Return what makes the node of a name: a plain one, unless faults are ordered."""
+        if self._course is None:
+            return partial(RosNode, self._loop, master_uri=self._master_uri)
+        failing = faults.Failing(course=self._course, effects=faults.Effects(self))
+        return partial(faults.FaultyNode, self._loop, master_uri=self._master_uri, failing=failing)
+
     def _make_node(self, name: str) -> RosNode:
-        node = RosNode(self._loop, name, self._master_uri)
+        node = self._new_node(name)
         node.on_end(lambda: self._lose(name))
         self._nodes[name] = node
         return node
@@ -94,10 +144,6 @@ class _Process:
         if controller is not None:
             controller.close()
 
-    def _end(self, status: int) -> None:
-        self._exit_code = status
-        self._loop.stop()
-
     def _check_master(self) -> None:
         """End when the master is gone: its names are lost, and a controller would end too."""
         for name in self._simulator.controllers:
@@ -105,7 +151,7 @@ class _Process:
                 self._nodes[name].check_master()
             except MasterUnreachable as error:
                 log.warning("%s", error)
-                self._end(_NO_MASTER)
+                self.end(_NO_MASTER)
                 return
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 
@@ -124,4 +170,5 @@ def _parser() -> argparse.ArgumentParser:
     add("--step-sleep-ms", type=float, default=0.0, help="real time that each step takes at least")
     add("--publish-delay-ms", type=float, default=0.0, help="from the end of a step to its messages")
     add("--lost-wakeup", action="store_true", help="lose the messages of a step that comes too early")
+    faults.add_options(add)
     return parser

@@ -11,9 +11,12 @@ from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber
 from palaestra_trainer.webots.services import Services
 
-# The reading is the last field of the message, so the header before it need not be decoded.
-_FLOAT32 = struct.Struct("<f")
+# What follows a message's std_msgs/Header, whose only part of varying length is `frame_id`.
+_RANGE = struct.Struct("<Bffff")  # sensor_msgs/Range: type, field of view, least, most, reading
+_BOOL = struct.Struct("<?")
 _FLOAT64 = struct.Struct("<d")
+_FRAME_LENGTH = struct.Struct("<I")
+_FRAME_AT = 12  # after sequence number and stamp
 
 # Webots replaces these in names of devices, and nothing else.
 _REPLACED = str.maketrans("-. ()", "_____")
@@ -116,15 +119,14 @@ class DistanceSensor(Sensor):
         super().__init__(robot, device, "sensor_msgs/Range", self._range)
 
     def _range(self, payload: memoryview) -> float:
-        (value,) = _FLOAT32.unpack_from(payload, len(payload) - _FLOAT32.size)
-        return _finite(value, self.device)
+        return _finite(_fields(_RANGE, payload)[-1], self.device)
 
 
 class TouchSensor(Sensor):
     """A bumper; `value` is True while something touches it."""
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/BoolStamped", _last_byte)
+        super().__init__(robot, device, "webots_ros/BoolStamped", _bool)
 
 
 class PositionSensor(Sensor):
@@ -134,8 +136,7 @@ class PositionSensor(Sensor):
         super().__init__(robot, device, "webots_ros/Float64Stamped", self._position)
 
     def _position(self, payload: memoryview) -> float:
-        (value,) = _FLOAT64.unpack_from(payload, len(payload) - _FLOAT64.size)
-        return _finite(value, self.device)
+        return _finite(_fields(_FLOAT64, payload)[0], self.device)
 
 
 class Motor:
@@ -171,11 +172,20 @@ class Motor:
         self._services.close()
 
 
-def _last_byte(payload: memoryview) -> bool:
-    return bool(payload[-1])
+def _fields(layout: struct.Struct, payload: memoryview) -> tuple[Any, ...]:
+    """Return what follows a message's header; its length has to be exact, or text becomes a reading."""
+    (frame_bytes,) = _FRAME_LENGTH.unpack_from(payload, _FRAME_AT)
+    begin = _FRAME_AT + _FRAME_LENGTH.size + frame_bytes
+    if len(payload) != begin + layout.size:
+        raise ValueError(f"a message of {len(payload)} bytes, not {begin + layout.size}")
+    return layout.unpack_from(payload, begin)
+
+
+def _bool(payload: memoryview) -> bool:
+    return bool(_fields(_BOOL, payload)[0])
 
 
 def _finite(value: float, device: str) -> float:
-    if math.isnan(value):
-        raise ValueError(f"NaN from {device}")
+    if not math.isfinite(value):
+        raise ValueError(f"{value} from {device}")
     return value

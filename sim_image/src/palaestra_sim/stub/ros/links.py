@@ -28,6 +28,27 @@ class Endpoint(Protocol):
         ...
 
 
+class Connection(Protocol):
+    """What an endpoint sends through: a link, or something before one."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing can be sent any more."""
+        ...
+
+    def send(self, data: bytes) -> None:
+        """Send all of `data`."""
+        ...
+
+    def send_newest(self, data: bytes) -> None:
+        """Send `data`, or keep the newest alone while the peer does not read."""
+        ...
+
+    def close(self) -> None:
+        """Close it; safe to repeat."""
+        ...
+
+
 class Refused(Exception):
     """The header names nothing that is served here; the text goes to the peer."""
 

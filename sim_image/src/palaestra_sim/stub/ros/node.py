@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from palaestra_sim.protocol.rostypes import ServiceType, message_type, service_type
 from palaestra_sim.protocol.tcpros import encode_header, frame
-from palaestra_sim.stub.ros.links import Endpoint, Link, Refused
+from palaestra_sim.stub.ros.links import Connection, Endpoint, Link, Refused
 from palaestra_sim.stub.ros.loop import Loop
 from palaestra_sim.stub.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name
 from palaestra_sim.stub.ros.topics import Publisher, Topic
@@ -48,8 +48,8 @@ class RosNode:
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, Topic] = {}
-        self._links: set[Link] = set()
-        self._waiting: deque[tuple[_ServiceEnd, bytes]] = deque()
+        self._links: set[Connection] = set()
+        self._waiting: deque[tuple[ServiceEnd, bytes]] = deque()
         host = host_name()
         self._listener = socket.create_server((bind_address(host), 0), backlog=_BACKLOG)
         self._listener.setblocking(False)
@@ -117,7 +117,7 @@ class RosNode:
             end, payload = self._waiting.popleft()
             end.handle(payload)
 
-    def request(self, end: _ServiceEnd, payload: bytes) -> None:
+    def request(self, end: ServiceEnd, payload: bytes) -> None:
         """Take a request: handled now, or after the step that blocks the controller."""
         if self.blocked():
             self._waiting.append((end, payload))
@@ -126,13 +126,17 @@ class RosNode:
 
     def close(self) -> None:
         """Unregister, as a controller that ends in good order does, and close every socket."""
+        self.unregister()
+        self.abandon()
+
+    def unregister(self) -> None:
+        """Let the master forget every service and topic; connections stay."""
         # A master that is gone has forgotten us already.
         with contextlib.suppress(MasterUnreachable):
             for name in self._services:
                 self._master.call("unregisterService", name, self._rosrpc)
             for name in self._topics:
                 self._master.call("unregisterPublisher", name, self._slave.uri)
-        self.abandon()
 
     def abandon(self) -> None:
         """Close every socket without a word to the master, as a controller that was killed."""
@@ -165,12 +169,12 @@ class RosNode:
             return  # the peer was gone before we looked
         self._links.add(Link(self._loop, connection, self._greet))
 
-    def _greet(self, link: Link, header: Mapping[str, str]) -> Endpoint:
+    def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         if "service" in header:
             return self._greet_client(link, header)
         return self._greet_subscriber(link, header)
 
-    def _greet_client(self, link: Link, header: Mapping[str, str]) -> Endpoint:
+    def _greet_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         known = self._services.get(header["service"])
         if known is None:
             raise Refused(f"no such service {header['service']}")
@@ -187,9 +191,9 @@ class RosNode:
                 }
             )
         )
-        return _ServiceEnd(self, link, service, handler, persistent=header.get("persistent") == "1")
+        return ServiceEnd(self, link, service, handler, persistent=header.get("persistent") == "1")
 
-    def _greet_subscriber(self, link: Link, header: Mapping[str, str]) -> Endpoint:
+    def _greet_subscriber(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         topic = self._topics.get(header.get("topic", ""))
         if topic is None:
             raise Refused(f"no such topic {header.get('topic')}")
@@ -208,7 +212,7 @@ class RosNode:
         )
         return topic.connect(link, self.dropped)
 
-    def dropped(self, link: Link) -> None:
+    def dropped(self, link: Connection) -> None:
         """Forget a connection that is closed."""
         self._links.discard(link)
 
@@ -224,16 +228,16 @@ class _Call:
 
     __slots__ = ("end", "type")
 
-    def __init__(self, end: _ServiceEnd, service: ServiceType) -> None:
+    def __init__(self, end: ServiceEnd, service: ServiceType) -> None:
         self.end = end
         self.type = service
 
 
-class _ServiceEnd:
+class ServiceEnd:
     """The server's end of one client's connection to one service."""
 
     def __init__(
-        self, node: RosNode, link: Link, service: ServiceType, handler: Handler, *, persistent: bool
+        self, node: RosNode, link: Connection, service: ServiceType, handler: Handler, *, persistent: bool
     ) -> None:
         self._node = node
         self._link = link
@@ -242,9 +246,11 @@ class _ServiceEnd:
         self._persistent = persistent
 
     def receive(self, payload: bytes) -> None:
+        """Take a request from the link."""
         self._node.request(self, payload)
 
     def handle(self, payload: bytes) -> None:
+        """Have a request handled, and answer it, or let the handler do so later."""
         self._node.current_call = _Call(self, self._service)
         try:
             fields = self._handler(self._service.request.decode(payload))
@@ -255,9 +261,11 @@ class _ServiceEnd:
             self.answer(self._service, fields)
 
     def answer(self, service: ServiceType, fields: dict[str, Any]) -> None:
+        """Answer the request that was handled last."""
         self._send(b"\1" + frame(service.response.encode(fields)))
 
     def lost(self) -> None:
+        """Let the node forget the connection."""
         self._node.dropped(self._link)
 
     def _send(self, data: bytes) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from palaestra_sim.protocol.rostypes import MessageType
 from palaestra_sim.protocol.tcpros import LENGTH, frame
-from palaestra_sim.stub.ros.links import Endpoint, Link
+from palaestra_sim.stub.ros.links import Connection, Endpoint
 
 _STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds
 _TRAILING_VALUES = {
@@ -31,11 +31,11 @@ class Topic:
         self.name = name
         self.type = type_
         self.latched = latched
-        self.links: list[Link] = []
+        self.links: list[Connection] = []
         self.publishers = 0
         self._last: bytes | None = None
 
-    def connect(self, link: Link, dropped: Callable[[Link], None]) -> Endpoint:
+    def connect(self, link: Connection, dropped: Callable[[Connection], None]) -> Endpoint:
         """Take a subscriber, with the last message if the topic is latched."""
         self.links.append(link)
         if self._last is not None:
@@ -53,7 +53,7 @@ class Topic:
 class _SubscriberEnd:
     """The publisher's end of one subscriber's connection, which only ever closes."""
 
-    def __init__(self, topic: Topic, link: Link, dropped: Callable[[Link], None]) -> None:
+    def __init__(self, topic: Topic, link: Connection, dropped: Callable[[Connection], None]) -> None:
         self._topic = topic
         self._link = link
         self._dropped = dropped

@@ -1,0 +1,100 @@
+"""What a fault does to the process: signals, memory, the end. Nothing here decides when."""
+
+from __future__ import annotations
+
+import logging
+import resource
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+from palaestra_sim.stub.faults.kinds import (
+    Crash,
+    Exit,
+    Fault,
+    Hang,
+    MasterLost,
+    MemoryGrowth,
+    NamesLost,
+)
+
+_MIB = 1024 * 1024
+
+log = logging.getLogger(__name__)
+
+
+class Endings(Protocol):
+    """What only the process as a whole can do to itself."""
+
+    def end(self, status: int) -> None:
+        """End in good order, with that exit code."""
+        ...
+
+    def lose_master(self) -> None:
+        """End as if the ROS master did not answer any more."""
+        ...
+
+    def lose_names(self) -> None:
+        """Let the master forget every name, and go on."""
+        ...
+
+
+class Effects:
+    """Does to this process what faults say.
+
+    Args:
+        endings: of the process.
+    """
+
+    def __init__(self, endings: Endings) -> None:
+        self._endings = endings
+        self._kept: list[bytes] = []
+        self._kept_mib = 0.0
+        self._effects: Mapping[type[Fault], Callable[[Any], bool]] = {
+            Crash: self._crash,
+            Exit: self._exit,
+            Hang: self._hang,
+            MasterLost: self._lose_master,
+            MemoryGrowth: self._grow,
+            NamesLost: self._lose_names,
+        }
+
+    def happen(self, faults: Sequence[Fault]) -> bool:
+        """Let the faults happen, in their order; say whether the stub goes on."""
+        for fault in faults:
+            if not isinstance(fault, MemoryGrowth):
+                log.warning("fault: %s", fault.text)
+            if not self._effects[type(fault)](fault):
+                return False
+        return True
+
+    def _crash(self, fault: Crash) -> bool:
+        # A core file would be left in a work folder that nobody looks into.
+        resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+        if fault.signal is not signal.SIGKILL:
+            signal.signal(fault.signal, signal.SIG_DFL)
+        signal.raise_signal(fault.signal)  # to this thread, so that nothing more is answered
+        return False
+
+    def _exit(self, fault: Exit) -> bool:
+        self._endings.end(fault.code)
+        return False
+
+    def _hang(self, _fault: Hang) -> bool:
+        signal.raise_signal(signal.SIGSTOP)
+        return True  # somebody sent SIGCONT
+
+    def _lose_master(self, _fault: MasterLost) -> bool:
+        self._endings.lose_master()
+        return False
+
+    def _lose_names(self, _fault: NamesLost) -> bool:
+        self._endings.lose_names()
+        return True
+
+    def _grow(self, fault: MemoryGrowth) -> bool:
+        if self._kept_mib + fault.mib <= fault.most_mib:
+            self._kept_mib += fault.mib
+            # Pages of zeros would be shared, and no memory taken.
+            self._kept.append(b"\1" * int(fault.mib * _MIB))
+        return True

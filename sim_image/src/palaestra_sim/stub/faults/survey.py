@@ -1,0 +1,150 @@
+"""Which services and topics a world has: its controllers start on nodes that only listen, without a socket.
+
+So a fault that names a path which nobody serves is refused before anything starts, instead of never
+happening.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fnmatch import filter as matching
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from palaestra_sim.stub.faults.course import Course
+from palaestra_sim.stub.faults.kinds import Fault
+from palaestra_sim.stub.faults.language import FaultError
+from palaestra_sim.stub.faults.options import Ordered
+from palaestra_sim.stub.faults.schedule import Life, Schedule
+from palaestra_sim.stub.seam import Fields, Handler
+from palaestra_sim.stub.simulator import Simulator
+
+_HASH = re.compile(r"_[0-9a-f]{6}$")  # how generated ROS names end; it differs from job to job
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Survey:
+    """What a world has.
+
+    Attributes:
+        simulator: the name of its first robot, without the part that differs from job to job.
+        services: paths below the robot's name.
+        topics: in the same way, those of sensors only once they are enabled.
+    """
+
+    simulator: str
+    services: frozenset[str]
+    topics: frozenset[str]
+
+
+def survey(world_path: Path) -> Survey:
+    """Return what the world in that file has.
+
+    Raises:
+        WorldError: the file is wrong, or holds something that the stub cannot simulate.
+        OSError: it cannot be read.
+    """
+    nodes: list[_Listener] = []
+
+    def make_node(name: str) -> _Listener:
+        nodes.append(_Listener(name))
+        return nodes[-1]
+
+    simulator = Simulator(world_path, make_node)
+    simulator.start()
+    for node in nodes:
+        node.enable_all(simulator.simulation.basic_step_ms)
+    return Survey(
+        simulator=_HASH.sub("", nodes[0].name) if nodes else "",
+        services=frozenset().union(*(it.services for it in nodes)),
+        topics=frozenset().union(*(it.topics for it in nodes)),
+    )
+
+
+def begin(ordered: Ordered, world_path: Path) -> Course:
+    """Return the course of a life in which the ordered faults happen to a stub of that world.
+
+    Raises:
+        FaultError: a fault is about something that the world does not have.
+        WorldError: the world is wrong.
+        OSError: it cannot be read.
+    """
+    found = survey(world_path)
+    check(ordered.faults, found)
+    life = Life(seed=ordered.seed, simulator=found.simulator, number=ordered.life)
+    return Course(Schedule(faults=ordered.faults, life=life))
+
+
+def check(faults: Iterable[Fault], found: Survey) -> None:
+    """Return if every fault is about something that is there.
+
+    Raises:
+        FaultError: the world has no such service or topic.
+    """
+    for fault in faults:
+        for what, path, known in (
+            ("service", fault.service, found.services),
+            ("topic", fault.topic, found.topics),
+        ):
+            if path and not matching(known, path):
+                near = difflib.get_close_matches(path, known, cutoff=0.4) or sorted(known)[:3]
+                fact = f"the world has no {what} {path}"
+                raise FaultError(f"fault {fault.text}: {fact}; name another, such as {', '.join(near)}")
+
+
+class _Silent:
+    """A publisher with nobody to send to."""
+
+    subscribers = 0
+
+    def send(self, fields: Fields) -> None:
+        """Send it to nobody."""
+
+    def send_value(self, value: float) -> None:
+        """Send it to nobody."""
+
+
+class _Listener:
+    """A node that notes what it is asked to serve."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.blocked: Callable[[], bool] = lambda: False
+        self.current_call: object | None = None
+        self.services: dict[str, Handler] = {}
+        self.topics: set[str] = set()
+
+    def enable_all(self, period_ms: int) -> None:
+        """Enable every sensor, since their topics are there only then."""
+        for path, handler in self.services.items():
+            if path.endswith("/enable"):
+                handler(SimpleNamespace(value=period_ms))
+
+    def serve(self, path: str, type_name: str, handler: Handler) -> None:
+        """Note a service."""
+        del type_name
+        self.services[path] = handler
+
+    def advertise(
+        self, path: str, type_name: str, *, latched: bool = False, template: Fields | None = None
+    ) -> _Silent:
+        """Note a topic."""
+        del type_name, latched, template
+        self.topics.add(path)
+        return _Silent()
+
+    def withdraw(self, publisher: Any) -> None:
+        """Keep the topic in mind."""
+
+    def answer(self, call: Any, fields: Fields) -> None:
+        """Answer nobody."""
+
+    def later(self, delay_s: float, callback: Callable[[], None]) -> None:
+        """Never call back: nothing is stepped here."""
+
+    def close(self) -> None:
+        """Close nothing."""

@@ -1,0 +1,201 @@
+"""A ROS node whose requests, answers and messages go through the course of faults.
+
+It stands between the links and the node: a link's header has been read, and what follows is passed on,
+changed, put off or forgotten. The node below it is the one that runs without faults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from palaestra_sim.protocol.rostypes import Codec
+from palaestra_sim.stub.faults.course import Course, Damage, Ruling
+from palaestra_sim.stub.faults.damage import damaged_answer, damaged_message
+from palaestra_sim.stub.faults.effects import Effects
+from palaestra_sim.stub.faults.kinds import STEP_PATH
+from palaestra_sim.stub.ros.links import Connection, Endpoint
+from palaestra_sim.stub.ros.loop import Loop
+from palaestra_sim.stub.ros.node import RosNode, ServiceEnd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failing:
+    """What the nodes of one stub share: what goes wrong, and what does it."""
+
+    course: Course
+    effects: Effects
+
+
+class FaultyNode(RosNode):
+    """A RosNode that fails as ordered.
+
+    Args:
+        loop: where its sockets are watched.
+        name: the node's name and the prefix of its relative paths.
+        master_uri: the master.
+        failing: shared by all nodes of a stub.
+    """
+
+    def __init__(self, loop: Loop, name: str, master_uri: str, failing: Failing) -> None:
+        super().__init__(loop, name, master_uri)
+        self._failing = failing
+        self._held_steps = 0
+        self._master_lost = False
+
+    def lose_master(self) -> None:
+        """Leave the names with the master when this node is closed."""
+        self._master_lost = True
+
+    def close(self) -> None:
+        """Close as a RosNode does, without a word to a master that is lost."""
+        self._failing.course.closed(self.name)
+        if self._master_lost:
+            self.abandon()
+        else:
+            super().close()
+
+    def request(self, end: ServiceEnd, payload: bytes) -> None:
+        """Take a request; while a slow step is under way it waits, as behind any step."""
+        if self._held_steps:
+            self._waiting.append((end, payload))
+        else:
+            super().request(end, payload)
+
+    def take_waiting(self) -> None:
+        """Handle what waited, unless a slow step is under way."""
+        if not self._held_steps:
+            super().take_waiting()
+
+    def dropped(self, link: Connection) -> None:
+        """Forget a connection that is closed."""
+        super().dropped(link.link if isinstance(link, _Answers | _Messages) else link)
+
+    def receive(self, path: str, answers: _Answers, pass_on: Callable[[], None]) -> None:
+        """Take a request from a link, and pass it on when and if the course says so."""
+        ruling = self._failing.course.request(self.name, path)
+        if not self._failing.effects.happen(ruling.effects) or ruling.lost:
+            return
+        answers.damages = ruling.damages
+        if ruling.delay_s > 0.0:
+            self._hold(path, ruling, answers, pass_on)
+        else:
+            pass_on()
+
+    def _hold(self, path: str, ruling: Ruling, answers: _Answers, pass_on: Callable[[], None]) -> None:
+        held = int(path == STEP_PATH)
+        self._held_steps += held
+
+        def release() -> None:
+            self._held_steps -= held
+            if not answers.closed:
+                pass_on()
+            self.later(0.0, self.take_waiting)
+
+        self.later(ruling.delay_s, release)
+
+    def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        if "service" in header:
+            return self._greet_faulty_client(link, header)
+        name = header.get("topic", "")
+        topic = self._topics.get(name)
+        type_name = "" if topic is None else topic.type.name
+        return super()._greet(
+            _Messages(self, link, self._failing.course, self._path(name), type_name), header
+        )
+
+    def _greet_faulty_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        name = header["service"]
+        known = self._services.get(name)
+        answers = _Answers(link, None if known is None else known[0].response)
+        return _Requests(self, self._path(name), answers, super()._greet(answers, header))
+
+    def _path(self, name: str) -> str:
+        """Return a name as faults call it: below the robot's, or with its leading slash."""
+        return name.removeprefix(f"/{self.name}/")
+
+
+class _Requests:
+    """Takes one client's requests to one service."""
+
+    def __init__(self, node: FaultyNode, path: str, answers: _Answers, endpoint: Endpoint) -> None:
+        self._node = node
+        self._path = path
+        self._answers = answers
+        self._endpoint = endpoint
+
+    def receive(self, payload: bytes) -> None:
+        self._node.receive(self._path, self._answers, lambda: self._endpoint.receive(payload))
+
+    def lost(self) -> None:
+        self._endpoint.lost()
+
+
+class _Answers:
+    """A client's link, on which the answer to the present request may go out wrong.
+
+    Attributes:
+        link: the link itself.
+        damages: of the next answer.
+    """
+
+    def __init__(self, link: Connection, response: Codec | None) -> None:
+        self.link = link
+        self.damages: tuple[Damage, ...] = ()
+        self._response = response
+
+    @property
+    def closed(self) -> bool:
+        return self.link.closed
+
+    def send(self, data: bytes) -> None:
+        damages, self.damages = self.damages, ()
+        if damages and self._response is not None:
+            data = damaged_answer(self._response, data, damages)
+        self.link.send(data)
+
+    def send_newest(self, data: bytes) -> None:
+        self.link.send_newest(data)
+
+    def close(self) -> None:
+        self.link.close()
+
+
+class _Messages:
+    """A subscriber's link, on which messages may be lost, late or wrong.
+
+    Attributes:
+        link: the link itself.
+    """
+
+    def __init__(self, node: FaultyNode, link: Connection, course: Course, path: str, type_name: str) -> None:
+        self.link = link
+        self._node = node
+        self._course = course
+        self._path = path
+        self._type_name = type_name
+
+    @property
+    def closed(self) -> bool:
+        return self.link.closed
+
+    def send(self, data: bytes) -> None:
+        self.link.send(data)
+
+    def send_newest(self, data: bytes) -> None:
+        ruling = self._course.message(self._path)
+        if ruling.lost:
+            return
+        if ruling.damages:
+            data = damaged_message(self._type_name, data, ruling.damages)
+        if ruling.delay_s > 0.0:
+            self._node.later(ruling.delay_s, lambda: self._send_late(data))
+        else:
+            self.link.send_newest(data)
+
+    def close(self) -> None:
+        self.link.close()
+
+    def _send_late(self, data: bytes) -> None:
+        if not self.closed:
+            self.link.send_newest(data)

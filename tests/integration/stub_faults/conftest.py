@@ -1,0 +1,152 @@
+"""Stubs that fail, and Palaestra's own robot as the client that has to bear it."""
+
+import os
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+
+import pytest
+
+from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.robots import Pose
+from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.ros import Master, RosService
+from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.webots import Mode, Webots
+
+STUB = Path(sys.executable).with_name("palaestra-stub")
+ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
+
+
+class Player:
+    """A simulator with faults, behind a sidecar, and the robot that is driven in it.
+
+    Attributes:
+        fault: what the facade made of the first thing that went wrong; None: nothing did.
+        durations_s: of the steps that were answered.
+        extra_steps: how many of them there were.
+    """
+
+    def __init__(self, *options):
+        self.launcher = ProcessLauncher("arena", options=options)
+        self.webots = Webots("robotino", "arena", launcher=self.launcher, start_deadline_s=20.0)
+        self.robot = Robotino(self.webots)
+        self.scene = RobotinoScene(self.webots, self.robot)
+        self.fault = None
+        self.durations_s = []
+        self.extra_steps = 0
+        self.memory_mib = []
+
+    def play(self, episodes=26, steps=2):
+        """Start, play episodes until something goes wrong, and connect once more."""
+        try:
+            self.start()
+            for number in range(episodes):
+                self.scene.reset(number, Pose(0.0, 0.0, 0.0), (1.0, 1.0))
+                for _ in range(steps):
+                    self.step()
+            self.robot.connect()
+        except SimulatorFault as fault:
+            self.fault = fault
+        return self
+
+    def start(self):
+        """Start the simulator and connect to it."""
+        self.webots.start()
+        self.webots.supervisor.set_mode(Mode.FAST)
+        self.robot.connect()
+        self.memory_mib.append(self.resident_mib())
+
+    def step(self):
+        """Take one step, and note how long it took."""
+        began = time.monotonic()
+        self.extra_steps += self.robot.advance()
+        self.robot.pose()
+        self.durations_s.append(time.monotonic() - began)
+        self.memory_mib.append(self.resident_mib())
+
+    def resident_mib(self):
+        """Return the memory that the simulator's first process holds."""
+        pages = int(Path(f"/proc/{self.pid}/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+    @property
+    def pid(self):
+        """The simulator's process."""
+        return self.launcher.state().pid
+
+    def ended(self):
+        """Return how the simulator ended, once it has: its exit code, or its signal."""
+        self.launcher.wait_stopped(5.0)
+        last = self.launcher.state().last_exit
+        return last.code if last.signal is None else last.signal
+
+    def close(self):
+        """End the simulator and its sidecar."""
+        self.robot.close()
+        self.webots.close()
+        self.launcher.close()
+
+
+@pytest.fixture
+def player(master):
+    """`player("crash:step=20", ...)`: a Player, in the first life of the simulator unless told otherwise."""
+    del master
+    made = []
+
+    def make(*faults, life=1):
+        options = [f"--fault={fault}" for fault in faults]
+        made.append(Player(*options, f"--fault-life={life}"))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+class Stubs:
+    """Stubs without a sidecar, under a name that no other test has left at the master.
+
+    Attributes:
+        name: of their robot.
+    """
+
+    def __init__(self, master, folder):
+        self.name = f"faulty_{uuid.uuid4().hex[:8]}"
+        self._variables = {**os.environ, "ROS_MASTER_URI": master}
+        self._world = folder / "arena.wbt"
+        self._world.write_bytes(
+            ARENA.read_bytes().replace(b"--name=robotino", b"--name=" + self.name.encode())
+        )
+        self._started = []
+
+    def __call__(self, *options, **variables):
+        """Start one."""
+        command = [STUB, *options, self._world]
+        environment = {**self._variables, **variables}
+        self._started.append(subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True))
+        return self._started[-1]
+
+    def service(self, path, type_name):
+        """Return one of its services."""
+        return RosService(f"/{self.name}/{path}", f"webots_ros/{type_name}")
+
+    def registered(self):
+        """Return whether the master knows its services."""
+        return Master("/test").service_address(f"/{self.name}/robot/get_time") is not None
+
+    def close(self):
+        """Kill what is left."""
+        for process in self._started:
+            process.kill()
+            process.communicate()
+
+
+@pytest.fixture
+def stub(master, tmp_path):
+    """`stub("--fault=...", PALAESTRA_SIMULATOR_START="2")`: a running process, killed when the test ends."""
+    stubs = Stubs(master, tmp_path)
+    yield stubs
+    stubs.close()

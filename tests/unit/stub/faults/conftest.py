@@ -1,0 +1,23 @@
+"""Faults as they are written, and the course of a life with them."""
+
+import pytest
+
+from palaestra_sim.stub.faults.course import Course
+from palaestra_sim.stub.faults.language import parse
+from palaestra_sim.stub.faults.schedule import Life, Schedule
+
+
+@pytest.fixture
+def schedule():
+    """`schedule("crash:step=3 slow:latency_ms=5", seed=0, simulator="robotino", number=1)`."""
+
+    def make(text, **life):
+        return Schedule(faults=parse(text, "test"), life=Life(**{"simulator": "robotino", **life}))
+
+    return make
+
+
+@pytest.fixture
+def course(schedule):
+    """The course of a life: the same arguments as `schedule`."""
+    return lambda text, **life: Course(schedule(text, **life))

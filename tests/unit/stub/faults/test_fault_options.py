@@ -1,0 +1,117 @@
+"""Where faults are ordered, and how a stub knows which life it lives."""
+
+import argparse
+
+import pytest
+
+from palaestra_sim.stub.faults import FaultError, add_options, begin, read_options
+from palaestra_sim.world import builtin
+
+
+@pytest.fixture
+def read():
+    """`read("--fault", "crash", PALAESTRA_STUB_FAULTS="hang")`: what is ordered."""
+
+    def make(*arguments, **environment):
+        parser = argparse.ArgumentParser()
+        add_options(parser.add_argument)
+        return read_options(parser.parse_args(arguments), environment)
+
+    return make
+
+
+@pytest.fixture
+def arena(tmp_path):
+    """The shipped arena, as a file."""
+    path = tmp_path / "arena.wbt"
+    path.write_bytes(builtin("arena"))
+    return path
+
+
+def test_nothing_is_ordered_by_default(read):
+    """An empty variable is none."""
+    assert read() is None
+    assert read(PALAESTRA_STUB_FAULTS=" ") is None
+    assert read("--fault-seed=7", PALAESTRA_SIMULATOR_START="x") is None
+
+
+def test_options_and_environment_add_up(read):
+    """Options first."""
+    ordered = read("--fault=crash:step=5", "--fault=exit:step=6", PALAESTRA_STUB_FAULTS="hang:step=4")
+
+    assert [it.text for it in ordered.faults] == ["crash:step=5", "exit:step=6", "hang:step=4"]
+
+
+def test_seed_and_life_come_from_options_before_the_environment(read):
+    """A person at a shell is stronger than what a job set."""
+    environment = {"PALAESTRA_STUB_FAULT_SEED": "7", "PALAESTRA_SIMULATOR_START": "3"}
+
+    told, chosen = (
+        read("--fault=crash", **environment),
+        read("--fault=crash", "--fault-seed=8", "--fault-life=4", **environment),
+    )
+
+    assert (told.seed, told.life) == (7, 3)
+    assert (chosen.seed, chosen.life) == (8, 4)
+    assert str(told) == "crash (seed 7, life 3)"
+
+
+def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
+    """A restart under somebody else's care does not replay the life before."""
+    lives = {read("--fault=crash").life for _ in range(8)}
+
+    assert len(lives) > 1
+    assert str(read("--fault=crash")).endswith(", drawn)")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "environment", "words"),
+    [
+        (["--fault=crsh"], {}, "--fault: crsh: there is no fault"),
+        ([], {"PALAESTRA_STUB_FAULTS": "crsh"}, "PALAESTRA_STUB_FAULTS: crsh: there is no fault"),
+        (["--fault=crash", "--fault-seed=-1"], {}, "--fault-seed: '-1' is no whole number from 0 on"),
+        (["--fault=crash", "--fault-life=0"], {}, "--fault-life: '0' is no whole number from 1 on"),
+        (["--fault=crash"], {"PALAESTRA_SIMULATOR_START": ""}, "PALAESTRA_SIMULATOR_START: ''"),
+        (["--fault=crash", "--fault=crash"], {}, "fault crash: is there twice; leave one"),
+        (["--fault=slow_start:every=2,latency_ms=1"], {}, "nobody counts the starts here"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_place(read, arguments, environment, words):
+    """An option, or a variable of a job that was written somewhere else."""
+    with pytest.raises(FaultError, match=words):
+        read(*arguments, **environment)
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (
+            "hang:service=ir99/enable",
+            "the world has no service ir99/enable; name another, such as ir9/enable",
+        ),
+        ("lost:topic=ir1", "the world has no topic ir1; name another, such as ir1/value"),
+        ("lost:topic=camera*", "the world has no topic camera"),
+    ],
+)
+def test_what_the_world_does_not_have_is_told_with_what_it_has(read, arena, fault, words):
+    """Found by starting its controllers on nodes that only listen."""
+    with pytest.raises(FaultError, match=words):
+        begin(read(f"--fault={fault}"), arena)
+
+
+@pytest.mark.parametrize(
+    "fault", ["lost:topic=touch_sensor/value", "lost:topic=/model_name", "hang:service=*/enable"]
+)
+def test_what_the_world_has_can_be_named(read, arena, fault):
+    """Topics of sensors are there before anybody enables one."""
+    assert begin(read(f"--fault={fault}"), arena).schedule.faults[0].text == fault
+
+
+def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
+    """The same job meets the same faults again, though its UID is another."""
+    names = []
+    for name in (b"job_r0_collect_0a_robotino_8c31f2", b"job_r0_collect_0a_robotino_00ff00"):
+        arena.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=" + name))
+        names.append(begin(read("--fault=crash"), arena).schedule.life.simulator)
+
+    assert names == ["job_r0_collect_0a_robotino"] * 2

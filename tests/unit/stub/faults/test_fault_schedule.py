@@ -1,0 +1,114 @@
+"""When faults happen: a function of seed, simulator, life and number, and of nothing else."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from palaestra_sim.stub.faults.kinds import Event, Trigger
+from palaestra_sim.stub.faults.language import parse
+from palaestra_sim.stub.faults.schedule import Life, Schedule
+
+STEPS = range(1, 4001)
+
+
+def happenings(schedule, event=Event.STEP, numbers=STEPS):
+    """Return at which events anything happens."""
+    return [number for number in numbers if schedule.at(event, number)]
+
+
+def test_a_step_is_one_step(schedule):
+    """Neither the one before nor any after."""
+    assert happenings(schedule("crash:step=2000")) == [2000]
+
+
+def test_every_means_each_multiple(schedule):
+    """From the first on."""
+    assert happenings(schedule("lost:every=1000")) == [1000, 2000, 3000, 4000]
+
+
+def test_steps_and_resets_are_counted_apart(schedule):
+    """A fault is about one of them."""
+    both = schedule("crash:step=5 crash:reset=7")
+
+    assert happenings(both) == [5]
+    assert happenings(both, Event.RESET) == [7]
+
+
+def test_a_probability_is_a_share_of_the_steps(schedule):
+    """Within four standard deviations of 4000 draws."""
+    share = len(happenings(schedule("crash:probability=0.1"))) / len(STEPS)
+
+    assert 0.08 < share < 0.12
+
+
+def test_probability_0_is_never_and_1_is_always(schedule):
+    """The ends of a sweep."""
+    assert happenings(schedule("crash:probability=0")) == []
+    assert happenings(schedule("crash:probability=1")) == list(STEPS)
+
+
+def test_another_life_is_another_draw(schedule):
+    """Else a simulator that crashed would crash at the same step for ever."""
+    lives = [happenings(schedule("crash:probability=0.001", number=number))[:1] for number in range(1, 9)]
+
+    assert len({tuple(it) for it in lives}) > 4
+
+
+def test_over_many_lives_the_probability_is_what_was_written(schedule):
+    """The mean length of a life with p = 0.05 is 20 steps."""
+    lengths = [
+        happenings(schedule("crash:probability=0.05", number=it), numbers=range(1, 500))[0]
+        for it in range(1, 401)
+    ]
+
+    assert 16 < sum(lengths) / len(lengths) < 24
+
+
+def test_equal_simulators_do_not_fail_together(schedule):
+    """A group shares its environment, so also its seed."""
+    first, second = (schedule("crash:probability=0.01", simulator=f"job_r0_collect_{it}a") for it in (0, 1))
+
+    assert happenings(first) != happenings(second)
+
+
+def test_another_seed_is_another_course(schedule):
+    """And the same one is the same."""
+    draws = [happenings(schedule("crash:probability=0.01", seed=seed)) for seed in (1, 2, 1)]
+
+    assert draws[0] == draws[2] != draws[1]
+
+
+def test_a_fault_that_is_added_changes_no_other(schedule):
+    """So that two experiments can be compared."""
+    alone = schedule("crash:probability=0.01")
+    beside = schedule("slow:latency_ms=5,probability=0.5 crash:probability=0.01")
+    (crash,) = alone.faults
+
+    assert [it for it in STEPS if crash in beside.at(Event.STEP, it)] == happenings(alone)
+
+
+def test_the_draws_are_the_same_in_every_release():
+    """A run can be repeated years later; hash() of Python would differ from process to process."""
+    (fault,) = parse("crash:probability=0.05", "test")
+    schedule = Schedule(faults=[fault], life=Life(simulator="robotino", number=1))
+
+    assert happenings(schedule, numbers=range(1, 21)) == [7, 12, 20]
+
+
+@settings(deadline=None)
+@given(st.integers(1, 10**12), st.integers(0, 2**64))
+def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
+    """Evenly; never negative."""
+    (fault,) = parse("slow:latency_ms=50,jitter_ms=20", "test")
+    schedule = Schedule(faults=[fault], life=Life(seed=seed))
+
+    assert 0.05 <= schedule.delay_s(fault, number) < 0.07
+
+
+@settings(deadline=None)
+@given(st.integers(1, 10**6), st.integers(1, 1000), st.floats(0, 1, exclude_max=True))
+def test_a_trigger_needs_both_its_multiple_and_its_chance(number, every, draw):
+    """One that says nothing fires always."""
+    assert Trigger(event=Event.STEP).fires(number, draw)
+    assert Trigger(event=Event.STEP, every=every).fires(number, draw) == (number % every == 0)
+    assert Trigger(event=Event.STEP, at=every).fires(number, draw) == (number == every)
+    assert not Trigger(event=Event.STEP, probability=draw).fires(number, draw)
