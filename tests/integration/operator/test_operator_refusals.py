@@ -46,6 +46,8 @@ def test_a_claim_that_is_refused_is_told_and_made_when_there_is_room(place, star
     start()
     place.train()
     eventually(lambda: "PodsRefused" in place.events())
+    assert place.status()["replicas"][0]["reason"] == "PodsRefused"
+    assert "exceeded quota: none-left" in place.condition("Running")["message"]
     assert place.all(JOBS, "job") == []
     assert "Planned" not in {each["reason"] for each in place.about() if "Job" in each["message"]}
 

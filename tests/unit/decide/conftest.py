@@ -51,6 +51,7 @@ class Scene:
         }
         self.polled: dict[str, Polled] = {}
         self.there: dict[tuple[str, str], dict[str, Any]] = {}
+        self.denied: dict[int | None, str] = {}
         self.kueue = False
         self.deleted = False
         self.pods_made = 0
@@ -72,7 +73,13 @@ class Scene:
         """Return the decision as things are; nothing is changed."""
         job = accept(deepcopy(self.raw))
         sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
-        objects = Objects(**deepcopy(self.objects), polled=self.polled, sources=sources, kueue=self.kueue)
+        objects = Objects(
+            **deepcopy(self.objects),
+            polled=self.polled,
+            sources=sources,
+            denied=self.denied,
+            kueue=self.kueue,
+        )
         observed = observe(job, objects)
         return decide(job, observed, prepare(job, observed, self.layout), self.now)
 
@@ -115,6 +122,7 @@ class Scene:
                 "name": f"job-{index}-{number}",
                 "uid": uid or f"pod-{number}",
                 "creationTimestamp": self.stamp(),
+                "ownerReferences": [{"kind": "Job", "uid": self.job(index)["metadata"]["uid"]}],
             },
             "spec": {**template["spec"], "nodeName": "node-1"},
             "status": {"phase": "Pending", "startTime": self.stamp()},
@@ -253,6 +261,13 @@ def simulator() -> Callable[..., SimulatorStatus]:
         return SimulatorStatus(**({"name": "collect-0", "role": "Collect", "state": "ready"} | told))
 
     return make
+
+
+@pytest.fixture(scope="session")
+def command_groups() -> list[dict[str, Any]]:
+    """Return simulators of which one is a program of the user's own."""
+    own = {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim"]}
+    return [own, {"name": "evaluate", "role": "Evaluate"}]
 
 
 @pytest.fixture(scope="session")

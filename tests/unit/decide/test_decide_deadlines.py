@@ -253,3 +253,19 @@ def test_a_failed_replica_whose_job_appears_late_is_stopped_all_the_same(make_sc
 
     assert stops(scene.step()) == ["DeadlineExceeded"]
     assert scene.settle().actions == ()
+
+
+@pytest.mark.parametrize("how", ["unreachable", "deleted", "ended"])
+def test_a_crash_loop_of_before_is_not_held_against_a_pod_that_trained(training, how):
+    """An operator that has just started has heard nothing yet, and sidecars end with their pod."""
+    scene, pod = training()
+    scene.poll(pod, phase="training", step=50)
+    scene.settle(5)
+    scene.polled.clear()
+    scene.container(pod, "sim-collect-0", waiting="CrashLoopBackOff", code=143, restarts=5)
+    if how == "deleted":
+        pod["metadata"]["deletionTimestamp"] = scene.stamp(1060)
+    if how == "ended":
+        scene.container(pod, "trainer", code=75)
+
+    assert stops(scene.step(1000)) == []

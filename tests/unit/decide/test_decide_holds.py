@@ -61,8 +61,9 @@ def held(scene):
             {"simulators": [{**GROUPS[0], **SECRET}, GROUPS[1]]},
             {("Secret", "keys"): {"metadata": {"name": "keys"}}},
             "SecretNotForJobs",
-            "spec.simulators[0].env[0].secretKeyRef: Secret keys is not for jobs; "
-            'label it palaestra.dev/for-jobs: "true"',
+            "spec.simulators[0].env[0].secretKeyRef: Secret keys is not for jobs, or the operator may not "
+            'see that it is; label it palaestra.dev/for-jobs: "true" and bind the role '
+            "palaestra-job-secrets in this namespace",
             id="a Secret of somebody else",
         ),
         pytest.param(

@@ -160,7 +160,7 @@ def test_a_job_that_somebody_deleted_is_made_again_once_its_pods_are_gone(traini
     scene, _ = training()
     scene.objects["jobs"].clear()
     assert kinds(scene.step()) == []
-    assert scene.replica().message == "waits for its old pod to end"
+    assert scene.replica().message == "waits for pod job-0-0 to end"
 
     scene.objects["pods"].clear()
 
@@ -253,3 +253,21 @@ def test_the_time_to_live_may_be_given_after_the_end(training, last_word):
 
     assert scene.deleted
     assert scene.status.observed_generation == 2
+
+
+def test_a_pod_that_only_says_to_be_the_replicas_is_waited_for(accepted, last_word):
+    """It may write to the volume; what it tells is not believed."""
+    scene = accepted()
+    pod = scene.running_pod()
+    scene.end(pod, 0, last_word(step=9, success_rate=1.0))
+    pod["status"]["phase"] = "Running"
+    pod["metadata"]["ownerReferences"] = []
+    scene.objects["jobs"].clear()
+
+    decision = scene.settle()
+
+    assert kinds(decision) == []
+    assert (scene.replica().attempt, scene.replica().step) == (0, None)
+    assert scene.replica().message == "waits for pod job-0-0 to end"
+    scene.objects["pods"].clear()
+    assert "Job" in kinds(scene.settle())

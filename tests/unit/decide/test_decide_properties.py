@@ -20,9 +20,7 @@ TERMINAL = {Phase.SUCCEEDED, Phase.FAILED}
 texts = st.text(max_size=40) | st.sampled_from(["", "x" * 700, "\ud800", "a\nb", "2026-01-31T12:00:00Z"])
 scalars = st.none() | st.booleans() | st.integers() | st.floats() | texts
 garbage = st.recursive(
-    scalars,
-    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(texts, inner, max_size=2),
-    max_leaves=4,
+    scalars, lambda it: st.lists(it, max_size=2) | st.dictionaries(texts, it, max_size=2), max_leaves=4
 )
 moments = st.integers(-600, 600).map(
     lambda seconds: (START + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -57,20 +55,13 @@ exits = st.fixed_dictionaries(
         "finishedAt": maybe(moments),
     }
 )
+running = st.fixed_dictionaries({"startedAt": maybe(moments)})
+waiting = st.fixed_dictionaries({"reason": st.sampled_from(WAITING), "message": maybe(texts)})
 states = st.one_of(
-    st.fixed_dictionaries({"running": st.fixed_dictionaries({"startedAt": maybe(moments)})}),
+    st.fixed_dictionaries({"running": running}),
     st.fixed_dictionaries({"terminated": exits}),
-    st.fixed_dictionaries(
-        {
-            "waiting": st.fixed_dictionaries(
-                {
-                    "reason": st.sampled_from(WAITING),
-                    "message": maybe(texts),
-                }
-            )
-        }
-    ),
-)  # fmt: skip
+    st.fixed_dictionaries({"waiting": waiting}),
+)
 
 
 def container_status(name):
@@ -115,6 +106,7 @@ def pods(draw, planned):
             "uid": f"uid-{number}",
             "labels": template["metadata"]["labels"],
             "creationTimestamp": draw(maybe(moments)),
+            "ownerReferences": draw(maybe(st.just([{"uid": "job-uid"}]))),
         }
         | draw(st.sampled_from([{}, {}, {"deletionTimestamp": "2026-01-31T12:00:00Z"}])),
         "spec": draw(maybe(st.just(spec))),
@@ -187,10 +179,9 @@ def clusters(draw, planned):
                 )
             )
             jobs.append(job)
-    found = draw(st.lists(st.sampled_from(planned.replicas).flatmap(lambda it: pods(it.job)), max_size=3))
-    polled = {
-        pod["metadata"]["uid"]: Polled(status=draw(answers), at=START) for pod in found if draw(st.booleans())
-    }
+    one_pod = st.sampled_from(planned.replicas).flatmap(lambda it: pods(it.job))
+    found = draw(st.lists(one_pod, max_size=3, unique_by=lambda it: it["metadata"]["uid"]))
+    uids = [each["metadata"]["uid"] for each in found if draw(st.booleans())]
     return Objects(
         jobs=jobs,
         pods=found,
@@ -198,7 +189,7 @@ def clusters(draw, planned):
         config_maps=[trimmed(each.config_map) for each in planned.replicas if draw(st.booleans())],
         policies=[trimmed(planned.network_policy)] if draw(st.booleans()) else [],
         events=draw(st.lists(events, max_size=2)),
-        polled=polled,
+        polled={uid: Polled(status=draw(answers), at=START) for uid in uids},
     )
 
 
@@ -207,12 +198,9 @@ SPEC = {"replicas": 2, "activeDeadlineSeconds": 900, "ttlSecondsAfterFinished": 
 
 def raw(status=None):
     """Return the job of all these tests."""
-    return {
-        "apiVersion": "palaestra.dev/v1alpha1",
-        "kind": "TrainingJob",
-        "metadata": {"name": "job", "uid": "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e", "generation": 1},
-        "spec": SPEC,
-    } | ({"status": status} if status is not None else {})
+    metadata = {"name": "job", "uid": "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e", "generation": 1}
+    head = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": metadata}
+    return head | {"spec": SPEC} | ({"status": status} if status is not None else {})
 
 
 def one(obj, objects, now):
@@ -307,6 +295,6 @@ def test_what_is_written_is_within_the_bounds_of_the_definition(history):
 @given(st.lists(garbage, max_size=3), st.lists(garbage, max_size=3))
 def test_garbage_is_as_good_as_nothing(things, others):
     """One bad object must not delay another, whatever it is."""
-    objects = Objects(jobs=things, pods=others, claims=things, events=others, config_maps=things)  # type: ignore[arg-type]
+    objects = Objects(jobs=things, pods=others, claims=things, events=others, config_maps=things)
 
     assert one(raw(), objects, START).status.phase is Phase.PENDING

@@ -174,3 +174,75 @@ def test_while_its_simulators_start_a_trainer_does_not_train(training):
     scene.settle()
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.RUNNING, "Starting")
+
+
+@pytest.mark.parametrize("about", [0, None], ids=["of the replica", "of the whole job"])
+def test_an_object_that_is_refused_is_told_in_the_api_servers_words(make_scene, about, reasons):
+    """A claim over its quota has no Job whose events could tell."""
+    scene = make_scene()
+    scene.step()
+    scene.denied = {about: 'persistentvolumeclaims "job-0" is forbidden: exceeded quota: volumes'}
+
+    decision = scene.step()
+    scene.objects["jobs"].clear()
+
+    assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "PodsRefused")
+    assert scene.replica().message.endswith("is forbidden: exceeded quota: volumes")
+    assert scene.status.conditions[1].reason == "PodsRefused"
+    assert "PodsRefused" in reasons(decision)
+    scene.denied = {}
+    scene.settle()
+    assert scene.replica().reason == "Starting"
+
+
+def test_what_one_replica_is_refused_is_not_told_of_another(make_scene):
+    """Room for one claim is room for one replica."""
+    scene = make_scene(replicas=2)
+    scene.step()
+    scene.denied = {1: "exceeded quota"}
+
+    scene.step()
+
+    assert [each.reason for each in scene.status.replicas] == ["Starting", "PodsRefused"]
+
+
+def test_an_init_container_that_fails_is_named_with_its_last_line(accepted, command_groups):
+    """The trainer never started, so it has no word."""
+    scene = accepted(backoffLimit=0, simulators=command_groups)
+    pod = scene.new_pod()
+    scene.container(pod, "install-sidecar", code=1, message="cp: one\ncp: no space left on device\n")
+    pod["status"]["phase"] = "Failed"
+    scene.end_job("Failed", 0, "BackoffLimitExceeded")
+
+    scene.settle()
+
+    assert scene.replica().message.endswith(
+        "the last: container install-sidecar: exit code 1, cp: no space left on device"
+    )
+
+
+@pytest.mark.parametrize(("limit", "code"), [(0, 70), (3, 2), (3, 80), (3, 81)])
+def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, reasons, limit, code):
+    """No other will come, whatever the Job says later."""
+    scene, pod = training(backoffLimit=limit)
+    scene.end(pod, code, last_word())
+
+    decision = scene.settle()
+
+    assert scene.replica().reason != "Retrying"
+    assert "Retrying" not in reasons(decision)
+
+
+def test_a_replica_on_a_lost_node_does_not_run(training):
+    """The node's last word was that it does; nobody knows."""
+    scene, pod = training()
+    pod["metadata"]["deletionTimestamp"] = scene.stamp()
+
+    scene.settle(31)
+
+    assert (scene.replica().reason, scene.status.phase, scene.status.running) == (
+        "NodeLost",
+        Phase.PENDING,
+        "0/1",
+    )
+    assert scene.status.conditions[1].reason == "NodeLost"

@@ -42,7 +42,6 @@ def test_what_is_equal_is_not_written():
         {"step": 11},
         {"meanReturn": 1.0},
         {"stepsPerSecond": 20.5},
-        {"lastCheckpoint": {"step": 5, "time": "2026-01-31T12:00:00Z"}},
         {"restarts": {"trainer": 0, "simulator": 1}},
     ],
 )
@@ -62,10 +61,13 @@ def test_progress_waits_for_half_a_minute(change):
         {"attempt": 2},
         {"reason": "ImagePull"},
         {"restarts": {"trainer": 1, "simulator": 0}},
+        {"target": 100},
+        {"successRate": 0.0},
+        {"lastCheckpoint": {"step": 5, "time": "2026-01-31T12:00:00Z"}},
     ],
 )
 def test_what_people_wait_for_is_written_at_once(change):
-    """Phases, reasons, attempts."""
+    """Phases, reasons, attempts, and the first numbers of a training."""
     assert worth_writing(OLD, changed(change), NOW, NOW)
 
 

@@ -43,11 +43,12 @@ def raw_job() -> dict[str, Any]:
 def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
     """Return a pod of it that nobody has started."""
     template = deepcopy(raw_job["spec"]["template"])
-    named = {"name": "job-0-x", "uid": "pod-1", "creationTimestamp": "2026-01-31T12:00:00Z"}
+    named: dict[str, Any] = {"name": "job-0-x", "uid": "pod-1", "creationTimestamp": "2026-01-31T12:00:00Z"}
+    named["ownerReferences"] = [{"kind": "Job", "uid": raw_job["metadata"]["uid"]}]
     return {"kind": "Pod", **template, "metadata": {**template["metadata"], **named}, "status": {}}
 
 
 @pytest.fixture
-def look() -> Callable[..., Observed]:
-    """`look(pods=[...])`: what is observed of the job."""
-    return lambda **objects: observe(_make_job(), Objects(**objects))
+def look(raw_job: dict[str, Any]) -> Callable[..., Observed]:
+    """`look(pods=[...])`: what is observed of the job; its Job is there, unless `jobs` says otherwise."""
+    return lambda **objects: observe(_make_job(), Objects(**({"jobs": [raw_job]} | objects)))

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 
 import pytest
 
+from palaestra.api.status import PodReference, ReplicaStatus
 from palaestra.observe import JobEnd, Objects, Polled, observe, trimmed
 from palaestra_sim.protocol.status import TrainerStatus
 
@@ -157,3 +158,34 @@ def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
 
     assert look(**small) == look(**whole)
     assert len(str(small)) < len(str(whole)) / 2
+
+
+def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
+    """Whoever may make pods may give them our labels."""
+    raw_pod["metadata"]["ownerReferences"] = [{"kind": "Job", "name": "job-0", "uid": "another"}]
+
+    replica = look(pods=[raw_pod]).replicas[0]
+
+    assert (replica.pods, replica.in_the_way) == ((), ("job-0-x",))
+
+
+def test_the_pod_that_the_status_names_stays_the_replicas_when_its_job_is_gone(make_job, raw_pod):
+    """Somebody deleted the Job; its pod still saves a checkpoint."""
+    named = {"name": "job-0-x", "uid": "pod-1", "created": NOW}
+    job = make_job()
+    status = job.status.model_copy(
+        update={"replicas": (ReplicaStatus(index=0, attempt=1, pod=PodReference(**named)),)}
+    )
+
+    replica = observe(job.model_copy(update={"status": status}), Objects(pods=[raw_pod])).replicas[0]
+
+    assert [each.uid for each in replica.pods] == ["pod-1"]
+
+
+def test_what_was_refused_is_of_the_replica_or_of_all(make_job):
+    """In the API server's words, on one line."""
+    seen = observe(make_job(replicas=2), Objects(denied={1: "over\nquota"}))
+    of_all = observe(make_job(replicas=2), Objects(denied={None: "no policy"}))
+
+    assert [each.denied for each in seen.replicas] == ["", "over quota"]
+    assert [each.denied for each in of_all.replicas] == ["no policy"] * 2

@@ -147,6 +147,26 @@ def test_a_program_of_the_users_gets_the_sidecar_copied_into_its_image(in_cluste
     assert planned["sim-evaluate-0"]["command"] == ["palaestra-sidecar"]
 
 
+def test_the_copied_sidecar_is_where_the_users_image_starts_it(in_cluster):
+    """One volume, written by the init container and read by the simulators."""
+    planned = containers(in_cluster(simulators=COMMAND))
+    copied = {"name": "sidecar", "mountPath": "/palaestra"}
+
+    assert planned["install-sidecar"]["volumeMounts"] == [copied]
+    assert planned["install-sidecar"]["command"][-1].endswith(" /palaestra/")
+    assert planned["install-sidecar"]["terminationMessagePolicy"] == "FallbackToLogsOnError"
+    assert {**copied, "readOnly": True} in planned["sim-own-0"]["volumeMounts"]
+    assert copied["name"] not in [mount["name"] for mount in planned["sim-evaluate-0"]["volumeMounts"]]
+
+
+def test_ros_writes_its_logs_into_a_folder_that_is_there(in_cluster, on_laptop):
+    """One that it makes it would give to the owner of the folder above: root, of a pod's volume."""
+    for planned in (containers(in_cluster()), containers(on_laptop())):
+        for container in planned.values():
+            mounted = [mount["mountPath"] for mount in container["volumeMounts"]]
+            assert environment(container)["ROS_LOG_DIR"] in mounted
+
+
 def test_on_a_laptop_nothing_is_copied(on_laptop):
     """The sidecar is installed beside the runner."""
     planned = containers(on_laptop(simulators=COMMAND))

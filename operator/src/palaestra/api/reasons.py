@@ -109,9 +109,10 @@ ROWS: dict[Reason, Row] = {
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
     Reason.SECRET_NOT_FOR_JOBS: Row(
-        '{field}: Secret {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
-        "a job may read only what somebody has opened to jobs",
-        "whoever owns the Secret sets the label",
+        "{field}: Secret {name} is not for jobs, or the operator may not see that it is; "
+        'label it palaestra.dev/for-jobs: "true" and bind the role palaestra-job-secrets in this namespace',
+        "a job may read only what somebody has opened to jobs, and only where the operator may look at it",
+        "whoever owns the Secret labels it and binds the role `palaestra-job-secrets`: see Secrets below",
     ),
     Reason.CLAIM_MISSING: Row(
         "{field}: there is no PersistentVolumeClaim {name} here; create it and the job starts",
@@ -134,10 +135,7 @@ ROWS: dict[Reason, Row] = {
         "wait while it is being deleted; otherwise remove it, or rename the TrainingJob",
     ),
     Reason.PLANNED: Row(
-        "created {objects}",
-        "the objects of a replica were created",
-        "nothing",
-        warning=False,
+        "created {objects}", "the objects of a replica were created", "nothing", warning=False
     ),
     Reason.QUEUED: Row(
         "waits in queue {queue} for Kueue",
@@ -152,10 +150,7 @@ ROWS: dict[Reason, Row] = {
         warning=False,
     ),
     Reason.RESUMED: Row(
-        "goes on from the last checkpoint",
-        "the replica is no longer suspended",
-        "nothing",
-        warning=False,
+        "goes on from the last checkpoint", "the replica is no longer suspended", "nothing", warning=False
     ),
     Reason.STARTING: Row(
         "{what}",
@@ -163,12 +158,7 @@ ROWS: dict[Reason, Row] = {
         "nothing; after some minutes, `kubectl describe pod` tells what it waits for",
         warning=False,
     ),
-    Reason.TRAINING: Row(
-        "{what}",
-        "at least one trainer runs",
-        "nothing",
-        warning=False,
-    ),
+    Reason.TRAINING: Row("{what}", "at least one trainer runs", "nothing", warning=False),
     Reason.INTERRUPTED: Row(
         "pod {pod} was taken by the cluster{words}; another goes on from the last checkpoint",
         "an eviction, a preemption, a drain, or a deletion; it does not count against `backoffLimit`",
@@ -198,8 +188,8 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.PODS_REFUSED: Row(
         "no pod can be made: {words}",
-        "a quota, a LimitRange, Pod Security or a webhook refuses the pod; the words are the API server's",
-        "raise the quota, or allow what the message names; the Job controller tries again by itself",
+        "a quota, LimitRange, Pod Security or webhook refuses a pod or its claim, in the API server's words",
+        "raise the quota, or allow what the message names; it is tried again by itself",
     ),
     Reason.RESTART_POLICY_DROPPED: Row(
         "pod {pod}: {containers} lost restartPolicy: Always, so that the trainer would wait for ever; "
@@ -288,10 +278,7 @@ ROWS: dict[Reason, Row] = {
         "`kubectl describe job`",
     ),
     Reason.SUCCEEDED: Row(
-        "{what}",
-        "the training is complete",
-        "fetch `model.zip` from the run directory",
-        warning=False,
+        "{what}", "the training is complete", "fetch `model.zip` from the run directory", warning=False
     ),
     Reason.SOME_REPLICAS_FAILED: Row(
         "{failed} of {all} replicas failed; the first: replica {index}, {message}",

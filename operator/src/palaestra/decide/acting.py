@@ -47,7 +47,7 @@ def _things(planned: ReplicaPlan, seen: ReplicaObserved) -> tuple[Object, ...]:
     volumes = [thing for thing in (planned.config_map, planned.claim) if thing is not None]
     if seen.job is not None:
         return tuple(each for each in volumes if each["metadata"]["name"] in seen.job.volumes)
-    if seen.obstacle is not None or any(not pod.ended for pod in seen.pods):
+    if seen.obstacle is not None or seen.in_the_way or any(not pod.ended for pod in seen.pods):
         return ()
     return (*volumes, planned.job)
 

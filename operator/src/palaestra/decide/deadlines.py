@@ -22,7 +22,7 @@ from palaestra.decide.troubles import (
     storage_eviction,
 )
 from palaestra.observe.reading import as_time
-from palaestra.observe.views import ContainerView
+from palaestra.observe.views import ContainerView, PodView
 from palaestra_sim.protocol.status import SimulatorStatus
 
 FRUITLESS_PODS = 6  # in a row; as many as Kubernetes' own default for failures
@@ -68,7 +68,7 @@ def sidecar_kept_crashing(it: Situation) -> Deadline | None:
     """Before the training a crash loop is fatal at the start deadline; later, the trainer decides."""
     pod = it.pod
     looping = next((each for each in crashing(pod) if each.restarts >= CRASHES), None)
-    if pod is None or pod.started is None or looping is None or it.trains:
+    if pod is None or pod.started is None or looping is None or not _waits_for_simulators(it, pod):
         return None
     return Deadline(at=after(pod.started, it.start_deadline_s(looping.name)), told=of_crash(looping))
 
@@ -118,6 +118,18 @@ DEADLINES: tuple[DeadlineCheck, ...] = (
     no_progress,
     active_deadline,
 )
+
+
+def _waits_for_simulators(it: Situation, pod: PodView) -> bool:
+    """Return whether the training of a pod has not begun, as far as is known.
+
+    A trainer that told how far it is and does not answer now is unknown, and one that has ended needs its
+    simulators no more, nor does a pod that somebody deleted.
+    """
+    over = pod.gone_by is not None or (pod.trainer is not None and pod.trainer.exit is not None)
+    unknown = it.seen.polled is None and it.old.target is not None
+    runs = pod.trainer is not None and pod.trainer.running_since is not None
+    return not over and not it.trains and not (runs and unknown)
 
 
 def _of_waiting(it: Situation, reasons: frozenset[str], trouble: Told | None) -> Deadline | None:

@@ -19,7 +19,7 @@ from palaestra.decide.ending import TERMINAL
 from palaestra.decide.outcomes import ended, last_word_by
 from palaestra.decide.preparing import Hold
 from palaestra.decide.situation import Situation, Verdict, told
-from palaestra.decide.troubles import TROUBLES, lost_at
+from palaestra.decide.troubles import TROUBLES, lost_at, objects_refused
 from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra_sim.protocol.status import CheckpointStatus, TrainerStatus
 
@@ -55,6 +55,8 @@ def _standing(it: Situation, hold: Hold | None) -> Verdict:
     queue = spec.scheduling.queue_name
     if job is None and hold is not None:
         return Verdict(phase=Phase.PENDING, told=hold.told)
+    if job is None and (denied := objects_refused(it)) is not None:
+        return Verdict(phase=Phase.SUSPENDED if spec.suspend else Phase.PENDING, told=denied)
     if (job is None and spec.suspend) or (job is not None and job.suspended):
         why = told(Reason.QUEUED, queue=queue) if queue is not None else told(Reason.SUSPENDED)
         return Verdict(phase=Phase.SUSPENDED, told=why)
@@ -63,7 +65,8 @@ def _standing(it: Situation, hold: Hold | None) -> Verdict:
     if trainer is not None and trainer.exit is not None and not trouble:
         what = f"attempt {it.counted.attempt} has ended, its simulators are stopped"
         return Verdict(phase=Phase.RUNNING, told=told(Reason.TRAINING, what=what))
-    runs = it.pod is not None and trainer is not None and trainer.running_since is not None
+    lost = trouble is not None and trouble.reason is Reason.NODE_LOST  # as its node said last, it runs
+    runs = it.pod is not None and trainer is not None and trainer.running_since is not None and not lost
     phase = Phase.RUNNING if runs else Phase.PENDING
     return Verdict(phase=phase, told=trouble or (_running(it) if runs else _starting(it)))
 
@@ -75,12 +78,15 @@ def _running(it: Situation) -> Told:
 
 
 def _starting(it: Situation) -> Told:
-    there = it.pod is not None
+    there = [*it.seen.in_the_way, *([it.pod.name] if it.pod is not None else [])]
     if it.seen.job is None:
-        return told(
-            Reason.STARTING, what="waits for its old pod to end" if there else "is about to be created"
-        )
-    return told(Reason.STARTING, what="its containers start" if there else "its pod is about to be created")
+        waits = f"waits for pod {there[0]} to end" if there else "is about to be created"
+        return told(Reason.STARTING, what=waits)
+    if it.seen.pod is None:
+        return told(Reason.STARTING, what="its pod is about to be created")
+    return told(
+        Reason.STARTING, what="its last pod has ended" if it.seen.pod.ended else "its containers start"
+    )
 
 
 def _status(it: Situation, verdict: Verdict) -> ReplicaStatus:

@@ -12,7 +12,8 @@ from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.moments import after, seconds_between
 from palaestra.decide.situation import Situation, TroubleCheck, first_waiting, told
 from palaestra.observe.pods import dropped
-from palaestra.observe.views import ContainerView, PodView
+from palaestra.observe.views import ContainerKind, ContainerView, PodView
+from palaestra.plan.job import GIVEN_UP
 
 LOST_AFTER_S = 30  # past the moment at which a deleted pod was to be gone
 CRASHES = 3  # of one sidecar, before they are called a loop
@@ -43,6 +44,13 @@ def pods_refused(it: Situation) -> Told | None:
     if refused is None or it.pod is not None:
         return None
     return told(Reason.PODS_REFUSED, words=refused.message)
+
+
+def objects_refused(it: Situation) -> Told | None:
+    """The API server makes no object of ours; what it said is told by nobody else."""
+    if not it.seen.denied or it.pod is not None:
+        return None
+    return told(Reason.PODS_REFUSED, words=it.seen.denied)
 
 
 def node_lost(it: Situation) -> Told | None:
@@ -113,15 +121,16 @@ def pod_was_taken(it: Situation) -> Told | None:
 
 
 def pod_failed(it: Situation) -> Told | None:
-    """The newest pod failed and no other is there yet."""
+    """The newest pod failed and another will come."""
     pod = it.seen.pod
-    if pod is None or not failed_by_itself(pod):
+    if pod is None or not failed_by_itself(pod) or no_other_comes(it, pod):
         return None
     return told(Reason.RETRYING, pod=pod.name, how=how_it_failed(it, pod))
 
 
 TROUBLES: tuple[TroubleCheck, ...] = (
     name_taken,
+    objects_refused,
     pods_refused,
     node_lost,
     restart_policy_dropped,
@@ -134,6 +143,13 @@ TROUBLES: tuple[TroubleCheck, ...] = (
     pod_was_taken,
     pod_failed,
 )
+
+
+def no_other_comes(it: Situation, pod: PodView) -> bool:
+    """Return whether a pod that failed is the last: the Job is about to say that it failed, and why."""
+    booked = it.seen.job.failures if it.seen.job is not None else 0
+    failures = max(booked, it.counted.restarts.trainer + 1)  # the newest may not be booked yet
+    return failures > it.job.spec.backoff_limit or exit_code(pod) in GIVEN_UP
 
 
 def lost_at(it: Situation) -> datetime | None:
@@ -177,6 +193,22 @@ def how_it_failed(it: Situation, pod: PodView) -> str:
     code = exit_code(pod)
     if word is not None and word.reason:
         return f"exit code {code}, {word.reason}"
-    log = trainer.exit.message if trainer is not None and trainer.exit is not None else ""
-    words = log.strip().splitlines()[-1:] or [pod.message or pod.reason or "no word from the trainer"]
-    return f"exit code {code}, {words[0]}" if code is not None else words[0]
+    if code is None and (before := _failed_before(pod)) is not None:
+        return before
+    words = _last_line(trainer) or pod.message or pod.reason or "no word from the trainer"
+    return f"exit code {code}, {words}" if code is not None else words
+
+
+def _failed_before(pod: PodView) -> str | None:
+    """Return how a container failed that has to end well before the others start; None: none has."""
+    for each in pod.containers:
+        if each.kind is ContainerKind.INIT and each.exit is not None and each.exit.code:
+            line = _last_line(each) or each.exit.reason or "no word"
+            return f"container {each.name}: exit code {each.exit.code}, {line}"
+    return None
+
+
+def _last_line(container: ContainerView | None) -> str:
+    """Return the last line of what a container left."""
+    log = container.exit.message if container is not None and container.exit is not None else ""
+    return next(iter(log.strip().splitlines()[-1:]), "")

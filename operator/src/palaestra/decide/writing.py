@@ -1,4 +1,4 @@
-"""When a status is worth a write: what people wait for at once, progress every half minute."""
+"""When a status is worth a write: what people wait for at once, progress every half minute but its first."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -8,6 +8,7 @@ from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
 _OF_JOB = frozenset({"step", "successRate"})
+_FIRST = frozenset({"step", "target", "successRate", "lastCheckpoint"})  # never absent once they were there
 _OF_REPLICA = frozenset(
     {"step", "target", "successRate", "meanReturn", "stepsPerSecond", "simulators", "lastCheckpoint",
      "furthestStep", "simulatorRestarts"}
@@ -53,6 +54,7 @@ def _rest(replica: Any) -> Any:
     if not isinstance(replica, Mapping):
         return replica
     kept = {name: value for name, value in replica.items() if name not in _OF_REPLICA}
+    kept |= dict.fromkeys(_FIRST & replica.keys())  # that there is one is news; how large it is, is not
     restarts = kept.get("restarts")
     if isinstance(restarts, Mapping):  # those of simulators are as frequent as faults are
         kept["restarts"] = {name: value for name, value in restarts.items() if name != "simulator"}

@@ -3,9 +3,10 @@
 from datetime import datetime
 
 from palaestra.api import TrainingJob
+from palaestra.api.lines import one_line
 from palaestra.observe.jobs import job_view
 from palaestra.observe.pods import BEGINNING, pod_view
-from palaestra.observe.reading import part, parts, text, time
+from palaestra.observe.reading import MOST_TEXT, part, parts, text, time
 from palaestra.observe.views import (
     CreateFailure,
     JobView,
@@ -42,38 +43,55 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
     name = f"{job.metadata.name}-{index}"
     named = [raw for raw in objects.jobs if part(raw, "metadata").get("name") == name]
     ours = next((job_view(raw) for raw in named if _owned(raw, job)), None)
-    pods = _pods(job, index, objects)
+    pods, others = _pods(job, index, objects, ours)
     newest = pods[-1] if pods else None
     return ReplicaObserved(
         index=index,
         job=ours,
         obstacle=next((_obstacle(raw, name) for raw in named if not _owned(raw, job)), None),
         pods=pods,
+        in_the_way=tuple(each.name for each in others if not each.ended),
         polled=objects.polled.get(newest.uid) if newest and not newest.ended else None,
         terminations={each.uid: word for each in pods if (word := _last_word(each)) is not None},
         refused=_refused(ours, newest, objects) if ours else None,
+        denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
     )
 
 
 def _owned(raw: Raw, job: TrainingJob) -> bool:
+    return job.metadata.uid is not None and owned_by(raw, job.metadata.uid)
+
+
+def owned_by(raw: Raw, uid: str) -> bool:
+    """Return whether an object has an owner with this uid."""
     owners = parts(raw, "metadata", "ownerReferences")
-    return job.metadata.uid is not None and any(each.get("uid") == job.metadata.uid for each in owners)
+    return bool(uid) and any(each.get("uid") == uid for each in owners)
 
 
 def _obstacle(raw: Raw, name: str) -> Obstacle:
     return Obstacle(name=name, deleting="deletionTimestamp" in part(raw, "metadata"))
 
 
-def _pods(job: TrainingJob, index: int, objects: Objects) -> tuple[PodView, ...]:
-    """Return the pods of a replica, those of a Job before the present one too, oldest first."""
+def _pods(
+    job: TrainingJob, index: int, objects: Objects, ours: JobView | None
+) -> tuple[tuple[PodView, ...], tuple[PodView, ...]]:
+    """Return the pods of a replica, oldest first, and those that are only labelled as if they were.
+
+    Whoever may make pods may give them our labels; the replica's are made by its Job. Of a Job before the
+    present one nothing is known but the pod that the status names.
+    """
+    known = {each.pod.uid for each in job.status.replicas if each.index == index and each.pod is not None}
     found: dict[str, PodView] = {}
+    others: dict[str, PodView] = {}
     for raw in objects.pods:
         labels = part(raw, "metadata", "labels")
         if labels.get(UID_LABEL) == job.metadata.uid and labels.get(REPLICA_LABEL) == str(index):
             view = pod_view(raw)
-            found[view.uid] = view
+            made = view.uid in known or (ours is not None and owned_by(raw, ours.uid))
+            (found if made else others)[view.uid] = view
     found.pop("", None)
-    return tuple(sorted(found.values(), key=lambda it: (it.created, not it.ended, it.name)))
+    in_order = sorted(found.values(), key=lambda it: (it.created, not it.ended, it.name))
+    return tuple(in_order), tuple(others.values())
 
 
 def _last_word(pod: PodView) -> Termination | None:

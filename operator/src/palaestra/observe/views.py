@@ -54,6 +54,8 @@ class Objects:
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
         sources: what `references(job)` names; None: there is no such object. Of a Secret the
             metadata is enough.
+        denied: what the API server said when it last refused an object of a replica; None: an object of
+            the whole job. Absent: nothing is refused.
         kueue: whether the cluster has Kueue.
     """
 
@@ -65,6 +67,7 @@ class Objects:
     events: Sequence[Raw] = ()
     polled: Mapping[str, Polled] = field(default_factory=dict)
     sources: Mapping[Source, Raw | None] = field(default_factory=dict)
+    denied: Mapping[int | None, str] = field(default_factory=dict)
     kueue: bool = False
 
 
@@ -212,19 +215,24 @@ class ReplicaObserved:
     """What the cluster shows of one replica.
 
     Attributes:
-        pods: all there are, oldest first.
+        pods: those of its Job, and the one that the status names; oldest first.
+        in_the_way: names of all other pods that say they are the replica's and have not ended. What they
+            tell is not believed; they may write to its volume all the same.
         polled: the answer of the newest pod's trainer; None: unknown.
         terminations: last words of trainers by pod UID, those that are of our protocol.
         refused: why no pod could be made, if that is newer than the newest pod.
+        denied: why an object of the replica could not be made; "": it could.
     """
 
     index: int
     job: JobView | None = None
     obstacle: Obstacle | None = None
     pods: tuple[PodView, ...] = ()
+    in_the_way: tuple[str, ...] = ()
     polled: Polled | None = None
     terminations: Mapping[str, Termination] = field(default_factory=dict)
     refused: CreateFailure | None = None
+    denied: str = ""
 
     @property
     def pod(self) -> PodView | None:

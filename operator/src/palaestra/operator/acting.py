@@ -5,15 +5,17 @@ that fails keeps no other replica from its own.
 """
 
 from collections.abc import Mapping
+from http import HTTPStatus
 from typing import Any
 
 import structlog
 
 from palaestra.cluster import AlreadyExists, Api, ApiError, NotFound
-from palaestra.cluster.resources import JOBS, NETWORK_POLICIES, PODS, TRAINING_JOBS, of
+from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, PODS, TRAINING_JOBS, of
 from palaestra.decide import Action, Create, Delete, SetSuspend, Stop
 from palaestra.errors import PalaestraError
 from palaestra.operator.caches import Caches
+from palaestra.operator.denials import Denials
 from palaestra.operator.poller import Key
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.writing import Writer
@@ -39,13 +41,17 @@ class Acting:
         writer: to write.
         caches: whose Jobs are patched.
         strangers: told of Jobs whose names are taken.
+        denials: told what could not be created.
     """
 
-    def __init__(self, api: Api, writer: Writer, caches: Caches, strangers: Strangers) -> None:
+    def __init__(
+        self, api: Api, writer: Writer, caches: Caches, strangers: Strangers, denials: Denials
+    ) -> None:
         self._api = api
         self._writer = writer
         self._caches = caches
         self._strangers = strangers
+        self._denials = denials
 
     def carry_out(self, raw: Object, actions: tuple[Action, ...]) -> Refusals:
         """Do `actions` for a TrainingJob, in order, and return what was refused; empty if all was done.
@@ -59,6 +65,7 @@ class Acting:
         """
         self._confirm(raw, [each for each in actions if isinstance(each, Create)])
         refused: dict[int | None, ApiError] = {}
+        denied: dict[int | None, ApiError] = {}
         for action in actions:
             replica = None if isinstance(action, Delete) else action.replica
             if replica in refused or (None in refused and isinstance(action, Create)):
@@ -67,6 +74,9 @@ class Acting:
                 self._do(raw, action)
             except ApiError as error:
                 refused[replica] = error
+                if isinstance(action, Create):
+                    denied[replica] = error
+        self._denials.learn((raw["metadata"]["namespace"], raw["metadata"]["name"]), denied)
         return refused
 
     def _confirm(self, raw: Object, creations: list[Create]) -> None:
@@ -111,8 +121,21 @@ class Acting:
             log.info("exists", job=key, kind=kind, name=name)
             if of(obj) == JOBS:
                 self._strangers.meet(key, name)
+            if of(obj) == CONFIG_MAPS:
+                self._see_content(key[0], obj)
             return
         log.info("applied", job=key, kind=kind, name=name)
+
+    def _see_content(self, namespace: str, obj: Object) -> None:
+        """See that a ConfigMap that is there holds what it should: pods would train whatever it says.
+
+        Raises:
+            AlreadyExists: it does not.
+        """
+        name = obj["metadata"]["name"]
+        if self._api.get(CONFIG_MAPS, namespace, name).get("data") != obj["data"]:
+            words = f"ConfigMap {name} is there already, with other content; delete it"
+            raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _patch(self, key: Key, name: str, patch: Object) -> None:
         """Change a Job, if it is the one that was decided about."""

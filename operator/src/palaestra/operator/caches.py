@@ -101,14 +101,19 @@ class Caches:
 
     def trainers(self) -> Collection[Target]:
         """Return the trainers that run now."""
-        pods = self._children[PODS.plural].store.select(None, {})
+        pods = [pod for pod in self._children[PODS.plural].store.select(None, {}) if _trains(pod)]
+        jobs = {job["metadata"]["uid"] for job in self._jobs_of(pods)}
         return [
             Target(
                 key=_parent(pod), uid=pod["metadata"]["uid"], host=pod["status"]["podIP"], port=STATUS_PORT
             )
             for pod in pods
-            if _trains(pod)
+            if jobs & _owners(pod)
         ]
+
+    def _jobs_of(self, pods: list[Object]) -> list[Object]:
+        """Return the Jobs of TrainingJobs that have such pods: a pod is no trainer by its labels alone."""
+        return [job for key in {_parent(pod) for pod in pods} for job in self.children(JOBS, key)]
 
     def _all(self) -> tuple[Reflector, ...]:
         return (self._jobs, *self._children.values())
@@ -125,6 +130,10 @@ class Caches:
 def _parent(child: Object) -> Key:
     metadata = child["metadata"]
     return metadata["namespace"], metadata["labels"][JOB_LABEL]
+
+
+def _owners(obj: Object) -> set[str]:
+    return {each["uid"] for each in obj["metadata"].get("ownerReferences") or ()}
 
 
 def _trains(pod: Object) -> bool:

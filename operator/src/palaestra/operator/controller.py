@@ -64,6 +64,7 @@ class Controller:
         """
         raw = self._caches.training_job(key)
         if raw is None or not managed_here(raw):
+            self._looking.forget(key)
             self._telling.forget(key)
             return None
         now = self._now()

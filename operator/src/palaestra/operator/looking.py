@@ -15,6 +15,7 @@ from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, NETWORK_POLIC
 from palaestra.decide import complete
 from palaestra.observe import Objects, Polled, Raw, Source, SourceKind, observe, references
 from palaestra.operator.caches import Caches
+from palaestra.operator.denials import Denials
 from palaestra.operator.poller import Key
 from palaestra.operator.refusals import Refusals
 from palaestra.operator.strangers import Strangers
@@ -45,6 +46,7 @@ class Looking:
         api: the cluster.
         caches: what is watched.
         strangers: the Jobs of others that were met.
+        denials: what could not be created.
         polled: returns what the trainers said, by the pod's uid.
     """
 
@@ -53,11 +55,13 @@ class Looking:
         api: Api,
         caches: Caches,
         strangers: Strangers,
+        denials: Denials,
         polled: Callable[[], Mapping[str, Polled]],
     ) -> None:
         self._api = api
         self._caches = caches
         self._strangers = strangers
+        self._denials = denials
         self._polled = polled
         self._refusals = Refusals(api)
         self._kueue = (-KUEUE_S, False)
@@ -80,11 +84,17 @@ class Looking:
             policies=self._caches.children(NETWORK_POLICIES, key),
             events=events,
             polled=self._polled(),
+            denied=self._denials.of(key),
             kueue=job.spec.scheduling.queue_name is not None and self._has_kueue(),
         )
         sources = self._sources(job, objects)
         recheck_s = RECHECK_S if sources or strangers else None
         return Seen(objects=replace(objects, sources=sources), again_s=earliest(refused_s, recheck_s))
+
+    def forget(self, key: Key) -> None:
+        """Forget a TrainingJob that is gone."""
+        self._strangers.forget(key)
+        self._denials.forget(key)
 
     def _sources(self, job: TrainingJob, objects: Objects) -> dict[Source, Raw | None]:
         """Return what a job refers to, while something of it is still to be planned."""

@@ -16,6 +16,7 @@ from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
 from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
 from palaestra.operator.controller import Controller
+from palaestra.operator.denials import Denials
 from palaestra.operator.health import HealthServer
 from palaestra.operator.logs import configure_logs
 from palaestra.operator.looking import Looking
@@ -55,11 +56,11 @@ class Operator:
         identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
         self._leadership = Leadership(api, options.operator_namespace, NAME, identity)
         writer = Writer(api, self._leads)
-        strangers = Strangers(api)
+        strangers, denials = Strangers(api), Denials()
         controller = Controller(
             self._caches,
-            Looking(api, self._caches, strangers, self._poller.known),
-            Acting(api, writer, self._caches, strangers),
+            Looking(api, self._caches, strangers, denials, self._poller.known),
+            Acting(api, writer, self._caches, strangers, denials),
             Telling(writer, Recorder(api, instance=identity)),
             _layout(options),
         )

@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
-from palaestra.api.reasons import Reason, say
-from palaestra.cluster import ApiError, Forbidden, Invalid, Recorder
+from palaestra.api.reasons import Reason
+from palaestra.cluster import Recorder
 from palaestra.decide import Decision, Happening, worth_writing
-from palaestra.decide.happenings import happening
 from palaestra.decide.writing import PROGRESS_EVERY_S, as_data
 from palaestra.operator.acting import Refusals
 from palaestra.operator.poller import Key
@@ -38,7 +37,7 @@ class Telling:
     def tell(self, raw: Object, decision: Decision, refusals: Refusals, now: datetime) -> float | None:
         """Write what changed; return seconds until progress that was held back is to be written.
 
-        What was refused was not planned, and is told instead where a person has to act.
+        What was refused was not planned; why is told by the next look, in the status.
 
         Raises:
             Conflict: the job is not as it was when this was decided.
@@ -51,9 +50,6 @@ class Telling:
         for each in decision.events:
             if each.reason != Reason.PLANNED or not refusals.keys() & {None, each.replica}:
                 self._record(raw, each)
-        for replica, refusal in refusals.items():
-            if isinstance(refusal, Forbidden | Invalid):
-                self._record(raw, happening(Reason.PODS_REFUSED, _words(refusal), replica))
         return held_back_s
 
     def _record(self, raw: Object, event: Happening) -> None:
@@ -76,7 +72,3 @@ class Telling:
         """Forget a TrainingJob that is gone."""
         with self._lock:
             self._written.pop(key, None)
-
-
-def _words(refusal: ApiError) -> str:
-    return say(Reason.PODS_REFUSED, words=refusal.message)

@@ -116,6 +116,7 @@ def install_sidecar(replica: Replica) -> Container | None:
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
         # What is in the folder, not the folder: the volume's own times are not ours to set.
         "command": ["sh", "-c", f"cp -a /opt/palaestra/* {target}/"],
+        "terminationMessagePolicy": "FallbackToLogsOnError",
         "securityContext": SECURITY,
         "resources": planned.resources(Resources(), planned.ROS_MASTER),
         "volumeMounts": [{"name": "sidecar", "mountPath": target}],
@@ -150,6 +151,8 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
         "ROS_MASTER_URI": f"http://{LOOPBACK}:{replica.layout.ports.ros_master}",
         "ROS_HOSTNAME": "localhost",
         "ROS_HOME": f"{places.scratch}/ros",
+        # A folder that is there: one that ROS makes it would give the owner of a volume, which is root.
+        "ROS_LOG_DIR": places.scratch,
         "PALAESTRA_CONFIG": f"{places.config}/{FILE}",
         "PALAESTRA_RUN": places.run,
         "OMP_NUM_THREADS": str(threads),

@@ -1,0 +1,54 @@
+"""What was refused is remembered until it was made; what passes by itself is no news."""
+
+import pytest
+
+from palaestra.cluster import Forbidden, Invalid, ServerError, TooManyRequests, Unreachable
+from palaestra.operator.denials import Denials
+
+KEY = ("robots", "job")
+QUOTA = Forbidden(403, "Forbidden", "exceeded quota")
+WEBHOOK = "Internal error occurred: failed calling webhook x"
+
+
+@pytest.mark.parametrize(
+    "error", [QUOTA, Invalid(400, "BadRequest", "denied"), ServerError(500, "InternalError", WEBHOOK)]
+)
+def test_what_a_person_has_to_mend_is_told_until_it_was_made(error):
+    """By replica, in the words of whoever refused."""
+    denials = Denials()
+
+    denials.learn(KEY, {1: error})
+    assert denials.of(KEY) == {1: error.message}
+    denials.learn(KEY, {})
+
+    assert denials.of(KEY) == {}
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        TooManyRequests(429, "TooManyRequests", "busy"),
+        Unreachable(0, "Unreachable", "no answer"),
+        ServerError(500, "InternalError", "etcdserver: leader changed"),
+    ],
+)
+def test_what_passes_by_itself_changes_nothing(error):
+    """Neither is it told, nor is what was told before forgotten."""
+    denials = Denials()
+
+    denials.learn(KEY, {1: error})
+    assert denials.of(KEY) == {}
+    denials.learn(KEY, {1: QUOTA})
+    denials.learn(KEY, {1: error})
+
+    assert denials.of(KEY) == {1: "exceeded quota"}
+
+
+def test_a_job_that_is_gone_is_forgotten():
+    """Memory does not grow with what was."""
+    denials = Denials()
+    denials.learn(KEY, {None: QUOTA})
+
+    denials.forget(KEY)
+
+    assert denials.of(KEY) == {}
