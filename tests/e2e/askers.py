@@ -1,0 +1,71 @@
+"""Pods that ask other pods something over the network, from wherever a test puts them."""
+
+from importlib.metadata import version
+
+from tests.e2e.cluster import CommandFailed, Object
+from tests.e2e.namespace import ASK, Namespace, runs, trains
+
+IMAGE = f"palaestra-stub:{version('palaestra-sim')}"
+CONNECT_S = 3
+RESTRICTED_CONTAINER = {
+    "allowPrivilegeEscalation": False,
+    "capabilities": {"drop": ["ALL"]},
+    "readOnlyRootFilesystem": True,
+}
+RESTRICTED_POD = {"runAsNonRoot": True, "runAsUser": 65532, "seccompProfile": {"type": "RuntimeDefault"}}
+CONNECT = """
+import socket, sys
+socket.create_connection((sys.argv[1], int(sys.argv[2])), timeout=float(sys.argv[3])).close()
+"""
+LISTEN = """
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+ThreadingHTTPServer(("", 9090), SimpleHTTPRequestHandler).serve_forever()
+"""
+
+
+def plain_pod(name: str, labels: dict[str, str] | None = None, **container: object) -> Object:
+    """Return a pod of one small container, which sleeps, in the terms of *restricted*."""
+    return {
+        "apiVersion": "v1",
+        "kind": "Pod",
+        "metadata": {"name": name, "labels": labels or {}},
+        "spec": {
+            "automountServiceAccountToken": False,
+            "terminationGracePeriodSeconds": 1,
+            "securityContext": RESTRICTED_POD,
+            "containers": [
+                {
+                    "name": "main",
+                    "image": IMAGE,
+                    "command": ["sleep", "infinity"],
+                    "resources": {"requests": {"cpu": "5m", "memory": "32Mi"}},
+                    "securityContext": RESTRICTED_CONTAINER,
+                    **container,
+                }
+            ],
+        },
+    }
+
+
+class Asker:
+    """A pod that runs in a namespace until that is deleted; `labels` are its own."""
+
+    def __init__(self, namespace: Namespace, name: str, labels: dict[str, str] | None = None) -> None:
+        self.namespace, self.name, self.labels = namespace, name, labels or {}
+        namespace.create("pods", plain_pod(name, labels))
+        namespace.wait(lambda: trains(namespace.get("pods", name) or {"status": {}}))
+
+    def get(self, pod: Object, port: int, path: str) -> str:
+        """Return what another pod answers over HTTP."""
+        address = f"http://{pod['status']['podIP']}:{port}{path}"
+        return self.namespace.execute(self.name, "python3", "-c", ASK, address, container="main")
+
+    def reaches(self, pod: Object, port: int) -> bool:
+        """Return whether a connection to a port of another pod is answered."""
+        assert runs(pod)
+        where = (pod["status"]["podIP"], str(port), str(CONNECT_S))
+        try:
+            self.namespace.execute(self.name, "python3", "-c", CONNECT, *where, container="main")
+        except CommandFailed:
+            return False
+        return True

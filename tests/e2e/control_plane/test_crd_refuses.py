@@ -1,0 +1,212 @@
+"""What the API server itself refuses: no wrong TrainingJob gets as far as the operator.
+
+Every message names the field; where a rule of ours refuses, it is our sentence, with the remedy.
+"""
+
+import copy
+import itertools
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = sorted((ROOT / "manifests" / "examples").glob("*.yaml"))
+MINIMAL = yaml.safe_load((ROOT / "manifests" / "examples" / "minimal.yaml").read_text())
+FROZEN = "cannot be changed; make a new TrainingJob"
+COLLECT, EVALUATE = {"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}
+numbers = itertools.count(1)
+
+
+def changed(obj, path, value):
+    """Return a copy of an object with another value at a path such as `spec.simulators.0.count`."""
+    whole = copy.deepcopy(obj)
+    *above, last = path.split(".")
+    inside = whole
+    for step in above:
+        inside = inside[int(step)] if isinstance(inside, list) else inside.setdefault(step, {})
+    inside[int(last) if isinstance(inside, list) else last] = value
+    return whole
+
+
+def make_job(**changes):
+    """Return the smallest TrainingJob, with a name of its own and changes by path (`__` for a dot)."""
+    job = changed(MINIMAL, "metadata.name", f"job-{next(numbers)}")
+    for path, value in changes.items():
+        job = changed(job, path.replace("__", "."), value)
+    return job
+
+
+WRONG = [
+    ("metadata.name", "n" * 49, "metadata.name: Too long"),
+    ("metadata.name", "9-lives", "metadata.name"),
+    ("spec.replicas", 0, "spec.replicas: Invalid value: 0"),
+    ("spec.replicas", 101, "spec.replicas: Invalid value: 101"),
+    ("spec.replicas", "two", "spec.replicas: Invalid value"),
+    ("spec.seed", -1, "spec.seed: Invalid value: -1"),
+    ("spec.backoffLimit", -1, "spec.backoffLimit"),
+    ("spec.suspend", "yes", "spec.suspend"),
+    ("spec.activeDeadlineSeconds", 0, "spec.activeDeadlineSeconds"),
+    ("spec.ttlSecondsAfterFinished", -1, "spec.ttlSecondsAfterFinished"),
+    ("spec.steps", 5, 'unknown field "spec.steps"'),
+    ("spec.simulators", [], "spec.simulators"),
+    ("spec.simulators", [COLLECT, COLLECT], "spec.simulators[1]: Duplicate value"),
+    ("spec.simulators", [EVALUATE], "spec.simulators: Invalid value.*none of them collects; add a group"),
+    (
+        "spec.simulators",
+        [COLLECT | {"count": 16}, EVALUATE | {"count": 16}, COLLECT | {"name": "more"}],
+        "more than 32 simulators in one pod; lower the counts or use replicas",
+    ),
+    ("spec.simulators", [COLLECT], "spec.trainer.evaluation.*no simulator evaluates; add a group"),
+    ("spec.simulators.0", {"name": "collect"}, "spec.simulators[0].role: Required value"),
+    ("spec.simulators.0.role", "Eval", "spec.simulators[0].role: Unsupported value"),
+    ("spec.simulators.0.count", 17, "spec.simulators[0].count"),
+    ("spec.simulators.0.name", "Collect_1", "spec.simulators[0].name"),
+    ("spec.simulators.0.name", "c" * 21, "spec.simulators[0].name: Too long"),
+    ("spec.simulators.0.driver", "gazebo", "spec.simulators[0].driver: Unsupported value"),
+    ("spec.simulators.0.image", "two words", "spec.simulators[0].image"),
+    ("spec.simulators.0.command", ["run"], "spec.simulators[0].command.*belongs to driver command"),
+    ("spec.simulators.0.driver", "command", "driver command has no image of its own; name the one"),
+    ("spec.simulators.0.world", {}, "spec.simulators[0].world.*needs exactly one of inline, configMap"),
+    (
+        "spec.simulators.0.world",
+        {"builtin": "arena", "file": "/w.wbt"},
+        "spec.simulators[0].world.*needs exactly one of",
+    ),
+    ("spec.simulators.0.world", {"configMap": {"name": "c"}}, "world.configMap.key: Required value"),
+    ("spec.simulators.0.world", {"builtin": "house"}, "world.builtin: Unsupported value"),
+    ("spec.simulators.0.world", {"file": "../x.wbt"}, "world.file"),
+    ("spec.simulators.0.env", [{"name": "A"}], "env[0].*has both or neither of value and secretKeyRef"),
+    ("spec.simulators.0.env", [{"name": "ROS_IP", "value": "x"}], "env[0].name.*are set by Palaestra"),
+    ("spec.simulators.0.env", [{"name": "A-B", "value": "x"}], "env[0].name"),
+    ("spec.simulators.0.resources", {"requests": {"cpu": "lots"}}, "resources.requests.cpu"),
+    ("spec.trainer.steps", 0, "spec.trainer.steps"),
+    ("spec.trainer.environment.id", "MoveToTarget", "spec.trainer.environment.id"),
+    ("spec.trainer.environment.reward", "Medium", "spec.trainer.environment.reward: Unsupported value"),
+    ("spec.trainer.algorithm.name", "DDPG", "spec.trainer.algorithm.name: Unsupported value"),
+    ("spec.trainer.evaluation", {"stopAtSuccessRate": 0}, "stopAtSuccessRate"),
+    (
+        "spec.trainer.evaluation",
+        {"everySteps": 0, "stopAtSuccessRate": 0.9},
+        "stopAtSuccessRate.*nothing is evaluated while everySteps is 0",
+    ),
+    ("spec.trainer.checkpoint", {"keep": 0}, "spec.trainer.checkpoint.keep"),
+    ("spec.storage", {"size": "much"}, "spec.storage.size"),
+    ("spec.storage", {"ephemeral": True, "existingClaim": "c"}, "ephemeral.*excludes existingClaim; remove"),
+    ("spec.storage", {"resumeFrom": "uid"}, "resumeFrom.*needs existingClaim; name the claim"),
+    (
+        "spec.storage",
+        {"existingClaim": "c", "retain": "Delete"},
+        "retain.*is never deleted with it; use Keep",
+    ),
+    ("spec.network", {"egress": "Half"}, "spec.network.egress: Unsupported value"),
+    ("spec.scheduling", {"tolerations": [{"value": "x"}]}, "tolerations[0].key.*is missing; name the taint"),
+    ("spec.scheduling", {"podLabels": {"palaestra.dev/job": "x"}}, "podLabels.*are set by Palaestra; remove"),
+    ("spec.scheduling", {"podLabels": {"a": "two words"}}, "podLabels"),
+]
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"), WRONG, ids=[f"{path}={value}" for path, value, _ in WRONG]
+)
+def test_a_wrong_manifest_is_refused_with_the_name_of_the_field(create, path, value, message):
+    """By the API server alone: no operator runs here."""
+    code, said = create(changed(make_job(), path, value))
+
+    assert code == 1
+    assert_says(said, message)
+
+
+def test_suspending_a_queued_job_by_hand_is_refused(create):
+    """Two fields that exclude each other: Kueue owns suspension."""
+    code, said = create(make_job(spec__suspend=True, spec__scheduling__queueName="team"))
+
+    assert code == 1
+    assert_says(said, "spec.suspend.*Kueue suspends a job that has a queueName; remove one of them")
+
+
+def test_a_driver_that_is_a_command_needs_one(create):
+    """Named beside the image, which it needs too."""
+    code, said = create(make_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1"))
+
+    assert code == 1
+    assert_says(said, "spec.simulators[0].command.*belongs to driver command, which needs one; set both")
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_every_example_is_accepted(apply, example):
+    """What people copy works."""
+    code, said = apply(*yaml.safe_load_all(example.read_text()))
+
+    assert code == 0, said
+
+
+def test_an_empty_spec_is_accepted_and_completed(apply, defined):
+    """Defaults are the API server's, so that everybody sees them."""
+    job = make_job(spec={})
+    code, said = apply(job)
+    stored = yaml.safe_load(defined.kubectl("get", "tj", job["metadata"]["name"], "-o", "yaml").stdout)
+
+    assert code == 0, said
+    assert stored["spec"]["replicas"] == 1
+    assert [group["role"] for group in stored["spec"]["simulators"]] == ["Collect", "Evaluate"]
+
+
+MAY_CHANGE = [
+    ("spec.suspend", True),
+    ("spec.activeDeadlineSeconds", 60),
+    ("spec.stallDeadlineSeconds", 60),
+    ("spec.ttlSecondsAfterFinished", 60),
+    ("spec.simulators.0.startDeadlineSeconds", 7),
+    ("metadata.labels", {"team": "a"}),
+]
+MAY_NOT_CHANGE = [
+    ("spec.replicas", 2),
+    ("spec.seed", 2),
+    ("spec.backoffLimit", 0),
+    ("spec.managedBy", "example.com/other"),
+    ("spec.simulators", [COLLECT, {"name": "judge", "role": "Evaluate"}]),
+    ("spec.simulators", [COLLECT, EVALUATE, {"name": "more", "role": "Collect"}]),
+    ("spec.simulators.0.count", 2),
+    ("spec.simulators.0.image", "another:1"),
+    ("spec.simulators.0.world", {"file": "/other.wbt"}),
+    ("spec.trainer.steps", 7),
+    ("spec.trainer.algorithm.name", "A2C"),
+    ("spec.storage", {"size": "2Gi"}),
+    ("spec.scheduling", {"queueName": "team"}),
+    ("spec.network", {"egress": "Closed"}),
+]
+
+
+@pytest.mark.parametrize(("path", "value"), MAY_CHANGE, ids=[path for path, _ in MAY_CHANGE])
+def test_what_may_change_changes(apply, path, value):
+    """The whole list of docs/trainingjob.md."""
+    job = make_job()
+    apply(job)
+
+    code, said = apply(changed(job, path, value))
+
+    assert code == 0, said
+    assert "configured" in said
+
+
+@pytest.mark.parametrize(
+    ("path", "value"), MAY_NOT_CHANGE, ids=[f"{path}={value}" for path, value in MAY_NOT_CHANGE]
+)
+def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
+    """A run that changed half-way could not be explained."""
+    job = make_job()
+    apply(job)
+
+    code, said = apply(changed(job, path, value))
+
+    assert code == 1
+    assert_says(said, f"{path.split('.')[1]}.*{FROZEN}")
+
+
+def assert_says(said, message):
+    """Assert that the parts of a message, divided by `.*`, come in this order."""
+    rest = said
+    for part in message.split(".*"):
+        assert part in rest, f"{part!r} is not in {said!r}"
+        rest = rest.partition(part)[2]

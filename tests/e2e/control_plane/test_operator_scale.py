@@ -1,0 +1,161 @@
+"""Two hundred TrainingJobs on one operator: all planned, little memory, and then silence.
+
+The control plane has no nodes, so that only the operator is measured. It runs with the rights of
+manifests/install.yaml and nothing more.
+"""
+
+import os
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+import yaml
+
+from palaestra.cluster import Api, connect
+from palaestra.cluster.resources import (
+    CLAIMS,
+    CONFIG_MAPS,
+    JOBS,
+    LEASES,
+    NAMESPACES,
+    NETWORK_POLICIES,
+    TRAINING_JOBS,
+)
+from tests.control_plane.plane import running
+from tests.control_plane.programs import REQUIRED
+from tests.e2e.control_plane.installed import READS, asked, operator, wait_for
+
+pytestmark = pytest.mark.skipif(
+    os.environ.get(REQUIRED) != "1", reason=f"takes three minutes; set {REQUIRED}=1, as `make e2e` does"
+)
+
+ROOT = Path(__file__).parents[3]
+NAMESPACE = "crowd"
+TRAINING_JOBS_COUNT, REPLICAS = 200, 2
+PLANNED_S = 240
+SETTLED_S, SETTLES_S = 10, 120
+QUIET_S = 60
+MOST_BYTES = 120_000_000
+LABEL = "palaestra.dev/job"
+
+
+@pytest.fixture(scope="module")
+def crowd(tmp_path_factory):
+    """A control plane of its own, with Palaestra installed and two hundred TrainingJobs in it."""
+    with running(tmp_path_factory.mktemp("crowd")) as plane:
+        installed = plane.kubectl("apply", "-f", str(ROOT / "manifests" / "install.yaml"))
+        assert installed.returncode == 0, installed.stderr
+        established = plane.kubectl(
+            "wait", "--for=condition=Established", "crd/trainingjobs.palaestra.dev", "--timeout=30s"
+        )
+        assert established.returncode == 0, established.stderr
+        api = connect(str(plane.kubeconfig))
+        wait_for(lambda: api.serves("palaestra.dev/v1alpha1"), 30, api.version)
+        api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": NAMESPACE}})
+        with ThreadPoolExecutor(8) as pool:
+            list(pool.map(lambda number: create_job(api, number), range(TRAINING_JOBS_COUNT)))
+        yield plane, api
+        api.close()
+
+
+@pytest.fixture(scope="module")
+def settled(crowd, tmp_path_factory):
+    """An operator that has planned them all and found its rest."""
+    plane, api = crowd
+    with operator(plane, tmp_path_factory.mktemp("operator") / "log") as first:
+        wait_for(
+            lambda: count(api, JOBS) == TRAINING_JOBS_COUNT * REPLICAS, PLANNED_S, lambda: count(api, JOBS)
+        )
+        wait_for(lambda: quiet(plane, SETTLED_S), SETTLES_S, lambda: asked(plane)[-5:])
+        yield first
+
+
+def create_job(api: Api, number: int) -> None:
+    """Create the smallest TrainingJob with two replicas."""
+    job = yaml.safe_load((ROOT / "manifests" / "examples" / "minimal.yaml").read_text())
+    job["metadata"] = {"name": f"job-{number:03d}", "namespace": NAMESPACE}
+    job["spec"]["replicas"] = REPLICAS
+    api.within(60).create(TRAINING_JOBS, job)
+
+
+def count(api: Api, resource) -> int:
+    """Return how many objects of a kind were made for TrainingJobs."""
+    return len(api.within(60).list(resource.only_metadata(), NAMESPACE, labels=LABEL))
+
+
+def quiet(plane, seconds):
+    """Whether nothing but watches and the Lease was asked for so long."""
+    before = len([each for each in asked(plane) if each.counts])
+    time.sleep(seconds)  # what is measured is that nothing happens
+    return len([each for each in asked(plane) if each.counts]) == before
+
+
+def test_every_job_gets_what_it_needs_exactly_once(crowd, settled):
+    """By the API server's own record: no name was asked for twice."""
+    plane, api = crowd
+    created = Counter((each.resource, each.name) for each in asked(plane) if each.verb == "create")
+    made = Counter(resource for resource, _ in created if resource != "events")
+
+    assert settled.process.poll() is None
+    assert [count(api, kind) for kind in (JOBS, CONFIG_MAPS, CLAIMS)] == [TRAINING_JOBS_COUNT * REPLICAS] * 3
+    assert count(api, NETWORK_POLICIES) == TRAINING_JOBS_COUNT
+    assert {each.code for each in asked(plane) if each.verb == "create"} == {201}
+    assert set(created.values()) == {1}, made
+
+
+def test_every_job_says_that_it_was_accepted(crowd, settled):
+    """With the generation that was seen."""
+    _, api = crowd
+    jobs = api.list(TRAINING_JOBS, NAMESPACE)
+    accepted = [
+        condition["status"]
+        for job in jobs
+        for condition in job["status"]["conditions"]
+        if condition["type"] == "Accepted"
+    ]
+
+    assert settled.process.poll() is None
+    assert accepted == ["True"] * TRAINING_JOBS_COUNT
+    assert all(job["status"]["observedGeneration"] == job["metadata"]["generation"] for job in jobs)
+
+
+def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
+    """Watches and the Lease aside; by its own metrics and by the API server's record."""
+    plane, _ = crowd
+    told, recorded = settled.requests(), [each for each in asked(plane) if each.counts]
+    time.sleep(QUIET_S)  # what is measured is that nothing happens
+
+    assert settled.requests() - told == Counter()
+    assert [each for each in asked(plane) if each.counts][len(recorded) :] == []
+
+
+def test_the_operator_stays_small(settled):
+    """Everything cached that there is: 200 TrainingJobs and 1,800 objects made for them, pods included."""
+    assert settled.rss_bytes() < MOST_BYTES
+
+
+def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
+    """The work is done, whoever looks: the first ends in two seconds, the second finds nothing to do.
+
+    It has to list all that the first one saw grow, which costs more memory.
+    """
+    plane, api = crowd
+    seconds = settled.end()
+    before = len(asked(plane))
+
+    with operator(plane, tmp_path / "log") as second:
+        wait_for(lambda: leader(api) != "", 30, lambda: leader(api))
+        wait_for(lambda: quiet(plane, SETTLED_S), SETTLES_S, lambda: asked(plane)[-5:])
+
+        assert second.rss_bytes() < MOST_BYTES
+    writes = [each for each in asked(plane)[before:] if each.counts and each.verb not in READS]
+    assert writes == []
+    assert seconds < 2
+
+
+def leader(api: Api) -> str:
+    """Return who holds the operator's Lease; "" for nobody."""
+    leases = api.list(LEASES, "palaestra-system")
+    return next((each["spec"].get("holderIdentity", "") for each in leases), "")

@@ -1,0 +1,33 @@
+"""Small TrainingJobs. Those that train need as much as any; those that only wait fit beside others."""
+
+import copy
+from typing import Any
+
+from tests.e2e.cluster import Object
+from tests.e2e.namespace import example
+
+WAIT = "trap exit TERM; sleep 3600 & wait"
+LITTLE = {"requests": {"cpu": "5m", "memory": "48Mi"}}
+
+
+def make_job(name: str = "tiny", *, script: str = "", simulator: Object | None = None, **spec: Any) -> Object:
+    """Return manifests/examples/tiny.yaml with another `name` and these fields of its spec.
+
+    `script` is bash in the place of the training, with one simulator only. `simulator` are fields of
+    the first group of simulators; a `trainer` given is merged into the example's.
+    """
+    job = example("tiny")
+    job["metadata"]["name"] = name
+    fields = job["spec"]
+    fields["trainer"] |= spec.pop("trainer", {})
+    if script:
+        fields["simulators"] = fields["simulators"][:1]
+        fields["trainer"] |= {
+            "command": ["bash", "-c", script],
+            "evaluation": {"everySteps": 0},
+            "resources": LITTLE,
+        }
+        fields["simulators"][0]["resources"] = LITTLE
+    fields["simulators"][0] |= simulator or {}
+    fields.update(copy.deepcopy(spec))
+    return job

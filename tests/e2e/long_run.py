@@ -1,0 +1,103 @@
+"""One training in full, which goes on beside the other tests, and whose operator is killed meanwhile."""
+
+import random
+import threading
+from typing import Self
+
+from tests.e2e.cluster import CommandFailed, Object
+from tests.e2e.namespace import OPERATOR, SYSTEM, Namespace, example, named, trains
+
+NAME = "move-to-target"
+REPLICAS = 2
+KILLS = 10
+SEED = 20
+GAP_S = (5.0, 40.0)  # between two kills: so short that some hit an operator that has only just begun
+END_S = 900.0
+
+# The operator is process 1 of its container, which no signal from inside can kill, unless the pod
+# shares its process namespace.
+SHARED = {"spec": {"template": {"spec": {"shareProcessNamespace": True}}}}
+KILL = """
+import os, pathlib, signal
+for entry in pathlib.Path("/proc").glob("[0-9]*"):
+    words = (entry / "cmdline").read_bytes().split(b"\\0") if int(entry.name) != os.getpid() else []
+    if b"operator" in words:
+        os.kill(int(entry.name), signal.SIGKILL)
+"""
+
+
+class LongRun:
+    """The long run: `namespace` it is in, and how often its operator was killed: `kills`."""
+
+    def __init__(self, namespace: Namespace) -> None:
+        self.namespace = namespace
+        self.kills = 0
+        self._ended = threading.Event()
+        self._killer = threading.Thread(target=self._kill_again_and_again, daemon=True)
+
+    def __enter__(self) -> Self:
+        """Begin the training, and the killing in the same moment."""
+        make_killable(self.namespace)
+        job = example(NAME)
+        job["spec"]["replicas"] = REPLICAS
+        self.namespace.apply(job)
+        self._killer.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End both."""
+        self._ended.set()
+        self._killer.join(END_S)
+        self.namespace.delete()
+
+    def pods(self) -> list[Object]:
+        """Return the pods once both train."""
+        space = self.namespace
+
+        def training() -> list[Object]:
+            found = [pod for pod in space.pods(NAME) if trains(pod)]
+            steps = [space.trainer_status(named(pod)).get("step", 0) for pod in found]
+            return found if len(found) == REPLICAS and all(steps) else []
+
+        return space.wait(training, 240)
+
+    def end(self) -> Object:
+        """Return its last status."""
+        self.namespace.wait_for_end(NAME, END_S)
+        self._killer.join(END_S)
+        return self.namespace.status(NAME)
+
+    def _kill_again_and_again(self) -> None:
+        moments = random.Random(SEED)
+        while self.kills < KILLS and not self._ended.wait(moments.uniform(*GAP_S)):
+            if kill_operator(self.namespace):
+                self.kills += 1
+
+
+def make_killable(namespace: Namespace) -> None:
+    """Let a test kill the operator as a node does that runs out of memory."""
+    cluster = namespace.cluster
+    cluster.patch("deployments", SYSTEM, OPERATOR, SHARED)
+    cluster.rolled_out(SYSTEM, OPERATOR)
+
+
+def operators(namespace: Namespace) -> list[Object]:
+    """Return the pods of the operator's Deployment whose containers run."""
+    pods = namespace.cluster.select("pods", SYSTEM, "app.kubernetes.io/component=operator")
+    return [pod for pod in pods if trains(pod) and "deletionTimestamp" not in pod["metadata"]]
+
+
+def kill_operator(namespace: Namespace, pod: str = "") -> bool:
+    """Kill an operator with SIGKILL and put a new one in its place; return whether one was there.
+
+    The pod goes too: a container that is killed often is made anew only minutes later.
+    """
+    chosen = pod or next((named(each) for each in operators(namespace)), "")
+    if not chosen:
+        return False
+    try:
+        namespace.cluster.execute(SYSTEM, chosen, "operator", "python3", "-c", KILL)
+    except CommandFailed:  # it was gone already, or is not up yet
+        return False
+    namespace.cluster.delete("pods", SYSTEM, chosen, grace_s=0)
+    return True

@@ -1,0 +1,229 @@
+"""One namespace with the TrainingJobs of one test in it: what is asked there, and what is waited for."""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from tests.e2e.cluster import Cluster, CommandFailed, Object
+
+T = TypeVar("T")
+
+OPERATOR = "palaestra-operator"
+SYSTEM = "palaestra-system"
+EXAMPLES = Path(__file__).parents[2] / "manifests/examples"
+RESTRICTED = {"pod-security.kubernetes.io/enforce": "restricted"}
+LOOK_EVERY_S = 0.5
+SHORT_S, LONG_S = 90.0, 240.0  # for what takes 10 s, and for a tiny training, on a busy machine
+JOB = "palaestra.dev/job"
+
+ASK = """
+import sys, urllib.request
+print(urllib.request.urlopen(sys.argv[1], timeout=10).read().decode())
+"""
+ROS_NODES = """
+import json, os, xmlrpc.client
+master = xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"])
+_, _, (published, _, services) = master.getSystemState("/e2e")
+print(json.dumps(sorted({node for _, nodes in published + services for node in nodes})))
+"""
+
+
+class NeverHeld(AssertionError):
+    """A claim that did not become true in time."""
+
+
+class Namespace:
+    """A namespace that enforces the *restricted* Pod Security Standard, and all that is in it."""
+
+    def __init__(self, cluster: Cluster, name: str, *, there: bool = False) -> None:
+        self.cluster = cluster
+        self.name = name
+        if not there:
+            cluster.create("namespaces", {"metadata": {"name": name, "labels": RESTRICTED}})
+
+    def delete(self) -> None:
+        """Begin to delete it with everything in it."""
+        self.cluster.delete("namespaces", None, self.name)
+
+    def apply(self, job: Object) -> Object:
+        """Create a TrainingJob; return it as it was accepted."""
+        return self.create("trainingjobs", job)
+
+    def create(self, kind: str, content: Object) -> Object:
+        """Create an object here."""
+        metadata = {**content["metadata"], "namespace": self.name}
+        return self.cluster.create(kind, {**content, "metadata": metadata})
+
+    def get(self, kind: str, name: str) -> Object | None:
+        """Return an object of here, None when there is none."""
+        return self.cluster.get(kind, self.name, name)
+
+    def select(self, kind: str, job: str = "") -> list[Object]:
+        """Return the objects of a kind, of one TrainingJob or all."""
+        return self.cluster.select(kind, self.name, f"{JOB}={job}" if job else "")
+
+    def patch(self, name: str, **spec: Any) -> Object:
+        """Change fields of a TrainingJob's spec."""
+        return self.cluster.patch("trainingjobs", self.name, name, {"spec": spec})
+
+    def status(self, name: str) -> Object:
+        """Return the status of a TrainingJob, empty before it has one."""
+        found = self.get("trainingjobs", name) or {}
+        status: Object = found.get("status", {})
+        return status
+
+    def replica(self, name: str, index: int = 0) -> Object:
+        """Return what the status says of a replica, empty before it says anything."""
+        replicas = self.status(name).get("replicas", [])
+        return next((each for each in replicas if each["index"] == index), {})
+
+    def condition(self, name: str, kind: str) -> Object:
+        """Return a condition of a TrainingJob, empty before it has it."""
+        conditions = self.status(name).get("conditions", [])
+        return next((each for each in conditions if each["type"] == kind), {})
+
+    def holds(self, name: str, kind: str) -> bool:
+        """Return whether a condition of a TrainingJob is true."""
+        return self.condition(name, kind).get("status") == "True"
+
+    def reasons(self, name: str) -> set[str]:
+        """Return every reason that its true conditions and its replicas give."""
+        status = self.status(name)
+        conditions = [each for each in status.get("conditions", []) if each["status"] == "True"]
+        return {each["reason"] for each in [*conditions, *status.get("replicas", [])] if each.get("reason")}
+
+    def pods(self, name: str, *, live: bool = True) -> list[Object]:
+        """Return the pods of a TrainingJob that run, oldest first; all of them when not `live`."""
+        found = sorted(self.select("pods", name), key=lambda pod: pod["metadata"]["creationTimestamp"])
+        return [pod for pod in found if not live or runs(pod)]
+
+    def pods_made(self, name: str) -> int:
+        """Return how many pods the job controller tells to have made for a TrainingJob's Jobs."""
+        made = [
+            each
+            for each in self.select("events")
+            if each["reason"] == "SuccessfulCreate"
+            and each["involvedObject"]["kind"] == "Job"
+            and each["involvedObject"]["name"].rpartition("-")[0] == name
+        ]
+        return sum(each.get("count") or 1 for each in made)
+
+    def events(self, name: str, reason: str) -> list[str]:
+        """Return the messages of the events about a TrainingJob that have a reason."""
+        about = {"kind": "TrainingJob", "name": name}
+        return [
+            each["message"]
+            for each in self.select("events")
+            if about.items() <= each["involvedObject"].items() and each["reason"] == reason
+        ]
+
+    def execute(self, pod: str, *command: str, container: str = "trainer") -> str:
+        """Run a command in a container of a pod; return its standard output."""
+        return self.cluster.execute(self.name, pod, container, *command)
+
+    def fetch(self, pod: str, address: str, *, container: str = "trainer") -> str:
+        """Return what an address answers to a container of a pod."""
+        return self.execute(pod, "python3", "-c", ASK, address, container=container)
+
+    def trainer_status(self, pod: str) -> Object:
+        """Return what the trainer of a pod says of itself, empty while it does not answer."""
+        try:
+            status: Object = json.loads(self.fetch(pod, "http://127.0.0.1:9090/status"))
+        except CommandFailed:
+            return {}
+        return status
+
+    def ros_nodes(self, pod: str) -> set[str]:
+        """Return the names that a pod's ROS master knows."""
+        return set(json.loads(self.execute(pod, "python3", "-c", ROS_NODES)))
+
+    def in_run(self, pod: str, name: str) -> list[Object]:
+        """Return the JSON lines of a file in a pod's run directory."""
+        text = self.execute(pod, "bash", "-c", f"cat $PALAESTRA_RUN/{name}")
+        return [json.loads(line) for line in text.splitlines()]
+
+    def wait(self, claim: Callable[[], T], within_s: float = SHORT_S) -> T:
+        """Return the first true value of `claim`.
+
+        Raises:
+            NeverHeld: there was none in time.
+        """
+        give_up = time.monotonic() + within_s
+        while not (value := claim()):
+            if time.monotonic() > give_up:
+                raise NeverHeld(f"not within {within_s:.0f} s: {_source(claim)}")
+            time.sleep(LOOK_EVERY_S)
+        return value
+
+    def wait_for_end(self, name: str, within_s: float = LONG_S) -> str:
+        """Wait until a TrainingJob has ended; return its phase."""
+        ends = {"Succeeded", "Failed"}
+        return self.wait(lambda: {self.status(name).get("phase", "")} & ends, within_s).pop()
+
+    def wait_for_pod(self, name: str, within_s: float = SHORT_S) -> str:
+        """Wait until the trainer of a TrainingJob's only pod runs; return the pod's name."""
+        return self.wait(lambda: next((named(pod) for pod in self.pods(name) if trains(pod)), ""), within_s)
+
+    def wait_for_step(self, name: str, step: int, within_s: float = LONG_S) -> str:
+        """Wait until the trainer of the only pod says to have passed a step; return the pod's name."""
+
+        def passed() -> str:
+            pods = [named(pod) for pod in self.pods(name) if trains(pod)]
+            return next((pod for pod in pods if self.trainer_status(pod).get("step", 0) >= step), "")
+
+        return self.wait(passed, within_s)
+
+    def dump(self) -> str:
+        """Return what a person needs who asks why a claim never held."""
+        parts = [
+            yaml.safe_dump(_plain(self.select("trainingjobs"))),
+            yaml.safe_dump(_plain(self.select("jobs"))),
+            self.cluster.kubectl("get", "pods,pvc,configmaps,networkpolicies", "-o=wide", "-n", self.name),
+            self.cluster.kubectl("get", "events", "--sort-by=.lastTimestamp", "-n", self.name),
+        ]
+        logs = ["logs", "--all-containers", "--prefix", "--ignore-errors", "--tail=25"]
+        parts += [self.cluster.kubectl(*logs, "-n", self.name, named(pod)) for pod in self.select("pods")]
+        parts += [self.cluster.kubectl("get", "pods", "-n", SYSTEM)]
+        parts += [self.cluster.kubectl("logs", f"deploy/{OPERATOR}", "--tail=60", "-n", SYSTEM)]
+        return "\n".join(parts)
+
+
+def named(content: Object) -> str:
+    """Return the name of an object."""
+    name: str = content["metadata"]["name"]
+    return name
+
+
+def runs(pod: Object) -> bool:
+    """Return whether a pod has not ended, and nobody has deleted it."""
+    ended = pod["status"].get("phase") in {"Succeeded", "Failed"}
+    return not ended and "deletionTimestamp" not in pod["metadata"]
+
+
+def trains(pod: Object) -> bool:
+    """Return whether a pod's trainer container runs."""
+    return any("running" in each["state"] for each in pod["status"].get("containerStatuses", []))
+
+
+def example(name: str) -> Object:
+    """Return a TrainingJob of manifests/examples."""
+    job: Object = yaml.safe_load((EXAMPLES / f"{name}.yaml").read_text())
+    return job
+
+
+def _plain(objects: list[Object]) -> list[Object]:
+    """Return objects without what only servers read, and without what the pods show as well."""
+    for each in objects:
+        each["metadata"].pop("managedFields", None)
+        each["spec"].pop("template", None)
+    return objects
+
+
+def _source(claim: Callable[[], object]) -> str:
+    code = claim.__code__
+    line = Path(code.co_filename).read_text().splitlines()[code.co_firstlineno - 1].strip()
+    return f"{line} ({Path(code.co_filename).name}:{code.co_firstlineno})"

@@ -1,0 +1,132 @@
+"""What is left of a TrainingJob that is deleted, and of one whose objects are."""
+
+import pytest
+
+from tests.e2e.jobs import WAIT, make_job
+from tests.e2e.namespace import LONG_S, named
+
+pytestmark = pytest.mark.timeout(400)
+
+GONE = ("trainingjobs", "jobs", "pods", "configmaps", "networkpolicies")
+NOWHERE = {"nodeSelector": {"palaestra.dev/nowhere": "true"}}
+
+
+def _pending(namespace, name):
+    return namespace.replica(name).get("reason") == "Unschedulable"
+
+
+def _starting(namespace, name):
+    return namespace.pods(name) and namespace.status(name).get("phase")
+
+
+def _running(namespace, name):
+    return namespace.status(name).get("phase") == "Running"
+
+
+def _suspended(namespace, name):
+    return namespace.holds(name, "Suspended") and namespace.select("jobs", name)
+
+
+def _succeeded(namespace, name):
+    return namespace.holds(name, "Succeeded")
+
+
+def _failed(namespace, name):
+    return namespace.holds(name, "Failed")
+
+
+PHASES = {
+    "pending": (_pending, {"script": WAIT, "scheduling": NOWHERE}),
+    "starting": (_starting, {"script": WAIT}),
+    "running": (_running, {"script": WAIT}),
+    "suspended": (_suspended, {"script": WAIT, "suspend": True}),
+    "succeeded": (_succeeded, {"script": "exit 0"}),
+    "failed": (_failed, {"script": "exit 2"}),
+}
+
+
+@pytest.fixture(scope="module")
+def uids(shared):
+    """The jobs of all phases, by name, so that they get there side by side."""
+    return {
+        phase: shared.apply(make_job(phase, **spec))["metadata"]["uid"]
+        for phase, (_, spec) in PHASES.items()
+        if phase != "starting"  # a phase that is over too soon to be met later
+    }
+
+
+@pytest.mark.parametrize("phase", PHASES)
+def test_deleted_while_it_is(phase, uids, shared):
+    """Nothing is left but the volume, and nothing of ours holds up the deletion."""
+    reached, spec = PHASES[phase]
+    uid = uids.get(phase) or shared.apply(make_job(phase, **spec))["metadata"]["uid"]
+    shared.wait(lambda: reached(shared, phase), LONG_S)
+    assert "finalizers" not in shared.get("trainingjobs", phase)["metadata"]
+
+    shared.cluster.delete("trainingjobs", shared.name, phase)
+
+    shared.wait(lambda: not any(_left(shared, kind, phase) for kind in GONE), 30)
+    claims = shared.select("persistentvolumeclaims", phase)
+    assert [named(claim) for claim in claims] == [f"{phase}-0-{uid}"]
+
+
+def _left(namespace, kind, name):
+    if kind == "trainingjobs":
+        return namespace.get(kind, name)
+    return namespace.select(kind, name)
+
+
+def test_a_new_job_of_the_same_name_leaves_the_old_volume_alone(namespace, job):
+    """The claim has the job's uid: a run is never gone on with by accident."""
+    leaves = "touch /var/lib/palaestra/mark"
+    finds = "test -w /var/lib/palaestra && test ! -e /var/lib/palaestra/mark"
+    namespace.apply(job("again", script=leaves, backoffLimit=0))
+    assert namespace.wait_for_end("again", LONG_S) == "Succeeded"
+    (old,) = namespace.select("persistentvolumeclaims", "again")
+    namespace.cluster.delete("trainingjobs", namespace.name, "again")
+    namespace.wait(lambda: namespace.get("trainingjobs", "again") is None)
+
+    namespace.apply(job("again", script=finds, backoffLimit=0))
+
+    assert namespace.wait_for_end("again", LONG_S) == "Succeeded"
+    claims = {named(claim): claim["metadata"]["uid"] for claim in namespace.select("persistentvolumeclaims")}
+    assert len(claims) == 2
+    assert claims[named(old)] == old["metadata"]["uid"]
+
+
+def test_a_claim_that_is_not_to_be_kept_goes_with_its_job(namespace, job):
+    """`retain: Delete` gives it an owner."""
+    namespace.apply(job("forgets", script="exit 0", storage={"retain": "Delete"}))
+    assert namespace.wait_for_end("forgets", LONG_S) == "Succeeded"
+    assert len(namespace.select("persistentvolumeclaims", "forgets")) == 1
+
+    namespace.cluster.delete("trainingjobs", namespace.name, "forgets")
+
+    namespace.wait(lambda: namespace.select("persistentvolumeclaims", "forgets") == [])
+
+
+def test_a_finished_replica_whose_job_is_deleted_is_not_trained_again(namespace, job):
+    """A replica is terminal once its status says so, whatever is deleted."""
+    namespace.apply(job("done", script="exit 0"))
+    assert namespace.wait_for_end("done", LONG_S) == "Succeeded"
+    namespace.cluster.delete("jobs", namespace.name, "done-0")
+    namespace.wait(lambda: namespace.select("pods", "done") == [] and not namespace.select("jobs", "done"))
+
+    # A change and another job's whole life: the operator has looked at everything meanwhile.
+    namespace.patch("done", ttlSecondsAfterFinished=100_000)
+    namespace.apply(job("later", script="exit 0"))
+    assert namespace.wait_for_end("later", LONG_S) == "Succeeded"
+
+    assert namespace.select("jobs", "done") == []
+    assert namespace.status("done")["phase"] == "Succeeded"
+    assert namespace.pods_made("done") == 1
+
+
+def test_a_job_is_deleted_when_its_time_is_over(namespace, job):
+    """`ttlSecondsAfterFinished` deletes the TrainingJob and, with it, all but the volume."""
+    namespace.apply(job("short", script="exit 0", ttlSecondsAfterFinished=3))
+
+    namespace.wait(lambda: namespace.get("trainingjobs", "short") is None, LONG_S)
+
+    namespace.wait(lambda: not any(_left(namespace, kind, "short") for kind in GONE))
+    assert len(namespace.select("persistentvolumeclaims", "short")) == 1

@@ -1,0 +1,85 @@
+"""How a trainer's end is read: each row of the podFailurePolicy, and what it leaves in the status."""
+
+import pytest
+
+from tests.e2e.jobs import make_job
+from tests.e2e.namespace import LONG_S, named
+
+pytestmark = pytest.mark.timeout(600)
+
+INTERRUPTED_ONCE = (
+    "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen; exit 75"
+)
+MOST_IGNORED = 10  # more pods than that without a step are not borne
+GIVEN_UP = {
+    "refuses": (2, "ConfigurationRefused"),
+    "spent": (80, "FaultBudgetSpent"),
+    "diverged": (81, "Diverged"),
+}
+
+
+@pytest.fixture(scope="module")
+def ends(shared):
+    """The namespace with a job for each row, so that their pods wait side by side."""
+    for name, (code, _) in GIVEN_UP.items():
+        shared.apply(make_job(name, script=f"exit {code}"))
+    shared.apply(make_job("fails", script="exit 70", backoffLimit=2))
+    shared.apply(make_job("interrupted", script=INTERRUPTED_ONCE, backoffLimit=0))
+    shared.apply(make_job("stalls", script="exit 82", backoffLimit=0))
+    return shared
+
+
+@pytest.mark.parametrize("name", GIVEN_UP)
+def test_a_trainer_that_says_so_is_not_tried_again(ends, name):
+    """Wrong configuration, spent fault budget, diverged: a second pod would come to the same."""
+    code, reason = GIVEN_UP[name]
+
+    assert ends.wait_for_end(name, LONG_S) == "Failed"
+    assert ends.replica(name)["reason"] == reason
+    assert f"exit code {code}" in ends.replica(name)["message"]
+    assert ends.pods_made(name) == 1
+
+
+def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(ends):
+    """Limit n: n failures are tried again, so n + 1 pods, which are attempts 1 to n + 1."""
+    assert ends.wait_for_end("fails", LONG_S) == "Failed"
+
+    replica = ends.replica("fails")
+    pods = [named(pod) for pod in ends.pods("fails", live=False)]
+    assert ends.pods_made("fails") == len(pods) == 3
+    assert replica["attempt"] == 3
+    assert replica["pod"]["name"] == pods[-1]
+    assert replica["reason"] == "BackoffLimitSpent"
+    assert replica["restarts"]["trainer"] == 2
+    retried = " ".join(each for each in ends.events("fails", "Retrying"))
+    assert pods[0] in retried
+    assert pods[1] in retried
+
+
+def test_a_stalled_trainer_counts_against_the_limit(ends):
+    """It may be tried again, and with a limit of 0 it is not."""
+    assert ends.wait_for_end("stalls", LONG_S) == "Failed"
+    assert ends.pods_made("stalls") == 1
+
+
+def test_an_interrupted_trainer_is_tried_again_and_not_counted(ends):
+    """Exit 75 after a checkpoint: with a backoffLimit of 0 it still goes on, on the same volume."""
+    assert ends.wait_for_end("interrupted", LONG_S) == "Succeeded"
+    assert ends.pods_made("interrupted") == 2
+    assert ends.replica("interrupted")["restarts"]["trainer"] == 0
+
+
+@pytest.mark.comes_late
+@pytest.mark.timeout(900)
+def test_a_trainer_that_is_always_interrupted_is_stopped(always_interrupted):
+    """Kubernetes sets no bound to pods whose failure is ignored, so the operator does."""
+    space = always_interrupted
+
+    assert space.wait_for_end("always", 800) == "Failed"
+
+    assert space.replica("always")["reason"] == "NoProgress"
+    assert 1 < space.pods_made("always") <= MOST_IGNORED
+    space.wait(lambda: space.pods("always") == [])
+    (job,) = space.select("jobs", "always")
+    assert job["metadata"]["annotations"]["palaestra.dev/stopped"].startswith("NoProgress: ")
+    assert any(each["type"] == "Failed" and each["status"] == "True" for each in job["status"]["conditions"])

@@ -1,0 +1,117 @@
+"""move-to-target with two replicas, from `kubectl apply` to a policy, as the README promises it."""
+
+import json
+
+import pytest
+import yaml
+
+from palaestra_sim.world import robots
+from tests.e2e.long_run import KILLS, NAME, REPLICAS
+from tests.e2e.namespace import LONG_S, named
+
+pytestmark = pytest.mark.timeout(1200)
+
+
+def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
+    """The paper's one limitation: a world with fixed names allows one simulator only."""
+    pods = long_run.pods()
+    seen = [{node for node in long_run.namespace.ros_nodes(named(pod)) if "robotino" in node} for pod in pods]
+
+    generated = [
+        f"/{robot.ros_name}"
+        for content in long_run.namespace.select("configmaps", NAME)
+        for file, world in content["data"].items()
+        if file.endswith(".wbt")
+        for robot in robots(world.encode())
+    ]
+    assert len(generated) == len(set(generated)) == REPLICAS * 2
+    assert len(seen) == REPLICAS
+    assert set().union(*seen) <= set(generated)
+    assert seen[0].isdisjoint(seen[1])
+    assert all(seen), "a master knows the robots of its own pod"
+
+
+def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
+    """From the monitoring namespace and over the pods' network, by the ports that the pods name."""
+    for pod in long_run.pods():
+        containers = [*pod["spec"]["initContainers"], *pod["spec"]["containers"]]
+        ports = {p["name"]: p["containerPort"] for each in containers for p in each.get("ports", [])}
+        scraped = {name: monitor.get(pod, port, "/metrics") for name, port in ports.items()}
+
+        assert scraped.keys() == {"metrics", "sim-0", "sim-1"}
+        assert "palaestra_trainer_steps " in scraped["metrics"]
+        assert 'palaestra_simulator_state{state="ready"}' in scraped["sim-0"]
+        assert "palaestra_simulator_starts_total" in scraped["sim-1"]
+
+
+def test_the_status_tells_where_each_replica_stands(long_run):
+    """Asked of the trainers over the pods' network, though the operator is killed meanwhile."""
+    long_run.pods()
+    space = long_run.namespace
+
+    def told():
+        replicas = space.status(NAME).get("replicas", [])
+        return replicas if len(replicas) == REPLICAS and all(each.get("step") for each in replicas) else []
+
+    for replica in space.wait(told, LONG_S):
+        assert replica["phase"] == "Running"
+        assert replica["target"] == 50_000
+        assert {each["name"]: each["role"] for each in replica["simulators"]} == {
+            "collect-0": "Collect",
+            "evaluate-0": "Evaluate",
+        }
+
+
+@pytest.mark.comes_late
+def test_two_replicas_train_to_the_end_though_the_operator_is_killed_ten_times(long_run):
+    """SIGKILL at random moments, of which the pods notice nothing: one pod a replica, the same end."""
+    status = long_run.end()
+    space = long_run.namespace
+
+    assert status["phase"] == "Succeeded", status
+    assert long_run.kills == KILLS
+    assert status["successRate"] >= 0.9
+    assert status["running"] == f"{REPLICAS}/{REPLICAS}"
+    for replica in status["replicas"]:
+        assert replica["phase"] == "Succeeded"
+        assert replica["attempt"] == 1
+        assert replica["step"] == replica["lastCheckpoint"]["step"] == 50_000
+        assert replica["restarts"]["trainer"] == replica["restarts"]["disruption"] == 0
+    assert len(space.pods(NAME, live=False)) == space.pods_made(NAME) == REPLICAS
+    assert space.holds(NAME, "Succeeded")
+    assert not space.holds(NAME, "Running")
+
+
+@pytest.mark.comes_late
+def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
+    """The final truth does not hang on having been asked in time."""
+    long_run.end()
+
+    for pod in long_run.namespace.pods(NAME, live=False):
+        ended = pod["status"]["containerStatuses"][0]["state"]["terminated"]
+        assert ended["exitCode"] == 0
+        assert json.loads(ended["message"])["step"] == 50_000
+
+
+@pytest.mark.comes_late
+def test_kubectl_shows_a_job_in_one_line(long_run):
+    """Status, Replicas, Step, Success and Age are what a person looks for first."""
+    status = long_run.end()
+    cluster, space = long_run.namespace.cluster, long_run.namespace
+
+    header, line = cluster.kubectl("get", "tj", NAME, "-n", space.name).splitlines()
+
+    assert header.split() == ["NAME", "STATUS", "REPLICAS", "STEP", "SUCCESS", "AGE"]
+    assert line.split()[:4] == [NAME, "Succeeded", "2/2", "50000"]
+    assert float(line.split()[4]) == pytest.approx(status["successRate"])
+
+
+@pytest.mark.comes_late
+def test_what_was_run_stands_in_the_config_maps(long_run):
+    """Anyone can read the resolved job and the generated worlds of a replica, after its end too."""
+    long_run.end()
+    contents = long_run.namespace.select("configmaps", NAME)
+
+    seeds = {yaml.safe_load(each["data"]["training.yaml"])["seed"] for each in contents}
+    assert seeds == {1, 2}
+    assert all(each["immutable"] for each in contents)

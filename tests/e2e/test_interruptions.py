@@ -1,0 +1,58 @@
+"""A run that is interrupted goes on from its last checkpoint, whoever interrupts it."""
+
+import pytest
+
+from tests.e2e.namespace import LONG_S, SHORT_S, named
+
+pytestmark = [pytest.mark.trains, pytest.mark.timeout(600)]
+
+EVERY_STEPS = 100
+STEPS = 1200
+AMID = 350
+
+
+def suspend(namespace, name, pod):
+    """Suspend the job until its pod is gone, and resume it."""
+    namespace.patch(name, suspend=True)
+    namespace.wait(lambda: namespace.get("pods", pod) is None)
+    namespace.wait(lambda: namespace.holds(name, "Suspended"))
+    assert namespace.status(name)["phase"] == "Suspended"
+    namespace.patch(name, suspend=False)
+
+
+def delete(namespace, name, pod):  # noqa: ARG001 - each interruption is called alike
+    """Delete the pod, as a person does."""
+    namespace.cluster.delete("pods", namespace.name, pod)
+
+
+def evict(namespace, name, pod):  # noqa: ARG001
+    """Ask for the pod, as a drain of its node does."""
+    namespace.cluster.evict(namespace.name, pod)
+
+
+@pytest.mark.parametrize(
+    ("interrupt", "counted"), [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption")]
+)
+def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace, job):
+    """Written on the way out, so nothing is lost; never more than one interval if it is not."""
+    training = {"steps": STEPS, "checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
+    namespace.apply(job("amid", trainer=training, backoffLimit=0))
+    first = namespace.wait_for_step("amid", AMID)
+    before = namespace.trainer_status(first)["step"]
+
+    interrupt(namespace, "amid", first)
+    namespace.wait(lambda: namespace.get("pods", first) is None, SHORT_S)
+    second = namespace.wait_for_step("amid", 1)
+    after = namespace.trainer_status(second)["step"]
+    attempts = namespace.in_run(second, "attempts.jsonl")
+
+    resumed_at = int(attempts[1]["reason"].removeprefix("resumed at step "))
+    assert second != first
+    assert after >= resumed_at >= before - EVERY_STEPS
+    assert len(attempts) == 2
+    assert namespace.wait_for_end("amid", LONG_S) == "Succeeded"
+    replica = namespace.replica("amid")
+    assert replica["step"] == STEPS
+    assert replica["attempt"] == 2
+    assert replica["restarts"] == {"trainer": 0, "simulator": 0, "disruption": 0, "suspension": 0, counted: 1}
+    assert [named(pod) for pod in namespace.pods("amid", live=False)] == [second]

@@ -1,0 +1,137 @@
+"""Who reaches the ports of a training pod: tried where the cluster sees to it, and computed everywhere."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import pytest
+
+from tests.e2e.askers import LISTEN, Asker, plain_pod
+from tests.e2e.jobs import WAIT
+from tests.e2e.namespace import LONG_S, SYSTEM, named, trains
+
+pytestmark = pytest.mark.timeout(400)
+
+STATUS, HEALTH, CONTROL, MASTER = 9090, 7200, 7100, 11311
+OPEN = {STATUS, HEALTH, HEALTH + 31}
+CLOSED = {CONTROL, MASTER, HEALTH - 1, HEALTH + 100}
+VERDICT = re.compile(r"IS ALLOWED\?\s*\|\s*(TRUE|FALSE)")
+DENY_ALL = {"metadata": {"name": "deny"}, "spec": {"podSelector": {}, "policyTypes": ["Ingress"]}}
+
+
+@pytest.fixture
+def pod(namespace, job):
+    """A pod in training, with a NetworkPolicy."""
+    namespace.apply(job("guarded", script=WAIT))
+    return namespace.get("pods", namespace.wait_for_pod("guarded", LONG_S))
+
+
+@pytest.fixture(scope="session")
+def enforced(shared_listener, monitor):
+    """Whether the cluster enforces NetworkPolicies at all, found out with a policy that denies all."""
+    space, listener = shared_listener
+    space.wait(lambda: monitor.reaches(listener, STATUS))
+    space.create("networkpolicies", DENY_ALL)
+    try:
+        return bool(space.wait(lambda: not monitor.reaches(listener, STATUS), 10))
+    except AssertionError:
+        return False
+
+
+@pytest.fixture(scope="session")
+def shared_listener(make_namespace):
+    """A pod that listens, in a namespace where nothing else does."""
+    space = make_namespace("control")
+    space.create("pods", plain_pod("listens", command=["python3", "-c", LISTEN]))
+    space.wait(lambda: trains(space.get("pods", "listens")))
+    return space, space.get("pods", "listens")
+
+
+def test_ros_and_control_are_on_loopback_and_metrics_are_not(pod, monitor):
+    """ROS 1 has no authentication; whatever a cluster's network does, nobody outside speaks it."""
+    assert monitor.reaches(pod, HEALTH)
+    assert not monitor.reaches(pod, CONTROL)
+    assert not monitor.reaches(pod, MASTER)
+
+
+def test_no_stranger_reaches_a_training_pod(pod, namespace, make_namespace, monitor, enforced):
+    """Neither another namespace nor a pod beside it, even one that wears the operator's label."""
+    if not enforced:
+        pytest.skip("this cluster's network enforces no NetworkPolicy: the control pod was reached")
+    beside = Asker(namespace, "beside")
+    elsewhere = Asker(make_namespace("strangers"), "elsewhere", {"palaestra.dev/operator": "true"})
+
+    assert monitor.reaches(pod, HEALTH)
+    assert not beside.reaches(pod, HEALTH)
+    assert not elsewhere.reaches(pod, HEALTH)
+
+
+def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, namespace, tmp_path):
+    """By cyclonus, which was written to test networks' own reading of policies: not by our reading."""
+    operator = namespace.cluster.select("pods", SYSTEM, "app.kubernetes.io/component=operator")[0]
+    labels = operator["metadata"]["labels"]
+    admitted = [peer(SYSTEM, labels), peer("monitoring", {}), peer("monitoring", {"any": "thing"})]
+    strangers = [
+        peer("default", {}),
+        peer("default", labels),
+        peer(SYSTEM, {}),
+        peer(namespace.name, {}),
+        peer(namespace.name, labels),
+        peer(namespace.name, {"palaestra.dev/job": "another"}),
+        {"IP": "198.51.100.7"},
+    ]
+    target = peer(namespace.name, pod["metadata"]["labels"])
+    asked = [(who, port) for who in [*admitted, *strangers] for port in sorted(OPEN | CLOSED)]
+
+    verdicts = evaluate(namespace, tmp_path, [traffic(who, target, port) for who, port in asked])
+
+    assert verdicts == [who in admitted and port in OPEN for who, port in asked]
+
+
+def test_a_job_may_close_the_way_out(namespace, job, tmp_path):
+    """With `egress: Closed` the pods call nobody; who may call them stays as it was."""
+    namespace.apply(job("closed", script=WAIT, network={"egress": "Closed"}))
+    closed = namespace.get("pods", namespace.wait_for_pod("closed", LONG_S))
+    inside = peer(namespace.name, closed["metadata"]["labels"])
+    outside, monitoring = {"IP": "198.51.100.7"}, peer("monitoring", {})
+    asked = [
+        traffic(inside, outside, 443),
+        traffic(inside, monitoring, 80),
+        traffic(monitoring, inside, STATUS),
+    ]
+
+    assert evaluate(namespace, tmp_path, asked) == [False, False, True]
+
+
+def peer(namespace, labels):
+    """Return a pod as cyclonus takes it."""
+    own = {"kubernetes.io/metadata.name": namespace}
+    return {
+        "Internal": {"Namespace": namespace, "NamespaceLabels": own, "PodLabels": labels},
+        "IP": "198.18.0.9",
+    }
+
+
+def traffic(source, destination, port):
+    """Return a connection as cyclonus takes it."""
+    return {"Source": source, "Destination": destination, "ResolvedPort": port, "Protocol": "TCP"}
+
+
+def evaluate(namespace, folder, asked):
+    """Return for each connection whether the namespace's policies, as the API server has them, allow it."""
+    cyclonus = shutil.which("cyclonus")
+    assert cyclonus, "cyclonus is not on the PATH; `tests/cluster/programs.sh cyclonus` builds it"
+    policies = namespace.select("networkpolicies")
+    assert policies
+    for each in policies:
+        each.pop("status", None)
+        each |= {"apiVersion": "networking.k8s.io/v1", "kind": "NetworkPolicy"}
+        (folder / "policies").mkdir(exist_ok=True)
+        (folder / "policies" / f"{named(each)}.yaml").write_text(json.dumps(each))
+    (folder / "traffic.json").write_text(json.dumps(asked))
+    command = [cyclonus, "analyze", "--mode=query-traffic", f"--policy-path={folder / 'policies'}"]
+    ended = subprocess.run(
+        [*command, f"--traffic-path={folder / 'traffic.json'}"], capture_output=True, text=True, check=True
+    )
+    return [verdict == "TRUE" for verdict in VERDICT.findall(ended.stdout)]

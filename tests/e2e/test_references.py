@@ -1,0 +1,52 @@
+"""A TrainingJob opens nothing that its author could not open before: what it names must be for jobs."""
+
+import pytest
+
+from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
+
+pytestmark = pytest.mark.timeout(400)
+
+SECRETS_ROLE = "palaestra-job-secrets"
+FOR_JOBS = {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}}
+CLAIM = {
+    "metadata": {"name": "kept"},
+    "spec": {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "64Mi"}}},
+}
+
+
+@pytest.fixture
+def secrets_readable(namespace):
+    """The operator can read no Secret until somebody lets it, namespace by namespace."""
+    role = {"apiGroup": "rbac.authorization.k8s.io", "kind": "ClusterRole", "name": SECRETS_ROLE}
+    subject = {"kind": "ServiceAccount", "name": OPERATOR, "namespace": SYSTEM}
+    binding = {"metadata": {"name": SECRETS_ROLE}, "roleRef": role, "subjects": [subject]}
+    namespace.create("rolebindings", binding)
+
+
+def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
+    """Otherwise whoever may write TrainingJobs could write on everybody's volumes."""
+    namespace.apply(job("writes", script="touch /var/lib/palaestra/mark", storage={"existingClaim": "kept"}))
+    namespace.wait(lambda: namespace.condition("writes", "Accepted").get("reason") == "ClaimMissing")
+
+    namespace.create("persistentvolumeclaims", CLAIM)
+    namespace.wait(lambda: namespace.condition("writes", "Accepted").get("reason") == "ClaimNotForJobs")
+    assert namespace.select("jobs", "writes") == []
+
+    namespace.cluster.patch("persistentvolumeclaims", namespace.name, "kept", FOR_JOBS)
+    assert namespace.wait_for_end("writes", LONG_S) == "Succeeded"
+    assert namespace.select("persistentvolumeclaims", "writes") == []
+
+
+@pytest.mark.usefixtures("secrets_readable")
+def test_a_secret_is_used_only_if_it_is_for_jobs(namespace, job):
+    """Otherwise whoever may write TrainingJobs could read every Secret of the namespace."""
+    variable = {"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}
+    namespace.apply(job("reads", script='test "$WORD" = open', trainer={"env": [variable]}, backoffLimit=0))
+    namespace.wait(lambda: namespace.condition("reads", "Accepted").get("reason") == "SecretMissing")
+
+    namespace.create("secrets", {"metadata": {"name": "words"}, "stringData": {"word": "open"}})
+    namespace.wait(lambda: namespace.condition("reads", "Accepted").get("reason") == "SecretNotForJobs")
+    assert namespace.select("jobs", "reads") == []
+
+    namespace.cluster.patch("secrets", namespace.name, "words", FOR_JOBS)
+    assert namespace.wait_for_end("reads", LONG_S) == "Succeeded"

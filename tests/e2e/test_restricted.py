@@ -1,0 +1,79 @@
+"""A training from its first object to its end where nothing is allowed that *restricted* forbids."""
+
+from datetime import datetime, timedelta
+
+import pytest
+
+from tests.e2e.askers import plain_pod
+from tests.e2e.cluster import CommandFailed, Refused
+from tests.e2e.jobs import WAIT
+from tests.e2e.namespace import LONG_S
+
+TOKEN = "/var/run/secrets/kubernetes.io/serviceaccount/token"
+
+
+def test_a_pod_that_asks_for_more_is_refused_here(namespace):
+    """The control: without it, the tests below would say nothing about *restricted*."""
+    pod = plain_pod("control")
+    del pod["spec"]["securityContext"]["runAsNonRoot"]
+
+    with pytest.raises(Refused) as refusal:
+        namespace.create("pods", pod)
+
+    assert refusal.value.code == 403
+    assert 'violates PodSecurity "restricted' in refusal.value.message
+
+
+@pytest.mark.trains
+@pytest.mark.timeout(400)
+def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
+    """All that a person asks of a run that has ended, without a look into its pod."""
+    namespace.apply(job("tiny"))
+
+    assert namespace.wait_for_end("tiny") == "Succeeded"
+
+    status = namespace.status("tiny")
+    replica = status["replicas"][0]
+    assert status["observedGeneration"] == 1
+    assert status["startTime"] < status["completionTime"]
+    assert namespace.holds("tiny", "Accepted")
+    assert namespace.holds("tiny", "Succeeded")
+    assert replica["step"] == replica["target"] == replica["lastCheckpoint"]["step"] == 2000
+    assert 0 <= replica["successRate"] <= 1
+    assert replica["attempt"] == 1
+    assert all(namespace.events("tiny", reason) for reason in ("Accepted", "Planned", "Succeeded"))
+    assert namespace.pods_made("tiny") == 1
+
+
+def test_a_pod_ends_with_its_trainer(namespace, job):
+    """Simulators and ROS master are not what anybody waits for, nor a preempted node's grace."""
+    namespace.apply(job("ends", script="sleep 3"))
+    assert namespace.wait_for_end("ends") == "Succeeded"
+
+    (pod,) = namespace.pods("ends", live=False)
+    ended = {each["name"]: moment(each["state"]["terminated"]) for each in statuses(pod)}
+    assert max(ended.values()) - ended["trainer"] < timedelta(seconds=10)
+
+
+def statuses(pod):
+    """Return the statuses of all containers of a pod."""
+    return [*pod["status"]["initContainerStatuses"], *pod["status"]["containerStatuses"]]
+
+
+def moment(terminated):
+    """Return when a container ended."""
+    return datetime.fromisoformat(terminated["finishedAt"])
+
+
+@pytest.mark.timeout(400)
+def test_no_container_can_write_its_image_or_speak_to_the_cluster(namespace, job):
+    """Whoever may make TrainingJobs, and no pods, must gain nothing by it."""
+    namespace.apply(job("waits", script=WAIT))
+    pod = namespace.wait_for_pod("waits", LONG_S)
+
+    for container in ("trainer", "sim-collect-0", "ros-master"):
+        assert namespace.execute(pod, "id", "-u", container=container).strip() == "65532"
+        with pytest.raises(CommandFailed, match=r"[Rr]ead-only"):
+            namespace.execute(pod, "touch", "/etc/palaestra-was-here", container=container)
+        with pytest.raises(CommandFailed, match="No such file"):
+            namespace.execute(pod, "cat", TOKEN, container=container)
