@@ -160,7 +160,7 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.TRAINING: Row("{what}", "at least one trainer runs", "nothing", warning=False),
     Reason.INTERRUPTED: Row(
-        "pod {pod} was taken by the cluster{words}; another goes on from the last checkpoint",
+        "pod {pod} was interrupted{words}; another goes on from the last checkpoint",
         "an eviction, a preemption, a drain, or a deletion; it does not count against `backoffLimit`",
         "nothing; often: ask for nodes that stay",
         warning=False,

@@ -8,6 +8,7 @@ from datetime import datetime
 
 from palaestra.api.reasons import Reason
 from palaestra.decide.conditions import Told
+from palaestra.decide.counting import failed_by_itself
 from palaestra.decide.moments import after, seconds_between
 from palaestra.decide.situation import Deadline, DeadlineCheck, Situation, first_waiting, told
 from palaestra.decide.troubles import (
@@ -41,11 +42,18 @@ def active_deadline(it: Situation) -> Deadline | None:
 
 def no_progress(it: Situation) -> Deadline | None:
     """Pods that are taken again and again count against no limit of Kubernetes."""
-    if it.counted.fruitless < FRUITLESS_PODS:
+    pods = it.counted.fruitless + _taken_and_not_replaced(it)
+    if pods < FRUITLESS_PODS:
         return None
     evictions = (storage_eviction(pod) for pod in reversed(it.seen.pods) if pod.ended)
     cause = next(evictions, None)  # of the last that ended
-    return Deadline(at=it.now, told=cause or told(Reason.NO_PROGRESS, pods=it.counted.fruitless))
+    return Deadline(at=it.now, told=cause or told(Reason.NO_PROGRESS, pods=pods))
+
+
+def _taken_and_not_replaced(it: Situation) -> bool:
+    """Return whether the newest pod was taken: Kubernetes doubles the wait for the next each time."""
+    pod = it.seen.pod
+    return pod is not None and pod.phase == "Failed" and not failed_by_itself(pod)
 
 
 def restart_policy_is_gone(it: Situation) -> Deadline | None:

@@ -116,8 +116,13 @@ def pod_was_taken(it: Situation) -> Told | None:
     pod = it.seen.pod
     if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
         return None
-    words = pod.disruption or pod.message
+    words = pod.disruption or pod.message or _exit_words(pod)
     return told(Reason.INTERRUPTED, pod=pod.name, words=f" ({words})" if words else "")
+
+
+def _exit_words(pod: PodView) -> str:
+    code = exit_code(pod)
+    return "" if code is None else f"exit code {code}"
 
 
 def pod_failed(it: Situation) -> Told | None:
