@@ -46,8 +46,12 @@ class Cluster:
 
     def __enter__(self) -> Self:
         """Begin to serve the API on a port of loopback."""
+        # Ended by us alone: Ctrl-C must leave it to what is still to be cleaned up.
         self._proxy = subprocess.Popen(
-            [self._kubectl, "proxy", "--port=0"], stdout=subprocess.PIPE, text=True
+            ["setpriv", "--pdeathsig=TERM", self._kubectl, "proxy", "--port=0"],
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
         assert self._proxy.stdout
         line = self._proxy.stdout.readline()
