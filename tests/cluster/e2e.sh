@@ -39,7 +39,7 @@ bring_up() {
   [[ ! -f $MARK ]] || { say "removing what a killed run left behind" && "$HERE/down.sh"; }
   local stood=
   [[ ! -f $STATE/way ]] || stood=yes
-  KUBECONFIG=$("$HERE/up.sh")
+  KUBECONFIG=$(setpriv --pdeathsig TERM "$HERE/up.sh") # ends with us, so that it leaves no cluster without the mark
   export KUBECONFIG
   [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || touch "$MARK"
 }
