@@ -2,7 +2,7 @@
 
 from itertools import chain, product
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from palaestra_sim.world import Node, RunIdentity, World, generate, parse, robots, ros_name
@@ -133,6 +133,10 @@ def test_generating_twice_changes_nothing(source: bytes, *, clock: bool) -> None
 
 
 @given(worlds())
+@example(
+    b"#VRML_SIM R2023b utf8\n"
+    b'Robot { name "r" controller "ros" controllerArgs [ "--name=a"  # c\n"--name=a" "--clock" ] } '
+)
 def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: bytes) -> None:
     """Who generates first doesn't matter."""
     allowed = generate(source, IDENTITY, clock=True)

@@ -17,5 +17,4 @@ def configure_logs() -> None:
             structlog.processors.JSONRenderer(default=str),
         ],
         logger_factory=lambda *_: structlog.PrintLogger(sys.stderr),
-        cache_logger_on_first_use=True,
     )

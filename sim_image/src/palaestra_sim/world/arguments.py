@@ -14,7 +14,7 @@ from palaestra_sim.world.robots import CLOCK, NAME, SYNCHRONIZE
 from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
-_NO_COMMENT = re.compile(rb"[ \t\r\n,]*")
+_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # the last one, with its line's end
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 
@@ -40,7 +40,8 @@ def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> 
         return (Edit(start=start, end=start, text=b" ".join(texts), tokens=texts),)
     rows = _rows(strings, ros_name, clock=clock)
     changed = [pair for pair in zip(strings, rows, strict=True) if pair[1] != (pair[0].text,)]
-    separator = _gap_before(world, strings[0]) or b" "
+    gap = _gap_before(world, strings[0])
+    separator = b" " if b"#" in gap or not gap else gap
     return tuple(_new_row(world, token, row, separator) for token, row in changed)
 
 
@@ -80,10 +81,10 @@ def _options(text: str) -> list[str]:
 
 
 def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Edit:
-    """Replace one string of a list; if by nothing, then with what parts it from the one before."""
+    """Replace one string of a list; if by nothing, then with the blanks before it."""
     start = token.start
     if not row:
-        start -= len(_gap_before(world, token))
+        start -= len(_UP_TO_COMMENT.sub(b"", _gap_before(world, token)))
     return Edit(start=start, end=token.end, text=separator.join(row), tokens=row)
 
 
@@ -110,7 +111,6 @@ def _new_field(world: World, robot: Node, ros_name: str) -> Edit:
 
 
 def _gap_before(world: World, token: Token) -> bytes:
-    """Return what lies between a token and the one before it; nothing if that has a comment."""
+    """Return what lies between a token and the one before it: blanks, commas, comments."""
     before = world.tokens[world.index(token.start) - 1]
-    gap = world.source[before.end : token.start]
-    return gap if _NO_COMMENT.fullmatch(gap) else b""
+    return world.source[before.end : token.start]
