@@ -101,7 +101,7 @@ def test_ctrl_c_does_not_wait_for_a_simulator_that_starts(write_job, start):
 
     code, log = end(process)
 
-    assert code == 75
+    assert code == 75, log
     assert "Interrupted" in log
 
 

@@ -86,16 +86,6 @@ def test_a_signal_is_noted_and_raised_at_the_next_check():
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-def test_while_there_is_nothing_to_save_a_signal_is_raised_at_once():
-    """Starting simulators takes up to a minute."""
-    never = threading.Event()
-
-    with Interruption() as interruption, interruption.at_once():
-        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
-        with pytest.raises(Interrupted):
-            never.wait(10.0)
-
-
 def test_whoever_listened_before_listens_again():
     """Pytest, for one."""
     before = signal.getsignal(signal.SIGINT)

@@ -61,8 +61,8 @@ def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_membe
     member.start = start
     fleet, _ = make_fleet(member)
 
-    with Interruption() as interruption, interruption.at_once(), pytest.raises(Interrupted):
-        fleet.start()
+    with Interruption() as interruption, pytest.raises(Interrupted):
+        fleet.start(interruption.check)
     released.set()
     for thread in threading.enumerate():
         if thread.name == "fleet-collect-0":

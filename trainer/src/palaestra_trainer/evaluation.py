@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from statistics import fmean
@@ -18,6 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.member import Keeper, Member
 
 
@@ -97,15 +98,8 @@ class Evaluation:
         }
 
 
-Check = Callable[[], None]
-
-
-def _go_on() -> None:
-    """Let an evaluation go on."""
-
-
 def evaluate(
-    policy: Policy, member: Member | Keeper, seeds: Iterable[int], check: Check = _go_on
+    policy: Policy, member: Member | Keeper, seeds: Iterable[int], check: Check = go_on
 ) -> Evaluation:
     """Return how `policy` does in one episode for each of `seeds`, choosing greedily.
 
@@ -135,7 +129,7 @@ def evaluate(
 
 
 def evaluate_on_all(
-    policy: Policy, keepers: Sequence[Keeper], seeds: Iterable[int], check: Check = _go_on
+    policy: Policy, keepers: Sequence[Keeper], seeds: Iterable[int], check: Check = go_on
 ) -> Evaluation:
     """Return the same as `evaluate`, with the episodes shared out to several simulators at once."""
     wanted = list(seeds)
@@ -146,13 +140,13 @@ def evaluate_on_all(
     started = time.monotonic()
     over = threading.Event()
 
-    def go_on() -> None:
+    def check_all() -> None:
         check()
         if over.is_set():
             raise CancelledError
 
     with ThreadPoolExecutor(len(busy), "evaluate") as pool:
-        futures = [pool.submit(evaluate, policy, keeper, share, go_on) for keeper, share in busy]
+        futures = [pool.submit(evaluate, policy, keeper, share, check_all) for keeper, share in busy]
         try:
             done, _ = wait(futures, return_when=FIRST_EXCEPTION)
             for future in done:

@@ -1,17 +1,17 @@
 """Being asked to end: SIGTERM and SIGINT.
 
-The first signal is noted, and the run ends at its next boundary with a
-checkpoint; while simulators start there is nothing to save, and it ends where
-it is, without waiting for one to come up. A second signal ends the process at
-once.
+The first signal is noted, and the run ends at the next place where it looks: at
+a boundary with a checkpoint, or while simulators start, when there is nothing
+to save, without waiting for one to come up. Nothing is raised out of the
+handler itself: it may run amid a lock's release. A second signal ends the
+process at once.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
@@ -19,6 +19,12 @@ from palaestra_trainer.errors import TrainerError
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 HURRY = "a second signal ends at once"
+
+Check = Callable[[], None]
+
+
+def go_on() -> None:
+    """Check nothing."""
 
 
 class Interrupted(TrainerError):
@@ -34,7 +40,6 @@ class Interruption:
 
     def __init__(self) -> None:
         self.requested: signal.Signals | None = None
-        self._at_once = False
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
@@ -57,23 +62,10 @@ class Interruption:
         if self.requested is not None:
             raise Interrupted(f"{self.requested.name} received")
 
-    @contextmanager
-    def at_once(self) -> Iterator[None]:
-        """Raise Interrupted out of whatever is done inside as soon as a signal comes."""
-        self.check()
-        self._at_once = True
-        try:
-            yield
-        finally:
-            self._at_once = False
-
     def _note(self, number: int, frame: FrameType | None) -> None:
         del frame
         self.requested = signal.Signals(number)
         for later in SIGNALS:
             signal.signal(later, signal.SIG_DFL)
         # Not by a logger: this may run amid another line of it.
-        how = "ending" if self._at_once else "ending with a checkpoint"
-        os.write(2, f"{self.requested.name}: {how}; {HURRY}\n".encode())
-        if self._at_once:
-            self.check()
+        os.write(2, f"{self.requested.name}: ending; {HURRY}\n".encode())

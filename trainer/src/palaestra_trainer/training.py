@@ -150,10 +150,9 @@ class Attempt:
         self._begin(found)
         if found:
             progress.resumed(found.manifest.step)
-        with interruption.at_once():
-            fleet = Fleet(configuration, self._around.make_members(configuration), progress)
-            stack.callback(fleet.stop)
-            fleet.start()
+        fleet = Fleet(configuration, self._around.make_members(configuration), progress)
+        stack.callback(fleet.stop)
+        fleet.start(interruption.check)
         rest(fleet.evaluating)
         progress.ready()
         run = Run(

@@ -9,7 +9,10 @@ from contextlib import contextmanager
 
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.member import Care, Keeper, Member, Watcher
+
+LOOK_EVERY_S = 0.1
 
 
 class Fleet:
@@ -38,17 +41,23 @@ class Fleet:
         self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role("Evaluate")]
         self._all = [*self.collecting, *self.evaluating]
 
-    def start(self) -> None:
+    def start(self, check: Check = go_on) -> None:
         """Start all members at once.
 
-        Whatever is raised in the meantime, such as `Interrupted`, waits for no member: a try that
-        is under way may go on in its thread, and no other is begun.
+        Args:
+            check: called every tenth of a second; what it raises, such as `Interrupted`, waits for
+                no member: a try that is under way may go on in its thread, and no other is begun.
 
         Raises:
             FaultBudgetSpent: one of them does not come up, however often it is tried.
         """
+        check()
+        starts = [in_background(Keeper.start, keeper) for keeper in self._all]
         try:
-            self._each(Keeper.start)
+            while wait(starts, LOOK_EVERY_S).not_done:
+                check()
+            for start in starts:
+                start.result()
         except BaseException:
             for keeper in self._all:
                 keeper.give_up()
@@ -56,13 +65,10 @@ class Fleet:
 
     def stop(self) -> None:
         """Stop all members at once, however they are."""
-        self._each(Keeper.stop)
-
-    def _each(self, work: Callable[[Keeper], None]) -> None:
-        futures = [in_background(work, keeper) for keeper in self._all]
-        wait(futures)
-        for future in futures:
-            future.result()
+        stops = [in_background(Keeper.stop, keeper) for keeper in self._all]
+        wait(stops)
+        for stop in stops:
+            stop.result()
 
 
 def in_background(work: Callable[[Keeper], None], keeper: Keeper) -> Future[None]:
