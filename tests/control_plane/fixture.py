@@ -1,6 +1,7 @@
 """`control_plane` for tests: import it in a conftest.py. Skips where the programs are not built.
 
-With PALAESTRA_REQUIRE_CLUSTER=1 (`make e2e`) nothing is skipped: the programs are built, or the test fails.
+With PALAESTRA_REQUIRE_CLUSTER=1 (`.ci/run`, `make e2e`) nothing is skipped: the programs are built, or the
+test fails.
 """
 
 import os
