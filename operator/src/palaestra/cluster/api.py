@@ -171,14 +171,7 @@ class Api:
         call = _call("patch", resource, namespace, name, subresource=subresource)
         return self._object(call.sending(patch, method="PATCH", media_type=MERGE_PATCH))
 
-    def apply(
-        self,
-        obj: Mapping[str, Any],
-        *,
-        manager: str = MANAGER,
-        subresource: str | None = None,
-        force: bool = True,
-    ) -> Object:
+    def apply(self, obj: Mapping[str, Any], *, manager: str = MANAGER, force: bool = True) -> Object:
         """Make the fields in `obj` so (server-side apply), and return the object as stored.
 
         Fields that the same manager applied before and leaves out now are removed.
@@ -188,7 +181,7 @@ class Api:
         """
         query = {"fieldManager": manager, "force": "true" if force else "false"}
         name = str(obj["metadata"]["name"])
-        call = _call("apply", of(obj), _namespace(obj), name, subresource=subresource, query=query)
+        call = _call("apply", of(obj), _namespace(obj), name, query=query)
         return self._object(call.sending(obj, method="PATCH", media_type=APPLY_PATCH))
 
     def delete(
@@ -199,12 +192,10 @@ class Api:
         *,
         uid: str | None = None,
         propagation: str = "Background",
-        grace_s: int | None = None,
     ) -> None:
         """Delete one object, and what it owns by `propagation`: `Background`, `Foreground` or `Orphan`.
 
-        With a `uid` this object only, not a later one of the same name. `grace_s` are the seconds given to a
-        pod to end; None for its own.
+        With a `uid` this object only, not a later one of the same name.
 
         Raises:
             NotFound: there is none.
@@ -213,8 +204,6 @@ class Api:
         options: Object = {"kind": "DeleteOptions", "apiVersion": "v1", "propagationPolicy": propagation}
         if uid is not None:
             options["preconditions"] = {"uid": uid}
-        if grace_s is not None:
-            options["gracePeriodSeconds"] = grace_s
         self._object(_call("delete", resource, namespace, name).sending(options, method="DELETE"))
 
     def watch(

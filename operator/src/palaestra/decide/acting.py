@@ -57,7 +57,7 @@ def _there(thing: Object, observed: Observed) -> bool:
 
 
 def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
-    """Yield the stop of each replica that has to end, and again where only half of the patch is left."""
+    """Yield the stop of each replica that has to end and was not stopped yet."""
     for seen, it in zip(observed.replicas, each, strict=True):
         if seen.job is None or seen.job.end is not None:
             continue

@@ -7,7 +7,7 @@ from typing import Any
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Status
-from palaestra.observe.jobs import STOP_DEADLINE_S, STOPPED
+from palaestra.observe.jobs import STOPPED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +36,7 @@ class Stop:
         """Return the merge patch of the Job."""
         return {
             "metadata": {"annotations": {STOPPED: f"{self.reason}: {self.message}"}},
-            "spec": {"activeDeadlineSeconds": STOP_DEADLINE_S},
+            "spec": {"activeDeadlineSeconds": 1},
         }
 
 

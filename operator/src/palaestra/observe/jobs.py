@@ -4,7 +4,6 @@ from palaestra.observe.reading import condition, count, holds, part, parts, text
 from palaestra.observe.views import JobEnd, JobView, Raw
 
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
-STOP_DEADLINE_S = 1
 
 # The outcome is certain before the last pod has ended: a pod on a lost node never does.
 _ENDS = (
@@ -17,17 +16,16 @@ _ENDS = (
 
 def job_view(raw: Raw) -> JobView:
     """Return the Job; what it does not tell is empty."""
-    metadata, spec, status = part(raw, "metadata"), part(raw, "spec"), part(raw, "status")
+    metadata, status = part(raw, "metadata"), part(raw, "status")
     named, end = next(((kind, end) for kind, end in _ENDS if holds(raw, kind)), ("", None))
     ending = condition(raw, named)
     suspension = condition(raw, "Suspended")
     return JobView(
         name=text(metadata, "name", 253),
         uid=text(metadata, "uid", 253),
-        suspended=spec.get("suspend") is True,
+        suspended=part(raw, "spec").get("suspend") is True,
         resumed=time(suspension, "lastTransitionTime") if suspension.get("status") == "False" else None,
         stopped=_stopped(part(metadata, "annotations")),
-        short=spec.get("activeDeadlineSeconds") == STOP_DEADLINE_S,
         failures=_failures(status),
         end=end,
         end_reason=text(ending, "reason", 60),

@@ -6,7 +6,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.lines import one_line
 from palaestra.observe.jobs import job_view
 from palaestra.observe.pods import BEGINNING, pod_view
-from palaestra.observe.reading import MOST_TEXT, part, parts, text, time
+from palaestra.observe.reading import MOST_TEXT, owners, part, text, time
 from palaestra.observe.views import (
     CreateFailure,
     JobView,
@@ -42,13 +42,13 @@ def observe(job: TrainingJob, objects: Objects) -> Observed:
 def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
     name = f"{job.metadata.name}-{index}"
     named = [raw for raw in objects.jobs if part(raw, "metadata").get("name") == name]
-    ours = next((job_view(raw) for raw in named if _owned(raw, job)), None)
+    ours = next((job_view(raw) for raw in named if job.metadata.uid in owners(raw)), None)
     pods, others = _pods(job, index, objects, ours)
     newest = pods[-1] if pods else None
     return ReplicaObserved(
         index=index,
         job=ours,
-        obstacle=next((_obstacle(raw, name) for raw in named if not _owned(raw, job)), None),
+        obstacle=next((_obstacle(raw, name) for raw in named if job.metadata.uid not in owners(raw)), None),
         pods=pods,
         in_the_way=tuple(each.name for each in others if not each.ended),
         polled=objects.polled.get(newest.uid) if newest and not newest.ended else None,
@@ -56,16 +56,6 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
         refused=_refused(ours, newest, objects) if ours else None,
         denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
     )
-
-
-def _owned(raw: Raw, job: TrainingJob) -> bool:
-    return job.metadata.uid is not None and owned_by(raw, job.metadata.uid)
-
-
-def owned_by(raw: Raw, uid: str) -> bool:
-    """Return whether an object has an owner with this uid."""
-    owners = parts(raw, "metadata", "ownerReferences")
-    return bool(uid) and any(each.get("uid") == uid for each in owners)
 
 
 def _obstacle(raw: Raw, name: str) -> Obstacle:
@@ -87,7 +77,7 @@ def _pods(
         labels = part(raw, "metadata", "labels")
         if labels.get(UID_LABEL) == job.metadata.uid and labels.get(REPLICA_LABEL) == str(index):
             view = pod_view(raw)
-            made = view.uid in known or (ours is not None and owned_by(raw, ours.uid))
+            made = view.uid in known or (ours is not None and ours.uid in owners(raw))
             (found if made else others)[view.uid] = view
     found.pop("", None)
     in_order = sorted(found.values(), key=lambda it: (it.created, not it.ended, it.name))

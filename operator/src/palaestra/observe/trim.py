@@ -11,7 +11,6 @@ _METADATA = (
     "name", "namespace", "uid", "resourceVersion", "generation", "creationTimestamp",
     "deletionTimestamp", "labels", "ownerReferences",
 )  # fmt: skip
-_JOB = ("suspend", "activeDeadlineSeconds")
 _CONTAINER = ("name", "image", "restartPolicy")
 _POD_STATUS = (
     "phase", "reason", "message", "startTime", "podIP", "conditions",
@@ -46,7 +45,7 @@ def _metadata(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 def _job_spec(raw: Mapping[str, Any]) -> dict[str, Any]:
     spec = raw.get("spec")
-    kept = _some(spec, _JOB)
+    kept = _some(spec, ("suspend",))
     template = spec.get("template") if isinstance(spec, Mapping) else None
     pod = template.get("spec") if isinstance(template, Mapping) else None
     volumes = pod.get("volumes") if isinstance(pod, Mapping) else None

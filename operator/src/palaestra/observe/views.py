@@ -172,7 +172,6 @@ class JobView:
         suspended: as its spec says.
         resumed: when it last was, None: it never was suspended or still is.
         stopped: reason and message of our stop mark; None: it has none.
-        short: its deadline is that of a stopped Job.
         failures: pods that failed and count against backoffLimit.
         end, end_reason, end_message, ended: what its conditions say; None and "" while it goes on.
         deleting: somebody deleted it.
@@ -184,7 +183,6 @@ class JobView:
     suspended: bool = False
     resumed: datetime | None = None
     stopped: tuple[str, str] | None = None
-    short: bool = False
     failures: int = 0
     end: JobEnd | None = None
     end_reason: str = ""

@@ -15,7 +15,7 @@ from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, POD
 from palaestra.decide import Action, Create, Delete, SetSuspend, Stop
 from palaestra.errors import PalaestraError
 from palaestra.operator.caches import Caches
-from palaestra.operator.denials import Denials
+from palaestra.operator.denials import Denials, Denied
 from palaestra.operator.poller import Key
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.writing import Writer
@@ -24,9 +24,6 @@ from palaestra.plan.replica import JOB_LABEL, REPLICA_LABEL
 log = structlog.get_logger(__name__)
 
 Object = Mapping[str, Any]
-
-
-Refusals = Mapping[int | None, ApiError]  # by replica; None: of the whole job
 
 
 class Outdated(PalaestraError):
@@ -53,7 +50,7 @@ class Acting:
         self._strangers = strangers
         self._denials = denials
 
-    def carry_out(self, raw: Object, actions: tuple[Action, ...]) -> Refusals:
+    def carry_out(self, raw: Object, actions: tuple[Action, ...]) -> Denied:
         """Do `actions` for a TrainingJob, in order, and return what was refused; empty if all was done.
 
         After a refusal nothing more is done for that replica, and nothing more is created at all if it

@@ -19,6 +19,7 @@ from palaestra.cluster.resources import (
     TRAINING_JOBS,
 )
 from palaestra.observe import trimmed
+from palaestra.observe.reading import owners
 from palaestra.operator.poller import Key, Target
 from palaestra.plan.layout import STATUS_PORT
 from palaestra.plan.replica import JOB_LABEL, TRAINER
@@ -108,7 +109,7 @@ class Caches:
                 key=_parent(pod), uid=pod["metadata"]["uid"], host=pod["status"]["podIP"], port=STATUS_PORT
             )
             for pod in pods
-            if jobs & _owners(pod)
+            if jobs & owners(pod)
         ]
 
     def _jobs_of(self, pods: list[Object]) -> list[Object]:
@@ -130,10 +131,6 @@ class Caches:
 def _parent(child: Object) -> Key:
     metadata = child["metadata"]
     return metadata["namespace"], metadata["labels"][JOB_LABEL]
-
-
-def _owners(obj: Object) -> set[str]:
-    return {each["uid"] for each in obj["metadata"].get("ownerReferences") or ()}
 
 
 def _trains(pod: Object) -> bool:

@@ -69,10 +69,10 @@ class Controller:
             return None
         now = self._now()
         decision, again_s = self._decide(raw, now)
-        refusals = self._acting.carry_out(raw, decision.actions)
-        held_back_s = self._telling.tell(raw, decision, refusals, now)
-        if refusals:
-            raise next(iter(refusals.values()))
+        denied = self._acting.carry_out(raw, decision.actions)
+        held_back_s = self._telling.tell(raw, decision, denied, now)
+        if denied:
+            raise next(iter(denied.values()))
         return earliest(decision.wake_after_s, again_s, held_back_s)
 
     def _decide(self, raw: Object, now: datetime) -> tuple[Decision, float | None]:

@@ -7,17 +7,11 @@ object is made or no longer wanted. One that has just started knows nothing, tri
 import threading
 from collections.abc import Mapping
 
-from palaestra.cluster import (
-    ApiError,
-    Conflict,
-    Gone,
-    ServerError,
-    TooManyRequests,
-    Unreachable,
-)
+from palaestra.cluster import ApiError, ServerError
 from palaestra.operator.poller import Key
 
-_PASSING = (Conflict, Gone, TooManyRequests, Unreachable)
+Denied = Mapping[int | None, ApiError]  # by replica; None: of the whole job
+
 _BY_A_WEBHOOK = "webhook"  # that does not answer: the API server calls it an error of its own
 
 
@@ -33,7 +27,7 @@ class Denials:
         with self._lock:
             return dict(self._words.get(key, {}))
 
-    def learn(self, key: Key, refused: Mapping[int | None, ApiError]) -> None:
+    def learn(self, key: Key, refused: Denied) -> None:
         """Take what was refused of all that is missing; whatever is not among it was made.
 
         What passes by itself, as an API server that is busy, changes nothing.
@@ -55,6 +49,4 @@ class Denials:
 
 def _lasting(error: ApiError) -> bool:
     """Return whether a person has to act."""
-    if isinstance(error, ServerError):
-        return _BY_A_WEBHOOK in error.message
-    return not isinstance(error, _PASSING)
+    return not error.retryable or (isinstance(error, ServerError) and _BY_A_WEBHOOK in error.message)

@@ -11,6 +11,7 @@ from typing import Any
 
 from palaestra.cluster import Api
 from palaestra.cluster.resources import EVENTS
+from palaestra.observe.reading import holds, owners
 
 PATIENCE_S = 5.0  # that a Job may be without a pod
 RECHECK_S = 15.0
@@ -40,7 +41,7 @@ class Refusals:
         """
         found: list[Object] = []
         again_s: float | None = None
-        served = {owner for pod in pods if _alive(pod) for owner in _owners(pod)}
+        served = {owner for pod in pods if _alive(pod) for owner in owners(pod)}
         for job in jobs:
             uid = job["metadata"]["uid"]
             if uid in served or not _wants_pod(job):
@@ -76,15 +77,10 @@ class Refusals:
 
 
 def _wants_pod(job: Object) -> bool:
-    conditions = (job.get("status") or {}).get("conditions") or ()
-    ended = any(each["type"] in {"Complete", "Failed"} and each["status"] == "True" for each in conditions)
+    ended = holds(job, "Complete") or holds(job, "Failed")
     suspended = (job.get("spec") or {}).get("suspend") is True
     return not ended and not suspended and "deletionTimestamp" not in job["metadata"]
 
 
 def _alive(pod: Object) -> bool:
     return (pod.get("status") or {}).get("phase") not in {"Succeeded", "Failed"}
-
-
-def _owners(pod: Object) -> list[str]:
-    return [owner["uid"] for owner in pod["metadata"].get("ownerReferences") or ()]

@@ -13,7 +13,7 @@ from palaestra.api.reasons import Reason
 from palaestra.cluster import Recorder
 from palaestra.decide import Decision, Happening, worth_writing
 from palaestra.decide.writing import PROGRESS_EVERY_S, as_data
-from palaestra.operator.acting import Refusals
+from palaestra.operator.denials import Denied
 from palaestra.operator.poller import Key
 from palaestra.operator.writing import Writer, difference
 
@@ -34,7 +34,7 @@ class Telling:
         self._lock = threading.Lock()
         self._written: dict[Key, datetime] = {}
 
-    def tell(self, raw: Object, decision: Decision, refusals: Refusals, now: datetime) -> float | None:
+    def tell(self, raw: Object, decision: Decision, denied: Denied, now: datetime) -> float | None:
         """Write what changed; return seconds until progress that was held back is to be written.
 
         What was refused was not planned; why is told by the next look, in the status.
@@ -48,7 +48,7 @@ class Telling:
             None if decision.status is None else self._write(key, raw, as_data(decision.status), now)
         )
         for each in decision.events:
-            if each.reason != Reason.PLANNED or not refusals.keys() & {None, each.replica}:
+            if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
                 self._record(raw, each)
         return held_back_s
 
