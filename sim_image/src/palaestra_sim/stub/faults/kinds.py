@@ -86,19 +86,21 @@ class Hang(Fault):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slow(Fault):
-    """A step, a reset, or calls of a service take longer."""
+class Delayed(Fault):
+    """Something comes later: by the latency, and by up to the jitter on top of it."""
 
     latency_s: float = 0.0
     jitter_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Late(Fault):
-    """Messages of a step come later than its answer."""
+class Slow(Delayed):
+    """A step, a reset, or calls of a service take longer."""
 
-    latency_s: float = 0.0
-    jitter_s: float = 0.0
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Late(Delayed):
+    """Messages of a step come later than its answer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,11 +136,8 @@ class StartRefused(Fault):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SlowStart(Fault):
+class SlowStart(Delayed):
     """Nothing is registered for a while."""
-
-    latency_s: float = 0.0
-    jitter_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

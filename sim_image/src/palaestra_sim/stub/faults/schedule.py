@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from palaestra_sim.stub.faults.kinds import Event, Fault, Late, Slow, SlowStart
+from palaestra_sim.stub.faults.kinds import Delayed, Event, Fault
 
 _DRAW_BYTES = 7  # 56 bits: more than a float's 53
 _DRAWS = float(256**_DRAW_BYTES)
@@ -49,7 +49,7 @@ class Schedule:
             fault for fault in self.faults if fault.trigger.event is event and self.happens(fault, number)
         )
 
-    def delay_s(self, fault: Slow | Late | SlowStart, number: int) -> float:
+    def delay_s(self, fault: Delayed, number: int) -> float:
         """Return how long the fault delays the event of that number: latency, and a share of the jitter."""
         return fault.latency_s + fault.jitter_s * self._draw(fault, number, "jitter")
 
