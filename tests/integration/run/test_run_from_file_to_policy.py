@@ -13,6 +13,7 @@ import pytest
 from palaestra_sim.world import robots
 from palaestra_trainer.ros.master import Master
 
+EXAMPLES = Path(__file__).parents[3] / "manifests/examples"
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 FEW = {
     "steps": 600,
@@ -21,9 +22,7 @@ FEW = {
 }
 
 
-@pytest.mark.parametrize(
-    "example", ["minimal", "move-to-target", "two-collectors", "reinforce", "sparse-reward"]
-)
+@pytest.mark.parametrize("example", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
 def test_every_example_runs(run, example):
     """With few steps here; what people copy must work."""
     code, output = run(example, **FEW).start().end()
