@@ -2,8 +2,10 @@
 
 import pytest
 
+from palaestra_trainer import patience
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
+from palaestra_trainer.waits import waited_s
 
 
 @pytest.fixture
@@ -59,6 +61,36 @@ def test_a_service_that_does_not_answer_hangs(service):
     """Rospy's proxy would wait for ever here."""
     with pytest.raises(SimulatorHung, match=r"does not answer within 0\.2 s"):
         service("never", deadline_s=0.2)(ask=True)
+
+
+def test_when_patience_is_over_nobody_is_waited_for(service):
+    """Sixteen simulators that hang would take sixteen deadlines from a trainer that is asked to end."""
+    never = [service("never", deadline_s=30.0) for _ in range(16)]
+    get_time = service("get_time")
+    get_time(ask=True)
+    for each in never:
+        each.begin(ask=True)
+    before = waited_s()
+
+    patience.end(after_s=-1.0)
+    try:
+        for each in never:
+            with pytest.raises(SimulatorHung):
+                each.finish()
+    finally:
+        patience.renew()
+
+    assert waited_s() - before < 5.0
+    assert get_time(ask=True).value == 1.25
+
+
+def test_what_a_call_waited_for_its_answer_is_counted(service):
+    """So that a run can tell what simulators cost it from what it costs itself."""
+    before = waited_s()
+    with pytest.raises(SimulatorHung):
+        service("never", deadline_s=0.2)(ask=True)
+
+    assert 0.19 < waited_s() - before < 5.0
 
 
 def test_a_killed_node_is_dead(peer, service):

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palaestra_sim.stub.physics import WHEELS, wheel_speeds
@@ -55,6 +55,36 @@ def test_it_can_be_driven_without_ros(simulation):
     assert simulation.time_ms == 192
     assert robot.sensors["wheel0_joint_sensor"].value == pytest.approx(2.0 * 0.192)
     assert robot.sensors["ir1"].value == pytest.approx(0.31, rel=0.05)
+
+
+@settings(deadline=None)  # every example loads the world twice
+@given(
+    ways=st.lists(
+        st.tuples(
+            st.sampled_from([(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)]),
+            st.integers(1, 3),
+        ),
+        max_size=8,
+    )
+)
+def test_a_velocity_told_again_is_as_if_it_were_told_once(ways):
+    """The trainer's facade spares what did not change; a run stays the same, bit by bit."""
+
+    def moments(told_again):
+        simulation = Simulation.load(builtin("arena"))
+        motors = simulation.robots[0].motors
+        told = dict.fromkeys(WHEELS, 0.0)
+        drive(simulation, 0.0, 0.0, 0.0)
+        for way, steps in ways:
+            for _ in range(steps):
+                for name, speed in zip(WHEELS, wheel_speeds(*way), strict=True):
+                    if told_again or speed != told[name]:
+                        motors[name].set_velocity(speed)
+                        told[name] = speed
+                simulation.step(192)
+                yield readings(simulation)
+
+    assert list(moments(told_again=True)) == list(moments(told_again=False))
 
 
 def test_the_front_sensor_tells_volts_at_a_wall(simulation):

@@ -9,6 +9,7 @@ Threads did the same at twice the processor time: see docs/decisions/0006-turns-
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -16,11 +17,25 @@ from typing import Any
 from greenlet import getcurrent, greenlet
 
 
+class _Turn(greenlet):
+    """One work of `take_turns`, and the seconds that it has spent in others' turns."""
+
+    away_s = 0.0
+
+
 def let_others() -> None:
     """Let the others of `take_turns` go on first; alone, this does nothing."""
-    turns = getcurrent().parent
-    if turns is not None:
-        turns.switch()
+    turn = getcurrent()
+    if isinstance(turn, _Turn) and turn.parent is not None:
+        left = time.perf_counter()
+        turn.parent.switch()
+        turn.away_s += time.perf_counter() - left
+
+
+def away_s() -> float:
+    """Return the seconds that the work whose turn it is has spent in others' turns, so far."""
+    turn = getcurrent()
+    return turn.away_s if isinstance(turn, _Turn) else 0.0
 
 
 def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
@@ -41,10 +56,10 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
         except Exception as error:  # noqa: BLE001 - raised below, when no work is left in the middle
             errors.append(error)
 
-    waiting: deque[greenlet] = deque()
+    waiting: deque[_Turn] = deque()
     for place, work in enumerate(works):
         results.append(None)
-        waiting.append(greenlet(lambda place=place, work=work: run(place, work)))
+        waiting.append(_Turn(lambda place=place, work=work: run(place, work)))
     try:
         while waiting:
             turn = waiting.popleft()

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, Pose, RobotinoAbc
-from palaestra_trainer.ros import call_together
-from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, TouchSensor, Webots
+from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, TouchSensor, Webots, set_velocities
 
 PERIOD_MS = 192  # six basic steps of 32 ms
 
@@ -83,13 +82,7 @@ class Robotino(RobotinoAbc):
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
         """Set the wanted velocity: forward, left (m/s) and counter-clockwise (rad/s), until changed."""
-        speeds = wheel_speeds(vx, vy, omega)
-        call_together(
-            [
-                (wheel.velocity_service, {"value": speed})
-                for wheel, speed in zip(self._wheels, speeds, strict=True)
-            ]
-        )
+        set_velocities(zip(self._wheels, wheel_speeds(vx, vy, omega), strict=True))
 
     def advance(self) -> int:
         """Simulate one control period; return how many extra ones it took, normally 0."""

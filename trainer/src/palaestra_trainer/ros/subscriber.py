@@ -73,6 +73,7 @@ class RosSubscriber:
             "type": self._type.name,
         }
         self._wire = Wire(address, header, self.simulator, self._deadline_s)
+        self._wire.acknowledge_late()
 
     def next(self) -> Any:
         """Return the value of the next message, waiting for it.

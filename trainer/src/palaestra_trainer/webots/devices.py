@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
-from palaestra_trainer.ros import RosService, RosSubscriber
+from palaestra_trainer.ros import RosService, RosSubscriber, call_together
+from palaestra_trainer.turns import let_others
 from palaestra_trainer.webots.services import Services
 
 # What follows a message's std_msgs/Header, whose only part of varying length is `frame_id`.
@@ -145,6 +146,10 @@ class Motor:
     Args:
         robot: the ROS name of the robot's controller.
         device: the motor's name in the world, e.g. wheel0_joint
+
+    Attributes:
+        velocity: rad/s, as the simulator has confirmed it; None while it is not known what it made of it.
+        velocity_service: sets it.
     """
 
     def __init__(self, robot: str, device: str) -> None:
@@ -152,14 +157,18 @@ class Motor:
         name = topic_name(device)
         self._services = services
         self._position = services.get(f"{name}/set_position", "set_float")
+        self.velocity: float | None = None
         self.velocity_service = services.get(f"{name}/set_velocity", "set_float")
 
     def set_velocity(self, velocity: float) -> None:
         """Turn at `velocity` rad/s from the next step on."""
+        self.velocity = None
         self.velocity_service(value=velocity)
+        self.velocity = velocity
 
     def set_position(self, position: float) -> None:
         """Turn to `position` rad; infinity means velocity control."""
+        self.velocity = None  # a backward one, set before, was confirmed and yet refused
         self._position(value=position)
 
     def release(self) -> None:
@@ -169,7 +178,29 @@ class Motor:
 
     def close(self) -> None:
         """Drop the connections."""
+        self.velocity = None
         self._services.close()
+
+
+def set_velocities(wanted: Iterable[tuple[Motor, float]]) -> None:
+    """Let motors turn at velocities in rad/s from the next step on, with all requests sent at once.
+
+    A motor goes on as it was told, so that what it has confirmed is not sent again; whoever resets the
+    simulation must `release` its motors.
+
+    Raises:
+        SimulatorDead, SimulatorHung, WrongData: as `RosService`; whatever was sent will be sent again.
+    """
+    changes = [(motor, velocity) for motor, velocity in wanted if velocity != motor.velocity]
+    if not changes:
+        return
+    for motor, _ in changes:
+        motor.velocity = None
+    call_together(
+        [(motor.velocity_service, {"value": velocity}) for motor, velocity in changes], meanwhile=let_others
+    )
+    for motor, velocity in changes:
+        motor.velocity = velocity
 
 
 def _fields(layout: struct.Struct, payload: memoryview) -> tuple[Any, ...]:

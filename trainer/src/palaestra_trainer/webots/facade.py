@@ -128,14 +128,10 @@ class Webots:
         Raises:
             SimulatorHung: even killing it had no effect in time.
         """
-        if self.available():
-            self._launcher.expect_stop(self._stop_deadline_s)
-            # It may break before it quits; the announced deadline ends it then.
-            with contextlib.suppress(SimulatorFault):
-                self.supervisor.quit()
-        else:
-            self._launcher.expect_stop(0.0)
-        self._disconnect()
+        try:
+            self._end()
+        finally:
+            self._disconnect()
         self._launcher.wait_stopped(self._stop_deadline_s + _PROBE_S)
 
     def __call__(self) -> None:
@@ -187,6 +183,15 @@ class Webots:
         self._disconnect()
         if self._own is not None:
             self._own.close()
+
+    def _end(self) -> None:
+        if not self.available():
+            self._launcher.expect_stop(0.0)
+            return
+        self._launcher.expect_stop(self._stop_deadline_s)
+        # It may break before it quits; the announced deadline ends it then.
+        with contextlib.suppress(SimulatorFault):
+            self.supervisor.quit()
 
     def _disconnect(self) -> None:
         self._probe.close()

@@ -24,6 +24,10 @@ Callback = Callable[[], None]
 _QUICK_S = 200e-6
 _LOOKS = 30
 
+# What is due as soon as this is what the peers wait for too, such as the end of a step: they send nothing
+# before, and looking for it would only take the processor from those who compute, and come late.
+_NEAR_S = 10e-3
+
 
 class Loop:
     """Runs callbacks when sockets are ready, moments have come, or other threads posted."""
@@ -92,11 +96,11 @@ class Loop:
         os.close(self._wake_write)
 
     def _ready(self) -> list[tuple[selectors.SelectorKey, int]]:
-        """Return what is ready, after a wait; where the last wait was short, look a few times first."""
+        """Return what is ready, after a wait; where a short one is to be expected, look a few times first."""
         wait_s = self._wait_s()
         if wait_s == 0.0:
             return self._selector.select(0)
-        if self._quick:
+        if self._quick and (wait_s is None or wait_s > _NEAR_S):
             for _ in range(_LOOKS):
                 if ready := self._selector.select(0):
                     return ready

@@ -1,0 +1,161 @@
+"""What wheels are told, and when they are told it again."""
+
+import math
+
+import pytest
+
+from palaestra_trainer.errors import WrongData
+from palaestra_trainer.robots import Pose
+from palaestra_trainer.robots.robotino import wheel_speeds
+from palaestra_trainer.turns import take_turns
+from palaestra_trainer.webots import Mode, Motor, set_velocities
+from palaestra_trainer.webots.services import Services
+
+START = Pose(-1.5, 0.0, 0.0)
+AHEAD = (0.5, 0.0, 0.0)
+CURVE = (0.3, 0.1, 0.5)  # turns every wheel
+
+
+class Stranger:
+    """Somebody else who asks and tells the wheels, which shows what the facade sends and what not."""
+
+    def __init__(self):
+        self._services = Services("robotino")
+
+    def tell(self, velocity):
+        """Let all wheels turn at `velocity` rad/s."""
+        for wheel in range(3):
+            self._services.get(f"wheel{wheel}_joint/set_velocity", "set_float")(value=velocity)
+
+    def ask(self):
+        """Return the velocities that the wheels are told to turn at, in rad/s."""
+        return [self._services.ask(f"wheel{wheel}_joint/get_velocity", "get_float") for wheel in range(3)]
+
+    def close(self):
+        """Drop the connections."""
+        self._services.close()
+
+
+@pytest.fixture
+def stranger(master):
+    """Somebody else on the same master."""
+    del master
+    somebody = Stranger()
+    yield somebody
+    somebody.close()
+
+
+@pytest.fixture
+def motor(arena):
+    """One wheel alone."""
+    del arena
+    wheel = Motor("robotino", "wheel0_joint")
+    yield wheel
+    wheel.close()
+
+
+def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
+    """Webots keeps it, and a policy often does the same twice: three messages of fifteen a step."""
+    arena.robot.drive(*CURVE)
+    stranger.tell(7.0)
+
+    arena.robot.drive(*CURVE)
+
+    assert stranger.ask() == [7.0, 7.0, 7.0]
+
+
+def test_only_those_wheels_are_told_that_change(arena, stranger):
+    """Ahead and back are the same for the wheel at the rear: it stands."""
+    arena.robot.drive(*AHEAD)
+    stranger.tell(7.0)
+
+    arena.robot.drive(-0.5, 0.0, 0.0)
+
+    assert stranger.ask() == [7.0, *wheel_speeds(-0.5, 0.0, 0.0)[1:]]
+
+
+def test_after_a_reset_it_is_sent_again(arena, stranger):
+    """A reset takes all motors' velocities away."""
+    arena.robot.drive(*CURVE)
+    arena.scene.reset(1, START, (1.0, 0.0))
+    assert stranger.ask() == [0.0, 0.0, 0.0]
+
+    arena.robot.drive(*CURVE)
+
+    assert stranger.ask() == pytest.approx(wheel_speeds(*CURVE))
+
+
+def test_a_reset_to_standing_is_sent_although_it_stood(arena, stranger):
+    """What was confirmed before the reset says nothing about the motors after it."""
+    arena.robot.drive(0.0, 0.0, 0.0)
+    stranger.tell(7.0)
+
+    arena.scene.reset(1, START, (1.0, 0.0))
+
+    assert stranger.ask() == [0.0, 0.0, 0.0]
+
+
+def test_after_a_restart_it_is_sent_again(arena, stranger):
+    """The new process has never heard of it."""
+    arena.robot.drive(*CURVE)
+    stranger.close()
+    arena.webots()
+    arena.webots.supervisor.set_mode(Mode.FAST)
+    arena.robot.connect()
+
+    arena.robot.drive(*CURVE)
+
+    assert stranger.ask() == pytest.approx(wheel_speeds(*CURVE))
+
+
+def test_after_a_reconnection_it_is_sent_again(arena, stranger):
+    """Who knows what happened meanwhile."""
+    arena.robot.drive(*CURVE)
+    arena.robot.connect()
+
+    arena.robot.drive(*CURVE)
+
+    assert stranger.ask() == pytest.approx(wheel_speeds(*CURVE))
+
+
+def test_what_was_not_confirmed_is_sent_again(start, stranger):
+    """The second command of a wheel gets half an answer, so that nobody knows what became of it."""
+    arena = start("--fault=wrong_shape:service=wheel1_joint/set_velocity,call=2")
+    with pytest.raises(WrongData):
+        arena.robot.drive(*CURVE)
+    stranger.tell(7.0)
+
+    arena.robot.drive(*CURVE)
+
+    assert stranger.ask() == pytest.approx(wheel_speeds(*CURVE))
+
+
+def test_a_velocity_that_was_refused_is_sent_again_with_a_new_position(motor, stranger):
+    """Webots refuses to turn backward to a position, and confirms it all the same."""
+    motor.set_position(1.0)
+    motor.set_velocity(-2.0)
+    assert stranger.ask()[0] != -2.0
+    motor.set_position(math.inf)
+
+    set_velocities([(motor, -2.0)])
+
+    assert stranger.ask()[0] == -2.0
+
+
+def test_a_motor_that_is_told_alone_is_always_told(motor, stranger):
+    """It is in nobody's simulation, so that no reset would tell it."""
+    motor.set_velocity(2.0)
+    stranger.tell(7.0)
+
+    motor.set_velocity(2.0)
+
+    assert stranger.ask()[0] == 2.0
+
+
+def test_others_have_their_turn_while_the_wheels_answer(arena):
+    """Four robots are told in one round trip's time."""
+    told = []
+
+    take_turns([lambda: (arena.robot.drive(*CURVE), told.append("this")), lambda: told.append("the other")])
+
+    assert told == ["the other", "this"]

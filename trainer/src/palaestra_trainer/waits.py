@@ -1,0 +1,22 @@
+"""How long this thread has waited for simulators: what is left of a step is the trainer's own doing."""
+
+from __future__ import annotations
+
+import threading
+
+
+class _Waits(threading.local):
+    seconds = 0.0
+
+
+_waits = _Waits()
+
+
+def count_wait(seconds: float) -> None:
+    """Add to what the calling thread has waited."""
+    _waits.seconds += seconds
+
+
+def waited_s() -> float:
+    """Return the seconds that the calling thread has waited for simulators since it began."""
+    return _waits.seconds
