@@ -37,6 +37,7 @@ def test_help_says_what_it_reads_and_writes_and_how_it_ends() -> None:
         (["--control=0.0.0.0:0"], "--control: 0.0.0.0:0 is not on loopback, and anyone could use it"),
         (["--health=203.0.113.1:0"], "--health: 203.0.113.1:0: Cannot assign requested address; "),
         (["--job=j"], "--work: is missing; with --job, give the folder for the generated world"),
+        (["--standby"], "--standby: two simulators need names of their own; give --job and --work"),
         (["--job=j", "--work=/proc/x"], "--work: /proc/x: No such file or directory; give a folder"),
         (["--driver=command"], "--driver command: has no program; give it behind --, as -- sim {world}"),
         (["--driver=command", "--", "no-such"], "--driver command: there is no program no-such; install"),

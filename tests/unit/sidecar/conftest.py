@@ -5,9 +5,13 @@ from hypothesis import strategies as st
 
 from palaestra_sim.protocol.control import LastExit, RobotName, SidecarState, SimulatorState
 from palaestra_sim.protocol.status import (
+    Cause,
     CheckpointStatus,
+    FaultKind,
+    FaultRecord,
     SimulatorRole,
     SimulatorStatus,
+    StandbyState,
     Termination,
     TrainerStatus,
 )
@@ -19,6 +23,15 @@ shares = st.floats(0.0, 1.0)
 times = st.datetimes().map(lambda time: f"{time.isoformat(timespec='seconds')}Z")
 
 checkpoints = st.builds(CheckpointStatus, step=counts, time=times)
+lines = st.text(st.characters(exclude_categories=["Cs"]), max_size=200)
+fault_records = st.builds(
+    FaultRecord,
+    time=times,
+    simulator=names,
+    kind=st.sampled_from([kind.value for kind in FaultKind]),
+    fact=lines,
+    step=counts,
+)
 
 SHAPES = {
     SimulatorState: st.builds(
@@ -40,6 +53,7 @@ SHAPES = {
             expected=st.booleans(),
         ),
         detail=texts,
+        rss_bytes=st.none() | counts,
     ),
     TrainerStatus: st.builds(
         TrainerStatus,
@@ -58,12 +72,18 @@ SHAPES = {
                 state=st.sampled_from([state.value for state in SidecarState]),
                 restarts=counts,
                 last_fault=st.none() | texts,
+                flapping=st.booleans(),
+                given_up=st.booleans(),
+                standby=st.none() | st.sampled_from([state.value for state in StandbyState]),
             ),
             max_size=3,
         ).map(tuple),
         last_checkpoint=st.none() | checkpoints,
         last_progress=st.none() | times,
         attempt=st.none() | st.integers(1, 2**53),
+        faults=st.dictionaries(st.sampled_from([kind.value for kind in FaultKind]), counts),
+        goodput=st.dictionaries(st.sampled_from([cause.value for cause in Cause]), st.floats(0.0, 1e9)),
+        steps_lost=counts,
     ),
     Termination: st.builds(
         Termination,
@@ -73,6 +93,8 @@ SHAPES = {
         last_checkpoint=st.none() | checkpoints,
         attempt=st.none() | st.integers(1, 2**53),
         restarts=st.none() | counts,
+        log=st.lists(lines, max_size=10).map(tuple),
+        faults=st.lists(fault_records, max_size=10).map(tuple),
     ),
 }
 
@@ -88,6 +110,8 @@ def bent(draw, shape):
     whole = draw(SHAPES[shape]).to_json()
     part = whole
     while True:
+        if not part:
+            return whole
         name = draw(st.sampled_from(sorted(part)))
         inner = part[name][0] if isinstance(part[name], list) and part[name] else part[name]
         if not isinstance(inner, dict) or draw(st.booleans()):

@@ -13,9 +13,9 @@ from palaestra_sim.sidecar.output import MOST_LINE, LineHandler, Passage
 def passed_on(capfdbinary):
     """Return what comes out for what goes in, and the last line that was kept."""
 
-    def through(*pieces):
+    def through(*pieces, mark=""):
         source, sink = os.pipe()
-        passage = Passage(source)
+        passage = Passage(source, mark)
         reader = threading.Thread(target=passage.run)
         reader.start()
         for piece in pieces:
@@ -49,6 +49,16 @@ def test_a_line_without_end_is_passed_on_in_pieces(passed_on, end) -> None:
 
     assert {len(line) for line in out.splitlines(keepends=True)[:-1]} == {MOST_LINE}
     assert out.replace(b"\n", b"") == b"x" * 3 * MOST_LINE
+
+
+def test_every_line_of_one_of_two_simulators_begins_with_its_mark(passed_on) -> None:
+    """The pieces of a long line too, and with the mark they are no longer than a line may be."""
+    out, last = passed_on(b"one\n" + b"x" * MOST_LINE + b"\ntwo", mark="b: ")
+
+    lines = out.splitlines(keepends=True)
+    assert all(line.startswith(b"b: ") and len(line) <= MOST_LINE for line in lines)
+    assert (lines[0], lines[-1], last) == (b"b: one\n", b"b: two\n", "two")
+    assert out.count(b"x") == MOST_LINE
 
 
 def test_bytes_that_are_no_text_are_passed_on(passed_on) -> None:

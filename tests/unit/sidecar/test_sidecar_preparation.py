@@ -1,5 +1,7 @@
 """The world that a simulator runs: written whole, with its own ROS names, or not at all."""
 
+from dataclasses import replace
+
 import pytest
 
 from palaestra_sim.errors import WorldError
@@ -99,6 +101,21 @@ def test_a_container_that_starts_again_finds_its_own_links(source, tmp_path) -> 
     second = preparation.named(world, tmp_path / "work", IDENTITY, clock=False)
 
     assert first == second
+
+
+def test_the_world_of_a_standby_lies_beside_the_first_ones(source, tmp_path) -> None:
+    """Both find the same neighbours, and neither overwrites the other."""
+    world = source(NEIGHBOURS)
+    (world.parent / "textures").mkdir()
+
+    first, second = (
+        preparation.named(world, tmp_path / "work", replace(IDENTITY, slot=slot), clock=False)
+        for slot in preparation.SLOTS
+    )
+
+    assert (first.name, second.name) == ("collect-1.wbt", "collect-1b.wbt")
+    assert first.parent == second.parent
+    assert first.read_bytes() != second.read_bytes()
 
 
 def test_a_broken_world_says_where_and_leaves_nothing(source, tmp_path) -> None:

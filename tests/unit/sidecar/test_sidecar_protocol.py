@@ -20,8 +20,11 @@ from palaestra_sim.protocol.control import (
 )
 from palaestra_sim.protocol.fields import MOST_BYTES, decoded
 from palaestra_sim.protocol.status import (
+    Cause,
     CheckpointStatus,
     ExitCode,
+    FaultKind,
+    FaultRecord,
     SimulatorStatus,
     Termination,
     TrainerStatus,
@@ -84,6 +87,7 @@ def test_no_bytes_break_the_decoder(data) -> None:
         ({"starts": 1.0}, "starts: a number is no integer"),
         ({"faults": -1}, "faults: is not within 0 to 9007199254740992"),
         ({"faults": 10**6000}, "faults: is not within 0 to 9007199254740992"),
+        ({"rss_bytes": -1}, "rss_bytes: is not within 0 to 9007199254740992"),
         ({"robots": {}}, "robots: an object is no list"),
         ({"robots": [{}] * 33}, "robots: has 33 entries, more than 32"),
         ({"robots": [7]}, "robots[0]: a number is no object"),
@@ -108,6 +112,14 @@ def test_a_missing_field_is_named(state, field) -> None:
 
     with pytest.raises(ProtocolError, match=f"^{field}: is missing$"):
         SimulatorState.from_json(content)
+
+
+def test_a_sidecar_of_an_older_release_tells_no_memory(state) -> None:
+    """Nobody is recycled for what is not known."""
+    content = state(rss_bytes=7).to_json()
+    del content["rss_bytes"]
+
+    assert SimulatorState.from_json(content).rss_bytes is None
 
 
 def test_a_field_that_a_newer_release_added_is_ignored_in_an_answer(state) -> None:
@@ -220,6 +232,99 @@ def test_the_longest_reason_is_cut_and_nothing_else() -> None:
     read = Termination.from_message(message)
     assert (read.step, read.success_rate) == (7, 0.5)
     assert 300 < len(read.reason) < 341
+
+
+@given(data=st.data())
+def test_a_last_word_of_any_length_fits_in_a_termination_message(messages, data) -> None:
+    """However long its log and its faults; what is left out is the oldest, and never the reason."""
+    word = data.draw(messages.right(Termination))
+
+    message = word.to_message()
+
+    read = Termination.from_message(message)
+    assert len(message.encode()) <= 4096
+    assert read.log == word.log[len(word.log) - len(read.log) :]
+    assert read.faults == word.faults[len(word.faults) - len(read.faults) :]
+    assert read.reason == word.reason or not (read.log or read.faults)
+
+
+def test_a_long_log_does_not_drive_out_the_faults() -> None:
+    """Whoever reads it wants to see both."""
+    fault = FaultRecord(
+        time="2025-01-31T12:00:00Z", simulator="collect-0", kind="dead", fact="x" * 150, step=7
+    )
+    word = Termination(step=7, reason="y" * 500, log=("z" * 200,) * 30, faults=(fault,) * 30)
+
+    read = Termination.from_message(word.to_message())
+
+    assert len(read.log) >= 7
+    assert len(read.faults) >= 6
+    assert read.reason == word.reason
+
+
+@pytest.mark.parametrize(
+    "lines", ["one line", [7], ["x" * 201], ["x"] * 11, ["\ud800"]], ids=["text", "7", "long", "many", "half"]
+)
+def test_a_log_that_nobody_of_ours_wrote_is_refused(lines) -> None:
+    """It goes into a TrainingJob's status, which is bounded."""
+    content = Termination(step=7, reason="Completed").to_json() | {"log": lines}
+
+    with pytest.raises(ProtocolError, match=r"^log"):
+        Termination.from_json(content)
+
+
+def test_a_trainer_of_an_older_release_is_understood(status) -> None:
+    """Images of one job may be of different releases."""
+    simulator = SimulatorStatus(name="collect-0", role="Collect", state="ready")
+    running, ended = status(simulators=(simulator,)).to_json(), Termination(step=7, reason="x").to_json()
+    for name in ("faults", "goodput", "steps_lost"):
+        del running[name]
+    for name in ("flapping", "given_up", "standby"):
+        del running["simulators"][0][name]
+    for name in ("log", "faults"):
+        del ended[name]
+
+    assert TrainerStatus.from_json(running) == status(simulators=(simulator,))
+    assert Termination.from_json(ended) == Termination(step=7, reason="x")
+
+
+def test_a_kind_that_a_newer_release_added_is_ignored_in_a_table(status) -> None:
+    """As any other field that nobody asked for."""
+    content = status(faults={"dead": 1, "melted": 2}, goodput={"stepping": 1.5, "dreaming": 9.0}).to_json()
+
+    read = TrainerStatus.from_json(content)
+
+    assert (read.faults, read.goodput) == ({"dead": 1}, {"stepping": 1.5})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"faults": [1]}, r"^faults: a list is no object$"),
+        ({"faults": {"dead": -1}}, r"^faults\.dead: is not within"),
+        ({"goodput": {"learning": "long"}}, r"^goodput\.learning: text is no number$"),
+        ({"goodput": {"learning": -0.1}}, r"^goodput\.learning: is not within"),
+        ({"steps_lost": 1.5}, r"^steps_lost: a number is no integer$"),
+    ],
+)
+def test_a_table_says_which_of_its_values_is_wrong(status, changes, message) -> None:
+    """Of eleven numbers one may be."""
+    with pytest.raises(ProtocolError, match=message):
+        TrainerStatus.from_json(status().to_json() | changes)
+
+
+def test_kinds_and_causes_are_those_of_the_metrics_and_the_status() -> None:
+    """Dashboards and a TrainingJob's status have them by these names."""
+    assert [kind.value for kind in FaultKind] == ["dead", "hung", "slow", "wrong_data"]
+    assert [cause.value for cause in Cause] == [
+        "stepping",
+        "transport",
+        "learning",
+        "evaluating",
+        "checkpointing",
+        "starting",
+        "recovering",
+    ]
 
 
 @pytest.mark.parametrize("message", ["", "Traceback (most recent call last):", "{" * 5000, "\ud800"])

@@ -1,7 +1,8 @@
 """What trainer, sidecar, simulator and operator say to each other. Pure: values and bytes, no socket.
 
 control   between trainer and sidecar: the requests, and the state of a simulator
-status    what a trainer tells the operator: `/status`, the termination message, exit codes
+status    what a trainer tells the operator: `/status`, the termination message
+terms     the words of both: exit codes, kinds of faults, causes of time, roles
 fields    how all of that is read from JSON that nobody has to trust
 tcpros    the wire of ROS 1
 rostypes  the ROS types of the interface

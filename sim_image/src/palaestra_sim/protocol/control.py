@@ -5,6 +5,9 @@
     POST /stop    {"deadline_s": 5.0}   it will end; it is killed after that many seconds
     GET  /state
 
+A sidecar that has a standby takes the same for its second simulator at /standby/start, /standby/ready,
+/standby/stop and /standby/state. Which of the two is played in is the trainer's affair.
+
 Each is answered with a `SimulatorState`: 200, or 409 when the state does not allow the request. A
 body that is wrong is answered with 400 and {"error": "<field>: <fact>"}.
 """
@@ -33,6 +36,7 @@ __all__ = [
     "decoded",
 ]
 
+STANDBY = "/standby"  # what stands before a path that is about the second simulator
 MOST_DEADLINE_S = 3600.0
 MOST_PATH = 4096
 MOST_ROBOTS = 32
@@ -129,6 +133,7 @@ class SimulatorState:
         faults: how often it ended without having been asked to.
         last_exit: how it last ended; None: never yet.
         detail: why it is in this state, in a sentence for people; "": there is nothing to say.
+        rss_bytes: the memory that its processes use, told by GET while it is ready; None: not told.
     """
 
     state: SidecarState
@@ -140,6 +145,7 @@ class SimulatorState:
     faults: int = 0
     last_exit: LastExit | None = None
     detail: str = ""
+    rss_bytes: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, texts cut to what a reader takes."""
@@ -153,6 +159,7 @@ class SimulatorState:
             "faults": self.faults,
             "last_exit": None if self.last_exit is None else self.last_exit.to_json(),
             "detail": clipped(self.detail),
+            "rss_bytes": self.rss_bytes,
         }
 
     @classmethod
@@ -173,6 +180,7 @@ class SimulatorState:
             faults=fields.whole("faults"),
             last_exit=fields.part("last_exit", LastExit.from_json) if fields.has("last_exit") else None,
             detail=fields.text("detail"),
+            rss_bytes=fields.whole("rss_bytes") if fields.has("rss_bytes") else None,
         )
 
 

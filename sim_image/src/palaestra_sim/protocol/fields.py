@@ -89,14 +89,11 @@ class Fields:
 
     def text(self, name: str, most: int = MOST_TEXT, least: int = 0) -> str:
         """Return text of `least` to `most` characters."""
-        value = self._value(name)
-        if not isinstance(value, str):
-            raise self._error(name, f"{_kind(value)} is no text")
-        if not least <= len(value) <= most:
-            raise self._error(name, f"has {len(value)} characters, not {least} to {most}")
-        if any("\ud800" <= character <= "\udfff" for character in value):
-            raise self._error(name, "holds half a character")
-        return value
+        return _text(self._value(name), self._at(name), most, least)
+
+    def texts(self, name: str, most: int, most_entries: int) -> tuple[str, ...]:
+        """Return a list of at most `most_entries` texts of at most `most` characters each."""
+        return self.parts(name, lambda item, path: _text(item, path, most), most_entries)
 
     def choice(self, name: str, choices: type[Choice]) -> Choice:
         """Return one of `choices`."""
@@ -150,7 +147,7 @@ class Fields:
         return read(self._value(name), self._at(name))
 
     def parts(self, name: str, read: Callable[[object, str], T], most: int) -> tuple[T, ...]:
-        """Return a list of at most `most` objects, as `read` reads each."""
+        """Return a list of at most `most` entries, as `read` reads each."""
         value = self._value(name)
         if not isinstance(value, list):
             raise self._error(name, f"{_kind(value)} is no list")
@@ -169,6 +166,17 @@ class Fields:
 
     def _error(self, name: str, fact: str) -> ProtocolError:
         return ProtocolError(f"{self._at(name)}: {fact}")
+
+
+def _text(value: object, path: str, most: int, least: int = 0) -> str:
+    """Return `value`, which stands at `path`, if it is text of `least` to `most` characters."""
+    if not isinstance(value, str):
+        raise ProtocolError(f"{path}: {_kind(value)} is no text")
+    if not least <= len(value) <= most:
+        raise ProtocolError(f"{path}: has {len(value)} characters, not {least} to {most}")
+    if any("\ud800" <= character <= "\udfff" for character in value):
+        raise ProtocolError(f"{path}: holds half a character")
+    return value
 
 
 def _kind(value: object) -> str:

@@ -7,52 +7,48 @@ writing stays within the bounds, so that a trainer's long error message never hi
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
-from enum import IntEnum, StrEnum
-from typing import Any, Self
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Any, Self, TypeVar
 
 from palaestra_sim.protocol.control import SidecarState
-from palaestra_sim.protocol.fields import MOST_NAME, Fields, ProtocolError, clipped, decoded, known
+from palaestra_sim.protocol.fields import (
+    MOST_COUNT,
+    MOST_NAME,
+    Fields,
+    ProtocolError,
+    clipped,
+    decoded,
+    known,
+)
+from palaestra_sim.protocol.terms import Cause, ExitCode, FaultKind, SimulatorRole, StandbyState
 
 __all__ = [
+    "Cause",
     "CheckpointStatus",
     "ExitCode",
+    "FaultKind",
+    "FaultRecord",
     "ProtocolError",
     "SimulatorRole",
     "SimulatorStatus",
+    "StandbyState",
     "Termination",
     "TrainerStatus",
     "decoded",
 ]
 
+T = TypeVar("T")
+
 MOST_SIMULATORS = 32
+MOST_FAULTS = 10  # the last ones, in a last word
+MOST_LINES = 10  # the last ones of the trainer's log, in a last word
+MOST_LINE = 200  # characters of such a line, and of the fact of such a fault
 MOST_REASON = 2000
 MOST_TERMINATION_BYTES = 4096  # Source: Kubernetes cuts a container's termination message there
 
 _LONGEST_ESCAPE = 12  # bytes of one character in JSON: two \uXXXX
-
-
-class ExitCode(IntEnum):
-    """How a trainer ends; anything else is unexpected and may be tried again.
-
-    DONE: the run has ended. CONFIGURATION: it is wrong, don't retry. INTERRUPTED: by a signal, and
-    a checkpoint was written. FAULT_BUDGET: a simulator failed too often, don't retry. DIVERGED: the
-    learner did, don't retry. STALLED: no environment step for too long, retry.
-    """
-
-    DONE = 0
-    CONFIGURATION = 2
-    INTERRUPTED = 75
-    FAULT_BUDGET = 80
-    DIVERGED = 81
-    STALLED = 82
-
-
-class SimulatorRole(StrEnum):
-    """What a simulator's episodes are for: to learn from, or to measure the policy."""
-
-    COLLECT = "Collect"
-    EVALUATE = "Evaluate"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +83,9 @@ class SimulatorStatus:
         state: one of the states of a sidecar.
         restarts: after faults, in this attempt; recycling is not counted.
         last_fault: in a sentence; None: no fault in this attempt.
+        flapping: whether it breaks again and again, and not once.
+        given_up: whether its budget of restarts is spent, and the run goes on without it.
+        standby: starting or ready, the state of its spare; None: it has none.
     """
 
     name: str
@@ -94,6 +93,9 @@ class SimulatorStatus:
     state: str
     restarts: int = 0
     last_fault: str | None = None
+    flapping: bool = False
+    given_up: bool = False
+    standby: str | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, texts cut to what a reader takes."""
@@ -103,6 +105,9 @@ class SimulatorStatus:
             "state": self.state,
             "restarts": self.restarts,
             "last_fault": None if self.last_fault is None else clipped(self.last_fault),
+            "flapping": self.flapping,
+            "given_up": self.given_up,
+            "standby": self.standby,
         }
 
     @classmethod
@@ -119,6 +124,9 @@ class SimulatorStatus:
             state=fields.choice("state", SidecarState).value,
             restarts=fields.whole("restarts"),
             last_fault=fields.text("last_fault") if fields.has("last_fault") else None,
+            flapping=fields.has("flapping") and fields.flag("flapping"),
+            given_up=fields.has("given_up") and fields.flag("given_up"),
+            standby=fields.choice("standby", StandbyState).value if fields.has("standby") else None,
         )
 
 
@@ -138,6 +146,10 @@ class TrainerStatus:
         last_progress: when an environment last stepped (RFC 3339); None: never yet.
         phase: what the trainer does now, in one word.
         attempt: number of this attempt by the run directory's record, from 1; None: not recorded yet.
+        faults: how many of each `FaultKind`, over all attempts.
+        goodput: seconds spent on each `Cause`, over all attempts.
+        steps_lost: valid steps that were played in vain, over all attempts: after the checkpoint that a
+            resumed attempt went on from, or in an episode that a fault cut.
     """
 
     step: int
@@ -151,6 +163,9 @@ class TrainerStatus:
     last_checkpoint: CheckpointStatus | None = None
     last_progress: str | None = None
     attempt: int | None = None
+    faults: Mapping[str, int] = field(default_factory=dict)
+    goodput: Mapping[str, float] = field(default_factory=dict)
+    steps_lost: int = 0
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data; a number that is not finite is not known."""
@@ -167,6 +182,9 @@ class TrainerStatus:
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
             "last_progress": self.last_progress,
             "attempt": self.attempt,
+            "faults": dict(self.faults),
+            "goodput": {cause: known(seconds) for cause, seconds in self.goodput.items()},
+            "steps_lost": self.steps_lost,
         }
 
     @classmethod
@@ -189,6 +207,54 @@ class TrainerStatus:
             last_checkpoint=_checkpoint(fields),
             last_progress=fields.time("last_progress") if fields.has("last_progress") else None,
             attempt=_attempt(fields),
+            faults=_table(fields, "faults", FaultKind, Fields.whole),
+            goodput=_table(fields, "goodput", Cause, _seconds),
+            steps_lost=fields.whole("steps_lost") if fields.has("steps_lost") else 0,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultRecord:
+    """One fault of one simulator, as a last word tells it.
+
+    Attributes:
+        time: when it was noticed (RFC 3339).
+        simulator: group and number, as collect-0.
+        kind: one of `FaultKind`.
+        fact: what happened, in a sentence.
+        step: how many valid environment steps the run had then.
+    """
+
+    time: str
+    simulator: str
+    kind: str
+    fact: str
+    step: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data, texts cut to what a reader takes."""
+        return {
+            "time": self.time,
+            "simulator": clipped(self.simulator, MOST_NAME),
+            "kind": self.kind,
+            "fact": clipped(self.fact, MOST_LINE),
+            "step": self.step,
+        }
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else.
+        """
+        fields = Fields(content, path)
+        return cls(
+            time=fields.time("time"),
+            simulator=fields.text("simulator", MOST_NAME, least=1),
+            kind=fields.choice("kind", FaultKind).value,
+            fact=fields.text("fact", MOST_LINE),
+            step=fields.whole("step"),
         )
 
 
@@ -203,6 +269,8 @@ class Termination:
         last_checkpoint: the newest; None: none.
         attempt: number of this attempt by the run directory's record, from 1; None: not recorded.
         restarts: of simulators after faults, in this attempt; None: not told.
+        log: the last lines of the trainer's log, the newest last; at most ten.
+        faults: the last ones of this attempt, the newest last; at most ten.
     """
 
     step: int
@@ -211,17 +279,30 @@ class Termination:
     last_checkpoint: CheckpointStatus | None = None
     attempt: int | None = None
     restarts: int | None = None
+    log: tuple[str, ...] = ()
+    faults: tuple[FaultRecord, ...] = ()
 
     def to_message(self) -> str:
-        """Return the termination message: JSON of at most 4096 bytes, the reason cut to fit."""
+        """Return the termination message: JSON of at most 4096 bytes.
+
+        To fit, the oldest lines and faults are left out; when there is none left, the reason is cut.
+        """
         word = self
-        while (excess := len(message := json.dumps(word.to_json())) - MOST_TERMINATION_BYTES) > 0:
-            shorter = word.to_json()["reason"][: -(excess // _LONGEST_ESCAPE + 1)]
-            word = replace(word, reason=shorter)
-        return message
+        while (excess := _length(word.to_json()) - MOST_TERMINATION_BYTES) > 0:
+            word = word.shorter(excess)
+        return json.dumps(word.to_json())
+
+    def shorter(self, excess: int) -> Self:
+        """Return what comes nearer to a message with `excess` bytes less, and is worth most to a reader."""
+        content = self.to_json()
+        if self.log and _length(content["log"]) >= _length(content["faults"]):
+            return replace(self, log=self.log[-MOST_LINES:][1:])
+        if self.faults:
+            return replace(self, faults=self.faults[-MOST_FAULTS:][1:])
+        return replace(self, reason=content["reason"][: -(excess // _LONGEST_ESCAPE + 1)])
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, the reason cut to what a reader takes."""
+        """Return it as JSON data, texts and lists cut to what a reader takes."""
         checkpoint = self.last_checkpoint
         return {
             "step": self.step,
@@ -230,6 +311,8 @@ class Termination:
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
             "attempt": self.attempt,
             "restarts": self.restarts,
+            "log": [clipped(line, MOST_LINE) for line in self.log[-MOST_LINES:]],
+            "faults": [fault.to_json() for fault in self.faults[-MOST_FAULTS:]],
         }
 
     @classmethod
@@ -256,7 +339,32 @@ class Termination:
             last_checkpoint=_checkpoint(fields),
             attempt=_attempt(fields),
             restarts=fields.whole("restarts") if fields.has("restarts") else None,
+            log=fields.texts("log", MOST_LINE, MOST_LINES) if fields.has("log") else (),
+            faults=_fault_records(fields),
         )
+
+
+def _length(content: object) -> int:
+    """Return how many bytes `content` takes as JSON, which is ASCII as we write it."""
+    return len(json.dumps(content))
+
+
+def _table(
+    fields: Fields, name: str, rows: Iterable[StrEnum], read: Callable[[Fields, str], T]
+) -> dict[str, T]:
+    """Return an object's values by name, those of `rows` that are there; a newer release may have more."""
+    if not fields.has(name):
+        return {}
+    table = fields.part(name, Fields)
+    return {row.value: read(table, row.value) for row in rows if table.has(row.value)}
+
+
+def _seconds(fields: Fields, name: str) -> float:
+    return fields.number(name, 0.0, MOST_COUNT)
+
+
+def _fault_records(fields: Fields) -> tuple[FaultRecord, ...]:
+    return fields.parts("faults", FaultRecord.from_json, MOST_FAULTS) if fields.has("faults") else ()
 
 
 def _attempt(fields: Fields) -> int | None:

@@ -1,4 +1,6 @@
-"""The sidecar: one process that starts, watches and stops one simulator, for a trainer to command.
+"""The sidecar: one process that starts, watches and stops a simulator, for a trainer to command.
+
+It may have a second simulator that stands by. The two share the process and its ports, and nothing else.
 
 cli          the command line: check everything, then run
 preparation  the world that the simulator will run, with its own ROS names

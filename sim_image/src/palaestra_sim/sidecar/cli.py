@@ -1,4 +1,4 @@
-"""The command line of the sidecar: check everything, listen, say where, then own the simulator."""
+"""The command line of the sidecar: check everything, listen, say where, then own the simulators."""
 
 import argparse
 import ipaddress
@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from palaestra_sim.errors import SimError
@@ -17,7 +18,6 @@ from palaestra_sim.sidecar.drivers import Driver, Launch, command
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
-from palaestra_sim.sidecar.process import Command
 from palaestra_sim.sidecar.server import Listener, control_routes, health_routes
 from palaestra_sim.sidecar.simulator import Simulator
 from palaestra_sim.world import RunIdentity
@@ -31,25 +31,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
     log_to_stdout()
     given = parse(sys.argv[1:] if arguments is None else arguments)
     try:
-        simulator_command, state = prepare(given)
+        simulators = prepare(given)
         control = Listener("--control", given.control)
         health = Listener("--health", given.health)
     except SimError as error:
         sys.stderr.write(f"palaestra-sidecar: {error}\n")
         return EXIT_WRONG
-    simulator = Simulator(simulator_command, state)
-    signals.take(simulator.shut_down)
-    control.serve(control_routes(simulator))
-    health.serve(health_routes(simulator, metrics.registry(simulator)))
+    signals.take(lambda: shut_down(simulators))
+    control.serve(control_routes(simulators))
+    health.serve(health_routes(simulators, metrics.registry(simulators)))
     if given.until_stdin_closes:
         threading.Thread(target=end_with_stdin, daemon=True).start()
     log.info("control=%s health=%s", control.address, health.address)
-    simulator.run()
+    run(simulators)
     return 0
 
 
-def prepare(given: argparse.Namespace) -> tuple[Command, SimulatorState]:
-    """Return how the simulator is started, and what is known of it before.
+def shut_down(simulators: Sequence[Simulator]) -> None:
+    """End all simulators at once and let `run` return; from any thread."""
+    for simulator in simulators:
+        simulator.shut_down()
+
+
+def run(simulators: Sequence[Simulator]) -> None:
+    """Look after all simulators, each in a thread of its own, until a shutdown has left nothing running."""
+    first, *others = simulators
+    threads = [threading.Thread(target=each.run, name="simulator", daemon=True) for each in others]
+    for thread in threads:
+        thread.start()
+    first.run()
+    for thread in threads:
+        thread.join()
+
+
+def prepare(given: argparse.Namespace) -> tuple[Simulator, ...]:
+    """Return the simulator, and with --standby a second one, not started yet.
 
     Raises:
         SimError: an option, the world or the program is wrong.
@@ -59,11 +75,22 @@ def prepare(given: argparse.Namespace) -> tuple[Command, SimulatorState]:
     driver = Driver(given.driver)
     if given.program and driver is not Driver.COMMAND:
         raise SidecarError(f"--driver {driver}: takes no program; use --driver command")
-    world = _world(given)
+    if given.standby and given.job is None:
+        raise SidecarError("--standby: two simulators need names of their own; give --job and --work")
+    slots = preparation.SLOTS if given.standby else preparation.SLOTS[:1]
+    return tuple(_simulator(given, driver, slot) for slot in slots)
+
+
+def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Simulator:
+    """Return the simulator of one slot."""
+    world = _world(given, slot)
     robots = preparation.described(preparation.read(world), str(world))
     launch = Launch(world=world, options=given.option, program=given.program)
-    state = SimulatorState(state=SidecarState.IDLE, driver=driver.value, world=str(world), robots=robots)
-    return command(driver, launch, os.environ), state
+    started = command(driver, launch, os.environ | {"PALAESTRA_SIMULATOR_SLOT": slot})
+    return Simulator(
+        replace(started, mark=f"{slot}: ") if given.standby else started,
+        SimulatorState(state=SidecarState.IDLE, driver=driver.value, world=str(world), robots=robots),
+    )
 
 
 def end_with_stdin() -> None:
@@ -78,7 +105,7 @@ def log_to_stdout() -> None:
     logging.basicConfig(level=logging.INFO, handlers=[LineHandler()])
 
 
-def _world(given: argparse.Namespace) -> Path:
+def _world(given: argparse.Namespace, slot: str) -> Path:
     """Return the world to run: the given one, or with --job its copy with its own ROS names."""
     if given.job is None:
         return Path(given.world).absolute()
@@ -91,8 +118,10 @@ def _world(given: argparse.Namespace) -> Path:
         replica=given.replica,
         group=given.group,
         index=given.index,
+        slot=slot,
     )
-    return preparation.named(given.world, given.work.absolute(), identity, clock=given.clock)
+    clock = given.clock and slot == preparation.SLOTS[0]
+    return preparation.named(given.world, given.work.absolute(), identity, clock=clock)
 
 
 if __name__ == "__main__":

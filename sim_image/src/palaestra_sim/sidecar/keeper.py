@@ -59,12 +59,12 @@ def children(parents: set[int]) -> set[int]:
     return found
 
 
-def kill_children() -> set[int]:
-    """Send SIGKILL to every child of this process, and return them.
+def kill_children(spared: frozenset[int] = frozenset()) -> set[int]:
+    """Send SIGKILL to every child of this process that is not `spared`, and return them.
 
     None can be mistaken for another process: a number is free again only when we have reaped it.
     """
-    found = children({os.getpid()})
+    found = children({os.getpid()}) - spared
     for pid in found:
         with contextlib.suppress(OSError):  # it became another user's; its own end is up to that user
             os.kill(pid, signal.SIGKILL)

@@ -19,6 +19,10 @@ reads   the world; with --job it writes the world with its own ROS names, GROUP-
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
 serves  control: /start /ready /stop /state; health: /healthz /state /metrics
 
+With --standby there is a second simulator, slot b, with a world, ROS names and a process of its own
+(GROUP-INDEXb.wbt; /standby/start and so on), so that one can start while the other works. Lines then begin
+with "a: " or "b: ". A simulator finds its slot in PALAESTRA_SIMULATOR_SLOT.
+
 exit codes: 0 after SIGTERM or SIGINT, with nothing left running; 1 the same, but something hung;
             2 wrong options or world, a port in use, a missing program: nothing was started
 """
@@ -79,6 +83,7 @@ def _add_identity(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"
     )
+    group.add_argument("--standby", action="store_true", help="have a second simulator, which may stand by")
 
 
 def _address(text: str) -> Address:

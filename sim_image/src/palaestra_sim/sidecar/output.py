@@ -35,13 +35,19 @@ class LineHandler(logging.Handler):
 class Passage:
     """Passes on what comes out of a pipe, line by line, until its end.
 
+    Args:
+        source: the pipe.
+        mark: what to write before each line.
+
     Attributes:
         last_line: the last line that was not empty, as text.
     """
 
-    def __init__(self, source: int) -> None:
+    def __init__(self, source: int, mark: str = "") -> None:
         self.last_line = ""
         self._source = source
+        self._mark = mark.encode()
+        self._most = MOST_LINE - 1 - len(self._mark)
 
     def run(self) -> None:
         """Pass on everything; returns when nobody can write any more. Closes the pipe."""
@@ -50,9 +56,9 @@ class Passage:
             *lines, rest = (rest + chunk).split(b"\n")
             for line in lines:
                 self._pass_on(line)
-            while len(rest) >= MOST_LINE:
-                self._pass_on(rest[: MOST_LINE - 1])
-                rest = rest[MOST_LINE - 1 :]
+            while len(rest) > self._most:
+                self._pass_on(rest[: self._most])
+                rest = rest[self._most :]
         if rest:
             self._pass_on(rest)
         os.close(self._source)
@@ -61,5 +67,5 @@ class Passage:
         """Write one line, in pieces if it is longer than a line may be."""
         if line.strip():
             self.last_line = line[:MOST_LINE].decode("utf-8", "replace").strip()
-        for start in range(0, max(1, len(line)), MOST_LINE - 1):
-            write_line(line[start : start + MOST_LINE - 1] + b"\n")
+        for start in range(0, max(1, len(line)), self._most):
+            write_line(self._mark + line[start : start + self._most] + b"\n")

@@ -12,6 +12,7 @@ from palaestra_sim.protocol.control import RobotName
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.world import RunIdentity, builtin_path, generate, robots
 
+SLOTS = ("a", "b")  # of the simulators of one sidecar: the first, and one that may stand by for it
 _PROJECT = "project"
 
 
@@ -43,7 +44,7 @@ def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool) -> Pat
         WorldError: the world is wrong.
         SidecarError: it cannot be read or written; nothing is half-written.
     """
-    source, name = read(world), f"{identity.group}-{identity.index}.wbt"
+    source, name = read(world), file_name(identity)
     try:
         generated, folder = generate(source, identity, clock=clock, name=str(world)), None
     except WorldError:
@@ -55,6 +56,12 @@ def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool) -> Pat
         return _write_whole((folder or work) / name, generated)
     except OSError as error:
         raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
+
+
+def file_name(identity: RunIdentity) -> str:
+    """Return the name of a simulator's own world: `collect-0.wbt`, `collect-0b.wbt` for its standby."""
+    slot = "" if identity.slot == SLOTS[0] else identity.slot
+    return f"{identity.group}-{identity.index}{slot}.wbt"
 
 
 def described(source: bytes, name: str) -> tuple[RobotName, ...]:

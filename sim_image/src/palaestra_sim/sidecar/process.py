@@ -2,7 +2,7 @@
 
 The sidecar talks to the keeper through two pipes and hears its end through threads, so nothing here
 waits. Reaping is a matter of the whole sidecar, as it may be process 1 of its container: `reap` takes
-every child that ended, the keeper and the orphans that only process 1 gets.
+every child that ended, the keepers and the orphans that only process 1 gets.
 """
 
 import contextlib
@@ -21,13 +21,17 @@ from palaestra_sim.sidecar.output import Passage
 _KEEPER = Path(keeper.__file__)
 _LAST_OUTPUT_S = 0.2  # for the lines that are still in the pipe when the simulator has ended
 
+_keepers: set[int] = set()  # those that have not ended: the only children that are no orphans
+_keepers_lock = threading.Lock()  # a keeper between its start and its place in the set is none
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """A program with its arguments, and its environment."""
+    """A program with its arguments, its environment, and what marks each line that it prints."""
 
     arguments: tuple[str, ...]
     environment: Mapping[str, str]
+    mark: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,10 +85,10 @@ class Process:
             raise
         finally:
             _close(commands, output, reports)
-        passage = Passage(our_output)
+        passage = Passage(our_output, command.mark)
         reader = threading.Thread(target=passage.run, name="output", daemon=True)
         watcher = threading.Thread(
-            target=_watch, args=(our_reports, reader, passage, report), name="reports", daemon=True
+            target=_watch, args=(pid, our_reports, reader, passage, report), name="reports", daemon=True
         )
         reader.start()
         watcher.start()
@@ -130,17 +134,20 @@ def _resident_pages(pid: int) -> int:
 
 def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
     """Start the keeper with these of our descriptors as its own, out of reach of the terminal."""
-    return os.posix_spawn(
-        sys.executable,
-        [sys.executable, "-I", "-S", str(_KEEPER), *command.arguments],
-        dict(command.environment),
-        file_actions=[(os.POSIX_SPAWN_DUP2, ours, its) for its, ours in descriptors.items()],
-        setsid=True,
-        setsigmask=(),
-    )
+    with _keepers_lock:
+        pid = os.posix_spawn(
+            sys.executable,
+            [sys.executable, "-I", "-S", str(_KEEPER), *command.arguments],
+            dict(command.environment),
+            file_actions=[(os.POSIX_SPAWN_DUP2, ours, its) for its, ours in descriptors.items()],
+            setsid=True,
+            setsigmask=(),
+        )
+        _keepers.add(pid)
+        return pid
 
 
-def _watch(reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
+def _watch(keeper_pid: int, reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
     """Report what the keeper says until it has ended."""
     said: dict[str, int] = {}
     with os.fdopen(reports) as lines:
@@ -149,6 +156,8 @@ def _watch(reports: int, reader: threading.Thread, passage: Passage, report: Rep
             said[word] = int(number)
             if word == "started":
                 report(Started(pid=said[word]))
+    with _keepers_lock:
+        _keepers.discard(keeper_pid)
     if "exit" not in said:
         _end_orphans()
     reader.join(_LAST_OUTPUT_S)
@@ -157,11 +166,16 @@ def _watch(reports: int, reader: threading.Thread, passage: Passage, report: Rep
 
 def _end_orphans() -> None:
     """Kill what a keeper left behind that was killed itself: it has become ours."""
-    while orphans := keeper.kill_children():
+    while orphans := _kill_orphans():
         for pid in orphans:
             with contextlib.suppress(ChildProcessError):  # reaped by the signals' thread
                 os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
         reap()
+
+
+def _kill_orphans() -> set[int]:
+    with _keepers_lock:
+        return keeper.kill_children(frozenset(_keepers))
 
 
 def _ended(said: Mapping[str, int], last_line: str) -> Ended:

@@ -10,7 +10,7 @@ import json
 import socket
 import socketserver
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
@@ -18,7 +18,7 @@ from typing import Any, cast
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 
-from palaestra_sim.protocol.control import PlainRequest, ProtocolError, StopRequest, decoded
+from palaestra_sim.protocol.control import STANDBY, PlainRequest, ProtocolError, StopRequest, decoded
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.sidecar.lifecycle import Event
 from palaestra_sim.sidecar.simulator import Answer, NoAnswer, Simulator
@@ -26,6 +26,7 @@ from palaestra_sim.sidecar.simulator import Answer, NoAnswer, Simulator
 MOST_BODY_BYTES = 4096
 _MOST_CONNECTIONS = 32
 _TIMEOUT_S = 5.0
+_ABOVE = ("", STANDBY)  # the paths of the first simulator, and of one that stands by for it
 _MOST_PORT = 65535
 
 
@@ -70,23 +71,29 @@ Route = Callable[[bytes], Response]
 Routes = Mapping[tuple[str, str], Route]
 
 
-def control_routes(simulator: Simulator) -> Routes:
+def control_routes(simulators: Sequence[Simulator]) -> Routes:
     """Return what the control port can do; see `palaestra_sim.protocol.control`."""
-    return {
-        ("GET", "/state"): lambda _: _json(HTTPStatus.OK, simulator.state.to_json()),
-        ("POST", "/start"): _plain(simulator, Event.START),
-        ("POST", "/ready"): _plain(simulator, Event.READY),
-        ("POST", "/stop"): _stop(simulator),
+    routes: dict[tuple[str, str], Route] = {}
+    for above, simulator in zip(_ABOVE, simulators, strict=False):
+        routes |= {
+            ("GET", f"{above}/state"): _state(simulator),
+            ("POST", f"{above}/start"): _plain(simulator, Event.START),
+            ("POST", f"{above}/ready"): _plain(simulator, Event.READY),
+            ("POST", f"{above}/stop"): _stop(simulator),
+        }
+    return routes
+
+
+def health_routes(simulators: Sequence[Simulator], registry: CollectorRegistry) -> Routes:
+    """Return what the health port can do: answer at all, tell the states, and the metrics."""
+    states = {
+        ("GET", f"{above}/state"): _state(simulator)
+        for above, simulator in zip(_ABOVE, simulators, strict=False)
     }
-
-
-def health_routes(simulator: Simulator, registry: CollectorRegistry) -> Routes:
-    """Return what the health port can do: answer at all, tell the state, and the metrics."""
-    return {
+    return states | {
         ("GET", "/healthz"): lambda _: Response(
             status=HTTPStatus.OK, body=b"ok\n", content_type="text/plain"
         ),
-        ("GET", "/state"): lambda _: _json(HTTPStatus.OK, simulator.state.to_json()),
         ("GET", "/metrics"): lambda _: Response(
             status=HTTPStatus.OK, body=generate_latest(registry), content_type=CONTENT_TYPE_LATEST
         ),
@@ -189,6 +196,11 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Length", str(len(response.body)))
         self.end_headers()
         self.wfile.write(response.body)
+
+
+def _state(simulator: Simulator) -> Route:
+    """Return the route of a question for a simulator's state."""
+    return lambda _: _json(HTTPStatus.OK, simulator.told().to_json())
 
 
 def _plain(simulator: Simulator, event: Event) -> Route:

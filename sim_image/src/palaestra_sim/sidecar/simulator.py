@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from palaestra_sim.protocol.control import LastExit, SimulatorState
+from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.lifecycle import Action, Event
 from palaestra_sim.sidecar.process import Command, Ended, Process, Started, resident_bytes
@@ -98,6 +98,11 @@ class Simulator:
         """End the simulator and let `run` return; from any thread."""
         self._inbox.put(_Message(event=Event.SHUTDOWN))
 
+    def told(self) -> SimulatorState:
+        """Return the state with the memory in use, for which a simulator that is not ready is not asked."""
+        state = self.state
+        return replace(state, rss_bytes=self.resident_bytes()) if state.state is SidecarState.READY else state
+
     def resident_bytes(self) -> int:
         """Return the memory that its processes use, in bytes; 0 if none runs. From any thread."""
         process = self._process
@@ -128,7 +133,7 @@ class Simulator:
             self.state = replace(self.state, state=state, detail="")
             self._actions[action](message)
             detail = f": {self.state.detail}" if self.state.detail else ""
-            log.info("%s%s", self.state.state.value, detail)
+            log.info("%s%s%s", self._command.mark, self.state.state.value, detail)
         if message.answers is not None:
             message.answers.put(Answer(allowed=step is not None, state=self.state))
 

@@ -1,0 +1,211 @@
+"""Two simulators in one sidecar, so that one can start while the other works: they share nothing."""
+
+import json
+import os
+import re
+import signal
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
+from palaestra_sim.sidecar.keeper import children
+from palaestra_sim.world import RunIdentity, robots, ros_name
+
+IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
+FIRST, SECOND = "", "/standby"
+
+
+class Two:
+    """A sidecar with two simulators, each of them known by what stands before its paths."""
+
+    def __init__(self, sidecar, eventually) -> None:
+        self.it = sidecar
+        self._eventually = eventually
+
+    def state(self, above, address=None):
+        """What it tells of one of them."""
+        status, text = self.it.ask("GET", f"{above}/state", address=address)
+        assert status == 200, text
+        return SimulatorState.from_json(json.loads(text))
+
+    def start(self, above):
+        """Start one; return its state when it has printed `up`."""
+        line = {FIRST: "a: up", SECOND: "b: up"}[above]
+        ups = self.it.lines.count(line) + 1
+        self.it.request(f"{above}/start")
+        self._eventually(lambda: self.it.lines.count(line) >= ups)
+        return self.state(above)
+
+    def until(self, above, wanted):
+        """Return the state of one as soon as it is `wanted`."""
+        self._eventually(lambda: self.state(above).state is wanted)
+        return self.state(above)
+
+
+@pytest.fixture
+def two(sidecar, tmp_path, eventually_true):
+    """Return how to run a sidecar whose two simulators are the same program."""
+
+    def run(program):
+        given = (f"--work={tmp_path}/work", "--job=j", "--uid=u", "--clock", "--standby")
+        return Two(sidecar(program, *given), eventually_true)
+
+    return run
+
+
+def test_each_has_a_world_with_names_of_its_own(two, waits) -> None:
+    """Slot b: another readable part and another hash, or the two would throw each other out."""
+    it = two(waits)
+
+    for above, slot, file in ((FIRST, "a", "collect-0.wbt"), (SECOND, "b", "collect-0b.wbt")):
+        identity = RunIdentity(job="j", uid="u", replica=0, group="collect", index=0, slot=slot)
+        state = it.state(above)
+        (robot,) = robots(Path(state.world).read_bytes())
+        assert Path(state.world).name == file
+        assert state.robots[0].ros_name == robot.ros_name == ros_name(identity, "robotino")
+
+
+def test_the_one_that_stands_by_keeps_no_clock(two, waits) -> None:
+    """One publisher of /clock a ROS master, also when both run."""
+    it = two(waits)
+
+    assert b"--clock" in Path(it.state(FIRST).world).read_bytes()
+    assert b"--clock" not in Path(it.state(SECOND).world).read_bytes()
+
+
+def test_each_is_started_and_stopped_by_itself(two, waits) -> None:
+    """The trainer says which of them is played in; here they are equal."""
+    it = two(waits)
+
+    first, second = it.start(FIRST), it.start(SECOND)
+    it.it.request("/standby/ready")
+    it.it.request("/stop", {"deadline_s": 0})
+    it.until(FIRST, IDLE)
+
+    assert first.pid != second.pid
+    assert it.state(SECOND).state is READY
+    assert it.state(SECOND).pid == second.pid
+
+
+@pytest.mark.parametrize(("broken", "whole"), [(FIRST, SECOND), (SECOND, FIRST)])
+def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> None:
+    """Its own fault, its own count, its own start after that."""
+    it = two(waits)
+    pid, other = it.start(broken).pid, it.start(whole).pid
+
+    os.kill(pid, signal.SIGKILL)
+    failed = it.until(broken, FAILED)
+    again = it.start(broken)
+
+    assert failed.last_exit == LastExit(code=None, signal="SIGKILL", expected=False)
+    assert (again.starts, again.faults) == (2, 1)
+    assert (it.state(whole).starts, it.state(whole).faults, it.state(whole).pid) == (1, 0, other)
+
+
+def test_a_killed_keeper_takes_its_own_simulator_along_and_no_other(
+    two, family, left, eventually_true
+) -> None:
+    """What it leaves becomes the sidecar's child, as the other keeper is, which is no orphan."""
+    it = two(family)
+    sidecar = it.it.process.pid
+    it.start(FIRST)
+    (keeper,) = children({sidecar})
+    it.start(SECOND)
+
+    os.kill(keeper, signal.SIGKILL)
+    it.until(FIRST, FAILED)
+
+    eventually_true(lambda: len(left()) == 6)  # the sidecar, and keeper, simulator and three more
+    assert it.state(SECOND).state is STARTING
+    assert len(children({sidecar})) == 1
+
+
+@pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
+def test_a_signal_ends_both_within_two_seconds(two, request, left, what) -> None:
+    """One after the other would take the time of two."""
+    it = two(request.getfixturevalue(what))
+    it.start(FIRST)
+    it.start(SECOND)
+
+    seconds, code = it.it.end()
+
+    assert (code, left()) == (0, set())
+    assert seconds < 2
+
+
+def test_a_killed_sidecar_leaves_neither(two, family, left, eventually_true) -> None:
+    """Each keeper sees the end of its own pipe."""
+    it = two(family)
+    it.start(FIRST)
+    it.start(SECOND)
+
+    it.it.end(signal.SIGKILL)
+
+    eventually_true(lambda: not left(), 2)
+
+
+def test_the_log_says_whose_line_it_is(two, waits) -> None:
+    """Two simulators print at the same time."""
+    it = two(waits)
+
+    it.start(FIRST)
+    it.start(SECOND)
+    it.it.request("/standby/stop", {"deadline_s": 0})
+
+    assert {"a: up", "b: up", "palaestra-sidecar: a: starting"} <= set(it.it.lines)
+    it.it.until_said("palaestra-sidecar: b: stopping: killed at its deadline")
+
+
+def test_a_simulator_is_told_its_slot(two) -> None:
+    """A program that needs a port of its own can choose by it."""
+    it = two("import os; print('up', os.environ['PALAESTRA_SIMULATOR_SLOT'])")
+
+    it.it.request("/start")
+    it.it.request("/standby/start")
+
+    it.it.until_said("a: up a")
+    it.it.until_said("b: up b")
+
+
+def test_the_metrics_tell_the_two_apart(two, waits) -> None:
+    """By a label that a sidecar with one simulator does not have."""
+    it = two(waits)
+    it.start(SECOND)
+
+    _, text = it.it.ask("GET", "/metrics", address=it.it.health)
+
+    values = dict(re.findall(r"^palaestra_simulator_(\S+) (\S+)$", text, re.MULTILINE))
+    assert (values['starts_total{slot="a"}'], values['starts_total{slot="b"}']) == ("0.0", "1.0")
+    assert values['state{slot="b",state="starting"}'] == "1.0"
+    assert values['faults_total{kind="code",slot="a"}'] == "0.0"
+    assert float(values['rss_bytes{slot="b"}']) > 4e6
+
+
+def test_both_are_told_at_the_health_port_and_take_no_orders_there(two, waits) -> None:
+    """People and the operator see the one that stands by, too."""
+    it = two(waits)
+    it.start(SECOND)
+
+    assert it.state(SECOND, it.it.health) == it.state(SECOND)
+    assert it.it.ask("POST", "/standby/stop", {"deadline_s": 0}, it.it.health)[0] == 404
+    assert it.it.ask("GET", "/healthz", address=it.it.health) == (200, "ok\n")
+
+
+def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
+    """A trainer that believes in one is told so at once."""
+    status, text = sidecar(waits).ask("GET", "/standby/state")
+
+    assert status == 404
+    assert "/standby" not in json.loads(text)["error"]
+
+
+def test_the_memory_of_a_simulator_is_told_while_it_is_ready(sidecar, family) -> None:
+    """Of all its processes. Before that it is asked for its state fifty times a second."""
+    it = sidecar(family)
+    before = it.start().rss_bytes
+
+    it.request("/ready")
+
+    assert before is None
+    assert it.state.rss_bytes > 4 * 4e6  # four Pythons
