@@ -23,6 +23,7 @@ from palaestra_sim.world import builtin
 
 DEADLINE_S = 30.0
 PACE_S = 0.05
+BINDINGS = Resource(api_version="v1", kind="Binding", plural="bindings")
 KINDS = (NETWORK_POLICIES, CONFIG_MAPS, CLAIMS, JOBS)
 
 Object = dict[str, Any]
@@ -180,6 +181,46 @@ class Place:
         done = {"state": {"terminated": ended}, "ready": False, "started": False}
         self._report(pod, "Failed" if code else "Succeeded", done)
 
+    def take(self, pod: Object, reason: str, message: str, **status: Any) -> None:
+        """Say that the cluster takes a pod; keywords are more of its status."""
+        taken = {"type": "DisruptionTarget", "status": "True", "reason": reason, "message": message}
+        self._patch(pod, {"conditions": [taken], **status})
+
+    def kill(self, pod: Object, container: str) -> None:
+        """Let the kernel kill a sidecar of a running pod for its memory; it runs again at once."""
+        now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        ended = {"exitCode": 137, "reason": "OOMKilled", "startedAt": now, "finishedAt": now}
+        status = (self.get(PODS, pod["metadata"]["name"]) or pod)["status"]
+        for each in status["initContainerStatuses"]:
+            if each["name"] == container:
+                each |= {"lastState": {"terminated": ended}, "restartCount": each["restartCount"] + 1}
+        self._patch(pod, {"initContainerStatuses": status["initContainerStatuses"]})
+
+    def bind(self, pod: Object, node: str = "node-1") -> None:
+        """Let a scheduler give a pod to a node."""
+        name = pod["metadata"]["name"]
+        target = {"apiVersion": "v1", "kind": "Node", "name": node}
+        self.create(
+            BINDINGS, {"apiVersion": "v1", "kind": "Binding", "metadata": {"name": name}, "target": target}
+        )
+
+    def complain(self, pod: Object, reason: str, message: str) -> None:
+        """Let a kubelet warn about a pod."""
+        metadata = {"name": f"{pod['metadata']['name']}.1", "namespace": self.name}
+        about = {
+            "apiVersion": "v1",
+            "kind": "Pod",
+            "namespace": self.name,
+            "name": pod["metadata"]["name"],
+            "uid": pod["metadata"]["uid"],
+        }
+        now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        event = {"type": "Warning", "reason": reason, "message": message, "lastTimestamp": now}
+        self.create(
+            EVENTS,
+            {"apiVersion": "v1", "kind": "Event", "metadata": metadata, "involvedObject": about, **event},
+        )
+
     def _report(self, pod: Object, phase: str, state: Object, **more: Any) -> None:
         spec = pod["spec"]
         common = {"image": "i", "imageID": "i", "restartCount": 0}
@@ -189,4 +230,7 @@ class Place:
             "containerStatuses": [{"name": c["name"], **common, **state} for c in spec["containers"]],
             **more,
         }
+        self._patch(pod, status)
+
+    def _patch(self, pod: Object, status: Object) -> None:
         self.api.merge(PODS, self.name, pod["metadata"]["name"], {"status": status}, subresource="status")

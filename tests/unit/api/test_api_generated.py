@@ -11,7 +11,16 @@ from palaestra.api.reference import page, tables
 from palaestra.api.simulators import Builtin
 from palaestra_sim.world import builtin
 
-EXAMPLES = ["minimal", "move-to-target", "reinforce", "sparse-reward", "tiny", "two-collectors"]
+EXAMPLES = [
+    "chaos",
+    "minimal",
+    "move-to-target",
+    "reinforce",
+    "sparse-reward",
+    "standby",
+    "tiny",
+    "two-collectors",
+]
 
 
 @pytest.mark.parametrize("name", ["manifests/crd.yaml", "docs/trainingjob.md"])

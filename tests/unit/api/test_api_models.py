@@ -4,6 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from palaestra.api import Driver, Metadata, Role, SimulatorGroup, Spec, TrainingJob, validate
+from palaestra.api.simulators import Recycle
 
 
 @pytest.fixture
@@ -35,7 +36,8 @@ def test_simulators_are_expected_to_fail_sometimes(least) -> None:
     """Recycled before they leak, restarted ten times in ten minutes, a minute to come up."""
     group = least.spec.simulators[0]
 
-    assert group.recycle.after_resets == 24
+    assert group.recycle == Recycle(after_resets=24)
+    assert (group.standby, group.min_simulators) == (False, None)
     assert (group.restart.limit, group.restart.within_seconds) == (10, 600)
     assert group.start_deadline_seconds == 60
 

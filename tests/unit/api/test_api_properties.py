@@ -30,6 +30,14 @@ QUANTITIES = st.sampled_from([1, 8, "500m", "0.5", "512Mi", "2Gi"])
 RESOURCES = st.fixed_dictionaries(
     {}, optional={"limits": st.dictionaries(st.sampled_from(["cpu", "memory"]), QUANTITIES)}
 )
+RECYCLING = st.fixed_dictionaries(
+    {},
+    optional={
+        "afterResets": st.integers(0, 10_000),
+        "afterMinutes": COUNTS,
+        "aboveMemory": st.sampled_from(["400Mi", "2Gi"]),
+    },
+).filter(bool)
 WORLDS = st.sampled_from(
     [
         {"builtin": "arena"},
@@ -49,7 +57,9 @@ def groups(role: str) -> st.SearchStrategy[dict]:
     optional = {
         "count": st.integers(1, 16),
         "world": WORLDS,
-        "recycle": st.fixed_dictionaries({}, optional={"afterResets": COUNTS}),
+        "recycle": RECYCLING,
+        "standby": st.booleans(),
+        "minSimulators": st.just(1),
         "restart": st.fixed_dictionaries({}, optional={"limit": st.integers(0, 9)}),
         "startDeadlineSeconds": COUNTS,
         "env": VARIABLES,

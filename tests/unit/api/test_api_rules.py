@@ -56,6 +56,14 @@ BROKEN = {
             "name the one that holds your program"
         ),
     ),
+    "recycled at no limit": (
+        {"simulators.0.recycle": {}},
+        "spec.simulators[0].recycle: sets no limit; give afterResets, afterMinutes or aboveMemory",
+    ),
+    "more than there are are enough": (
+        {"simulators.0.count": 2, "simulators.0.minSimulators": 3},
+        "spec.simulators[0].minSimulators: is more than the group has; lower it or raise count",
+    ),
     "two worlds": (
         {"simulators.1.world": {"builtin": "arena", "file": "/worlds/hall.wbt"}},
         (
@@ -78,7 +86,7 @@ BROKEN = {
         {"simulators.0.env": [{"name": "ROS_MASTER_URI", "value": "http://elsewhere"}]},
         (
             "spec.simulators[0].env[0].name: names beginning with PALAESTRA_ or ROS_ "
-            "are set by Palaestra; choose another"
+            "are set by Palaestra, but for PALAESTRA_STUB_; choose another"
         ),
     ),
     "an evaluation that never is": (
@@ -167,6 +175,10 @@ KEPT = {
     "a program of one's own": {
         "simulators.0": {**COMMAND, "image": "mine:1", "command": ["simulate", "--fast"]}
     },
+    "never recycled": {"simulators.0.recycle": {"afterResets": 0}},
+    "recycled by its memory alone": {"simulators.0.recycle": {"aboveMemory": "400Mi"}},
+    "recycled by its age alone": {"simulators.0.recycle": {"afterMinutes": 30}},
+    "all of a group are enough": {"simulators.0.count": 2, "simulators.0.minSimulators": 2},
     "a world in the image": {"simulators.0.world": {"file": "/worlds/hall.wbt"}},
     "a world in the job": {"simulators.0.world": {"inline": "#VRML_SIM R2023b utf8\n"}},
     "a world in a ConfigMap": {"simulators.0.world": {"configMap": {"name": "worlds", "key": "hall.wbt"}}},

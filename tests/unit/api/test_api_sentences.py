@@ -119,6 +119,9 @@ SENTENCES = [
     ({"trainer.algorithm.hyperparameters": {"gamma": {1, 2}}},
      ("spec.trainer.algorithm.hyperparameters: holds what JSON cannot carry; "
      "use text and numbers")),
+    ({"simulators.0.recycle": {"aboveMemory": "400"}},
+     ('spec.simulators[0].recycle.aboveMemory: "400" is not an amount of memory; '
+     "write a whole number and a unit, as 400Mi or 2Gi")),
     # Twice.
     ({"imagePullSecrets": [{"name": "pull"}, {"name": "pull"}]},
      'spec.imagePullSecrets: "pull" is the name of two of them; give each its own'),
@@ -128,8 +131,7 @@ SENTENCES = [
      ("spec.simulators[0].start_deadline_seconds: is not a field; "
      "did you mean startDeadlineSeconds?")),
     ({"steps": 1}, "spec.steps: is not a field here; did you mean spec.trainer.steps?"),
-    ({"simulators.0.recycle": {"x": 1}},
-     "spec.simulators[0].recycle.x: is not a field; use afterResets"),
+    ({"network": {"x": 1}}, "spec.network.x: is not a field; use egress"),
     ({"storage.x": 1},
      ("spec.storage.x: is not a field; use size, storageClassName, retain, ephemeral, "
      "existingClaim or resumeFrom")),

@@ -201,6 +201,71 @@ def test_a_trainer_that_cannot_be_reached_is_not_stalled(training):
     assert stops(scene.step(3600)) == []
 
 
+def test_an_environment_that_steps_and_teaches_nothing_is_stalled(training):
+    """It answers, and the step count does not move: the deadline measures progress, not liveness."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    found = []
+    for _ in range(19):
+        scene.pass_(10)
+        scene.poll(pod, step=50, last_progress=scene.stamp())
+        found += stops(scene.step())
+
+    assert found == ["Stalled"]
+    assert "for more than 60 s" in scene.job()["metadata"]["annotations"]["palaestra.dev/stopped"]
+
+
+def test_an_environment_that_never_stepped_is_stalled_too(training):
+    """Its trainer says that it trains, and has nothing to show for it."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    scene.poll(pod, step=0)
+    scene.settle()
+    scene.pass_(180)
+    scene.poll(pod, step=0)
+
+    assert stops(scene.step()) == ["Stalled"]
+
+
+def test_a_run_that_comes_forward_slowly_is_not_stalled(training):
+    """One step in a minute is progress."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    for step in range(1, 20):
+        scene.pass_(60)
+        scene.poll(pod, step=step, last_progress=scene.stamp(-1))
+
+        assert stops(scene.step()) == []
+
+
+def test_an_evaluation_that_steps_is_progress(training):
+    """Nothing is learned from it, by intention; one that does not step is none."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    for _ in range(30):
+        scene.pass_(60)
+        scene.poll(pod, step=50, phase="evaluating", last_progress=scene.stamp())
+        assert stops(scene.step()) == []
+
+    stood = scene.stamp()
+    scene.pass_(180)
+    scene.poll(pod, step=50, phase="evaluating", last_progress=stood)
+
+    assert stops(scene.step()) == ["Stalled"]
+
+
+def test_the_next_attempt_has_the_whole_time_again(training, last_word):
+    """It goes on at the step at which the last one ended."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    scene.poll(pod, step=50, last_progress=scene.stamp())
+    scene.settle()
+    scene.pass_(170)
+    scene.end(pod, 75, last_word(step=50, attempt=1))
+    scene.settle()
+    newest = scene.running_pod()
+    scene.settle(20)
+    scene.poll(newest, step=50, attempt=2)
+
+    assert stops(scene.step()) == []
+    assert scene.replica().last_progress == scene.now
+
+
 def test_pods_that_are_taken_without_progress_are_capped(accepted, last_word):
     """A trainer that always exits 75 would be tried for ever: Kubernetes has no bound for it.
 

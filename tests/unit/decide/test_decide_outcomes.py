@@ -9,7 +9,7 @@ from palaestra.api.status import Phase
     ("code", "reason", "begin"),
     [
         (2, "ConfigurationRefused", "the trainer refuses its configuration (exit code 2): Why: because"),
-        (80, "FaultBudgetSpent", "the simulators broke too often (exit code 80): Why: because"),
+        (80, "SimulatorBudgetSpent", "the simulators broke too often (exit code 80): Why: because"),
         (81, "Diverged", "the learner diverged (exit code 81): Why: because"),
     ],
 )
@@ -63,20 +63,59 @@ def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
     assert scene.replica().restarts.trainer == 2
 
 
-@pytest.mark.parametrize(
-    ("failures", "words"), [(1, "memory; raise"), (4, "memory in the last of 4 pods; raise")]
-)
-def test_a_trainer_that_was_killed_for_its_memory_is_told_so(training, failures, words):
-    """Exit code 137 alone says nothing to anybody."""
-    scene, pod = training()
+def test_a_trainer_that_was_killed_for_its_memory_is_told_so(training):
+    """Exit code 137 alone says nothing to anybody; the limit does."""
+    scene, pod = training(trainer={"resources": {"limits": {"memory": "2Gi"}}})
     scene.end(pod, 137, reason="OOMKilled")
-    scene.count_failures(failures)
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
 
     scene.settle()
 
     assert scene.replica().reason == "TrainerOutOfMemory"
-    assert words in scene.replica().message
+    assert "killed for its memory (limit 2Gi, 1 so far); raise spec.trainer" in scene.replica().message
+
+
+def test_a_simulator_that_hung_each_time_is_told_from_a_run_that_stood_still(training, last_word):
+    """The exit code is the same; the last word tells whose fault it was."""
+    scene, pod = training()
+    scene.end(pod, 82, last_word(reason="SimulatorHung: collect-0: no answer within 600 s"))
+    scene.end_job("Failed", 0, "BackoffLimitExceeded")
+
+    scene.settle()
+
+    assert scene.replica().reason == "SimulatorHung"
+    assert scene.replica().message.startswith("SimulatorHung: collect-0: no answer within 600 s; ")
+
+
+@pytest.mark.parametrize("word", ["StorageFull", "DiskFull"])
+def test_a_full_volume_is_told_with_its_remedy(training, last_word, word):
+    """Also in the word of an older release."""
+    scene, pod = training(backoffLimit=0)
+    scene.end(pod, 1, last_word(reason=f"{word}: checkpoints/5: disk full"))
+    scene.end_job("Failed", 0, "BackoffLimitExceeded")
+
+    scene.settle()
+
+    assert scene.replica().reason == "StorageFull"
+    assert scene.replica().message == (
+        "the volume of the run is full: checkpoints/5: disk full; "
+        "free some space, or ask for more with spec.storage.size"
+    )
+
+
+def test_a_reason_of_an_older_release_is_read_as_what_it_is_called_now(training, last_word):
+    """An upgraded operator finds it in the status, and in the replica that failed beside others."""
+    scene, pod = training(replicas=2)
+    scene.end(pod, 80, last_word())
+    scene.end_job("Failed", 0, "PodFailurePolicy")
+    scene.settle()
+    scene.raw["status"]["replicas"][0]["reason"] = "FaultBudgetSpent"
+    scene.end(scene.running_pod(1), 80, last_word())
+    scene.end_job("Failed", 1, "PodFailurePolicy")
+
+    scene.settle()
+
+    assert scene.status.phase is Phase.FAILED
 
 
 @pytest.mark.parametrize("word", [True, False])

@@ -11,7 +11,14 @@ from palaestra.api.status import Phase
 from palaestra.decide import Create, accept, as_data, decide, prepare
 from palaestra.observe import Objects, Polled, observe, trimmed
 from palaestra.plan import ClusterLayout, Images
-from palaestra_sim.protocol.status import SimulatorStatus, Termination, TrainerStatus
+from palaestra_sim.protocol.status import (
+    Cause,
+    FaultKind,
+    FaultRecord,
+    SimulatorStatus,
+    Termination,
+    TrainerStatus,
+)
 
 LAYOUT = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
@@ -39,6 +46,14 @@ MARKS = [
     {"annotations": {"palaestra.dev/stopped": "Stalled: it"}},
     {"annotations": {"palaestra.dev/stopped": 3}},
 ]
+faults = st.builds(
+    FaultRecord,
+    time=moments | st.just("0001-01-01T00:00:00+23:59"),
+    simulator=st.text(min_size=1, max_size=300),
+    kind=st.sampled_from(FaultKind),
+    fact=st.text(max_size=300),
+    step=counts,
+)
 words = st.builds(
     Termination,
     step=counts,
@@ -46,6 +61,8 @@ words = st.builds(
     attempt=st.none() | st.integers(1, 5),
     restarts=st.none() | counts,
     success_rate=st.none() | st.floats(0, 1),
+    log=st.lists(st.text(max_size=300), max_size=12).map(tuple),
+    faults=st.lists(faults, max_size=12).map(tuple),
 ).map(Termination.to_message)
 exits = st.fixed_dictionaries(
     {
@@ -146,14 +163,17 @@ answers = st.builds(
     simulators=st.lists(simulators, max_size=3).map(tuple),
     last_progress=st.none() | moments,
     attempt=st.none() | st.integers(1, 2**53),
+    goodput=st.dictionaries(st.sampled_from(Cause), st.floats(0, 2**53), max_size=3),
+    faults=st.dictionaries(st.sampled_from(FaultKind), counts, max_size=3),
+    steps_lost=counts,
 )
 
 
 events = st.fixed_dictionaries(
     {
-        "reason": st.just("FailedCreate"),
+        "reason": st.sampled_from(["FailedCreate", "FailedMount"]),
         "message": maybe(texts),
-        "involvedObject": st.just({"uid": "job-uid"}),
+        "involvedObject": st.sampled_from([{"uid": "job-uid"}, {"uid": "uid-0"}]),
         "lastTimestamp": maybe(moments),
     }
 )
@@ -264,6 +284,13 @@ def test_counts_never_fall_and_always_add_up(history):
             assert now.suspension >= was.suspension
             assert new.attempt in {0, 1 + now.trainer + now.disruption + now.suspension}
             assert (new.furthest_step or 0) >= (old.furthest_step or 0)
+            assert kept(new) >= kept(old)
+            assert sum(it.times for it in new.memory_kills) >= sum(it.times for it in old.memory_kills)
+
+
+def kept(replica):
+    """Return the number of the attempt that is remembered, 0 for none."""
+    return replica.last_attempt.attempt if replica.last_attempt else 0
 
 
 @settings(max_examples=30)

@@ -1,11 +1,15 @@
 """The status as people read it: columns, conditions, events."""
 
-import pytest
+import json
 
+import pytest
+from pydantic.alias_generators import to_camel
+
+from palaestra.api.history import Faults, Goodput
 from palaestra.api.status import ConditionStatus, Phase
 from palaestra.decide import accept, prepare
 from palaestra.observe import Objects, observe
-from palaestra_sim.protocol.status import CheckpointStatus
+from palaestra_sim.protocol.status import Cause, CheckpointStatus, FaultKind, FaultRecord, Termination
 
 
 def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
@@ -51,6 +55,59 @@ def test_simulators_and_checkpoints_are_told(training, simulator):
     assert (told.name, told.state, told.restarts, told.last_fault) == (
         "collect-0", "failed", 2, "collect-0: gone",
     )  # fmt: skip
+
+
+def test_where_the_time_went_and_what_broke_is_told(training, simulator):
+    """In whole seconds, as far as the trainer tells; one of an older release does not."""
+    scene, pod = training()
+    scene.poll(pod, step=1)
+    scene.settle()
+    assert (scene.replica().goodput, scene.replica().faults, scene.replica().steps_lost) == (None,) * 3
+
+    flapping = simulator(flapping=True, given_up=True, standby="ready")
+    spent = {"stepping": 50.9, "learning": 7.2}
+    scene.poll(pod, goodput=spent, faults={"dead": 2, "wrong_data": 1}, steps_lost=9, simulators=(flapping,))
+    scene.settle()
+
+    replica = scene.replica()
+    assert (replica.goodput.stepping, replica.goodput.learning, replica.goodput.starting) == (50, 7, 0)
+    assert (replica.faults.dead, replica.faults.hung, replica.faults.wrong_data) == (2, 0, 1)
+    assert replica.steps_lost == 9
+    [told] = replica.simulators
+    assert (told.flapping, told.given_up, told.standby) == (True, True, "ready")
+
+
+def test_every_cause_and_every_kind_of_fault_has_a_field():
+    """The operator reads by name what a trainer of this release tells."""
+    assert {to_camel(cause) for cause in Cause} == {to_camel(name) for name in Goodput.model_fields}
+    assert {kind.value for kind in FaultKind} == set(Faults.model_fields)
+
+
+def test_a_status_of_two_replicas_stays_small(accepted, simulator):
+    """People read it, and an API server keeps it: everything is at its longest here."""
+    scene = accepted(replicas=2)
+    fact = "x" * 500
+    faults = tuple(
+        FaultRecord(time=scene.stamp(), simulator="collect-10", kind="dead", fact=fact, step=2**31)
+        for _ in range(10)
+    )
+    word = Termination(step=1, reason=fact, log=(fact,) * 10, faults=faults).to_message()
+    broken = tuple(simulator(name=f"collect-{i}", last_fault=fact, restarts=2**31) for i in range(32))
+    for index in range(2):
+        first = scene.running_pod(index)
+        scene.end(first, 70, word)
+        scene.pass_(1)
+        scene.poll(
+            scene.running_pod(index),
+            simulators=broken,
+            goodput=dict.fromkeys(Cause, 2.0**30),
+            faults=dict.fromkeys(FaultKind, 2**30),
+        )
+
+    scene.settle()
+
+    assert scene.replica().last_attempt.log
+    assert len(json.dumps(scene.raw["status"]).encode()) < 40_000
 
 
 def test_a_checkpoint_is_told_with_its_step_and_its_time(training):

@@ -108,7 +108,8 @@ def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
 
 def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
     """The trainer only sees that it broke."""
-    scene, pod = training()
+    group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
+    scene, pod = training(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
     scene.container(
         pod, "sim-collect-0", waiting="CrashLoopBackOff", code=137, reason="OOMKilled", restarts=2
     )
@@ -117,7 +118,10 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
     scene.settle()
 
     assert scene.replica().reason == "SimulatorOutOfMemory"
-    assert "container sim-collect-0 was killed for its memory 2 times" in scene.replica().message
+    assert scene.replica().message == (
+        "container sim-collect-0 was killed for its memory (limit 512Mi, 1 so far); "
+        "raise spec.simulators[].resources.limits.memory"
+    )
 
 
 def test_between_two_pods_it_is_told_how_the_last_one_failed(training, last_word):
@@ -161,9 +165,53 @@ def test_a_pod_that_the_cluster_took_is_no_failure(training):
 
     decision = scene.settle()
 
-    assert scene.replica().reason == "Interrupted"
+    assert scene.replica().reason == "Disrupted"
     assert "preempted by a more important pod" in scene.replica().message
     assert [each.type.value for each in decision.events] == ["Normal"]
+
+
+def test_a_trainer_that_stopped_and_nobody_says_why_is_interrupted(training, last_word):
+    """As when the ROS master was lost: the cluster has taken nothing."""
+    scene, pod = training()
+    scene.end(pod, 75, last_word(reason="MasterLost: it does not answer"))
+
+    scene.settle()
+
+    assert scene.replica().reason == "Interrupted"
+    assert "(exit code 75, MasterLost: it does not answer)" in scene.replica().message
+
+
+def test_a_full_volume_is_told_while_it_is_tried_again(training, last_word):
+    """Somebody may make room before the last try."""
+    scene, pod = training()
+    scene.end(pod, 1, last_word(reason="StorageFull: /run: no space left on device"))
+
+    scene.settle()
+
+    assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "StorageFull")
+
+
+def test_a_volume_that_does_not_come_is_told_in_the_clusters_words(accepted):
+    """Nothing but an event on the pod tells; for Kubernetes it only starts."""
+    scene = accepted()
+    pod = scene.new_pod()
+    words = 'Multi-Attach error for volume "pvc-1": still attached to node-2'
+    scene.objects["events"].append(
+        {
+            "reason": "FailedAttachVolume",
+            "message": words,
+            "involvedObject": {"uid": pod["metadata"]["uid"]},
+            "lastTimestamp": scene.stamp(),
+        }
+    )
+    scene.settle()
+    assert scene.replica().reason == "VolumeNotMounted"
+    assert words in scene.replica().message
+
+    pod["status"]["conditions"] = [{"type": "PodReadyToStartContainers", "status": "True"}]
+    scene.settle()
+
+    assert scene.replica().reason == "Starting"
 
 
 def test_while_its_simulators_start_a_trainer_does_not_train(training):

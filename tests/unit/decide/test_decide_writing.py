@@ -43,6 +43,10 @@ def test_what_is_equal_is_not_written():
         {"meanReturn": 1.0},
         {"stepsPerSecond": 20.5},
         {"restarts": {"trainer": 0, "simulator": 1}},
+        {"goodput": {"stepping": 5}},
+        {"faults": {"dead": 1}},
+        {"stepsLost": 5},
+        {"lastProgress": "2026-01-31T12:00:00Z"},
     ],
 )
 def test_progress_waits_for_half_a_minute(change):
@@ -64,6 +68,8 @@ def test_progress_waits_for_half_a_minute(change):
         {"target": 100},
         {"successRate": 0.0},
         {"lastCheckpoint": {"step": 5, "time": "2026-01-31T12:00:00Z"}},
+        {"lastAttempt": {"attempt": 1, "reason": "Disrupted"}},
+        {"memoryKills": [{"container": "trainer", "times": 1}]},
     ],
 )
 def test_what_people_wait_for_is_written_at_once(change):

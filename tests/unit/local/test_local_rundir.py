@@ -157,10 +157,13 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     """What nobody measured is left out."""
     (directory / "model.zip").touch()
 
-    lines = summary(Outcome(exit_code=0, steps=50_000, success_rate=0.951), directory)
+    ended = Outcome(exit_code=0, steps=50_000, success_rate=0.951, trained_share=0.934)
 
-    assert [line.split()[0] for line in lines] == ["success", "steps", "run", "look", "try"]
+    lines = summary(ended, directory)
+
+    assert [line.split()[0] for line in lines] == ["success", "steps", "trained", "run", "look", "try"]
     assert lines[0].endswith("95%")
     assert lines[1].endswith("50,000")
-    assert lines[3].endswith(f"tensorboard --logdir {directory}/tensorboard")
-    assert lines[4].endswith(f"palaestra-eval {directory}")
+    assert lines[2].endswith("93% of the wall clock")
+    assert lines[4].endswith(f"tensorboard --logdir {directory}/tensorboard")
+    assert lines[5].endswith(f"palaestra-eval {directory}")

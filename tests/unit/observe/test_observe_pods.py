@@ -118,3 +118,13 @@ def test_a_termination_message_is_cut_where_kubernetes_cuts_it(look, raw_pod):
     ]
 
     assert len(pod(look, raw_pod).trainer.exit.message) == 4096
+
+
+def test_the_memory_limit_is_that_of_the_pods_spec(look, raw_pod):
+    """Whoever is told that a container was killed for its memory wants to know at how much."""
+    limits = {each.name: each.memory_limit for each in pod(look, raw_pod).containers}
+    raw_pod["spec"]["containers"][0]["resources"] = {"limits": "garbage"}
+
+    assert limits["trainer"].endswith("Gi")
+    assert limits["sim-collect-0"]
+    assert pod(look, raw_pod).trainer.memory_limit == ""

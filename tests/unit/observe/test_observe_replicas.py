@@ -189,3 +189,27 @@ def test_what_was_refused_is_of_the_replica_or_of_all(make_job):
 
     assert [each.denied for each in seen.replicas] == ["", "over quota"]
     assert [each.denied for each in of_all.replicas] == ["no policy"] * 2
+
+
+def test_a_volume_that_does_not_come_is_told_by_the_events_of_its_pod(look, raw_pod):
+    """The last of those that speak of volumes, while the pod waits for them."""
+
+    def event(reason, words, second, uid="pod-1"):
+        return {
+            "reason": reason,
+            "message": words,
+            "involvedObject": {"uid": uid},
+            "lastTimestamp": f"2026-01-31T12:00:0{second}Z",
+        }
+
+    events = [
+        event("FailedAttachVolume", "first", 1),
+        event("FailedMount", "last", 3),
+        event("FailedMount", "of another", 5, "other"),
+        event("Unhealthy", "of a probe", 7),
+    ]
+    waits = look(pods=[raw_pod], events=events).replicas[0]
+    raw_pod["status"]["phase"] = "Running"
+    runs = look(pods=[raw_pod], events=events).replicas[0]
+
+    assert (waits.unmounted, runs.unmounted) == ("last", "")

@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.cluster import NotFound
-from palaestra.operator.refusals import PATIENCE_S, RECHECK_S, Refusals
+from palaestra.operator.refusals import PATIENCE_S, RECHECK_S, REMEMBERED, Refusals
 from palaestra.operator.strangers import Strangers
 
 KEY = ("robots", "job")
@@ -15,11 +15,12 @@ class Server:
 
     def __init__(self):
         self.now, self.asked, self.jobs = 100.0, 0, {}
+        self.about = "reason=FailedCreate"
 
     def list(self, resource, namespace, *, fields):
         """Return the one event that there is."""
         assert (resource.plural, namespace) == ("events", "robots")
-        assert fields == "involvedObject.uid=u,reason=FailedCreate"
+        assert fields == f"involvedObject.uid=u,{self.about}"
         self.asked += 1
         return [FAILED]
 
@@ -50,7 +51,10 @@ def job(**changes):
 
 def pod(phase):
     """Return its pod."""
-    return {"metadata": {"ownerReferences": [{"uid": "u"}]}, "status": {"phase": phase}}
+    return {
+        "metadata": {"uid": "p", "namespace": "robots", "ownerReferences": [{"uid": "u"}]},
+        "status": {"phase": phase},
+    }
 
 
 def test_a_new_job_is_given_some_seconds(server):
@@ -104,6 +108,57 @@ def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
 
     assert refusals.of(jobs, pods) == ([], None)
     assert server.asked == 0
+
+
+def waiting_pod(**status):
+    """Return a pod that a node has taken."""
+    return {
+        "metadata": {"uid": "u", "namespace": "robots"},
+        "spec": {"nodeName": "node-1"},
+        "status": {"phase": "Pending", **status},
+    }
+
+
+def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
+    """After some seconds, as a Job: most volumes come at once."""
+    server.about = "type=Warning"
+    refusals = Refusals(server, lambda: server.now)
+    refusals.of([], [waiting_pod()])
+    assert server.asked == 0
+    server.now += PATIENCE_S
+
+    assert refusals.of([], [waiting_pod()]) == ([FAILED], RECHECK_S)
+
+
+@pytest.mark.parametrize(
+    "pod",
+    [
+        {**waiting_pod(), "spec": {}},
+        waiting_pod(phase="Running"),
+        waiting_pod(conditions=[{"type": "PodReadyToStartContainers", "status": "True"}]),
+        {**waiting_pod(), "metadata": {"uid": "u", "namespace": "robots", "deletionTimestamp": "now"}},
+    ],
+    ids=["no node", "runs", "pulls images", "deleted"],
+)
+def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
+    """Its own status tells of that."""
+    refusals = Refusals(server, lambda: server.now)
+    refusals.of([], [pod])
+    server.now += PATIENCE_S
+
+    assert refusals.of([], [pod]) == ([], None)
+    assert server.asked == 0
+
+
+def test_what_was_deleted_while_it_lacked_something_is_forgotten_in_the_end(server):
+    """Nobody tells of it; an operator runs for months."""
+    refusals = Refusals(server, lambda: server.now)
+    refusals.of([job()], [])
+    server.now += PATIENCE_S
+    for i in range(REMEMBERED):
+        refusals.of([job(metadata={"name": "x", "namespace": "robots", "uid": f"u{i}"})], [])
+
+    assert refusals.of([job()], []) == ([], PATIENCE_S)
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):

@@ -206,6 +206,49 @@ def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
     assert resources.resources(Resources(**wanted), default) == planned
 
 
+STANDBY = [{"name": "collect", "role": "Collect", "standby": True}, {"name": "evaluate", "role": "Evaluate"}]
+
+
+def test_a_sidecar_is_told_that_a_second_simulator_stands_by(in_cluster):
+    """It makes that one's world and names itself, of the world that it is given."""
+    planned = containers(in_cluster(simulators=STANDBY))
+
+    assert "--standby" in planned["sim-collect-0"]["args"]
+    assert "--standby" not in planned["sim-evaluate-0"]["args"]
+
+
+def test_a_simulator_that_stands_by_has_memory_of_its_own_and_shares_the_processor(in_cluster):
+    """A container that holds two with the memory of one would be killed; only one of them computes."""
+    one, two = (
+        containers(in_cluster(simulators=simulators))["sim-collect-0"]["resources"]
+        for simulators in (TWO_GROUPS, STANDBY)
+    )
+
+    assert one == {"requests": {"cpu": "75m", "memory": "160Mi"}, "limits": {"memory": "2Gi"}}
+    assert two == {"requests": {"cpu": "75m", "memory": "320Mi"}, "limits": {"memory": "4Gi"}}
+
+
+def test_a_simulator_that_stands_by_has_shared_memory_of_its_own(in_cluster):
+    """The volume is counted to the container's memory, and Webots keeps its pictures there."""
+    spec = in_cluster(simulators=STANDBY).replicas[0].job["spec"]["template"]["spec"]
+    sizes = {
+        volume["name"]: volume["emptyDir"]["sizeLimit"]
+        for volume in spec["volumes"]
+        if volume["name"].startswith("memory-")
+    }
+
+    assert sizes == {"memory-sim-collect-0": "256Mi", "memory-sim-evaluate-0": "128Mi"}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "doubled"),
+    [("160Mi", "320Mi"), ("1.5Gi", "3Gi"), ("0.3G", "0.6G"), ("500m", "1000m"), ("5", "10"), ("100", "200")],
+)
+def test_a_quantity_is_doubled_in_its_own_unit(quantity, doubled):
+    """What a person wrote stays recognisable in the pod."""
+    assert resources.twice(quantity) == doubled
+
+
 @given(st.integers(min_value=1, max_value=200_000))
 def test_there_is_always_a_thread_and_never_more_than_a_core_too_many(millis):
     """Rounded up: half a core is good for one thread."""

@@ -7,10 +7,11 @@ import yaml
 
 from palaestra.api import load
 from palaestra.plan import ClusterLayout, Images, identified, plan
-from palaestra_trainer.configuration import parse
+from palaestra_trainer.configuration import Recycle, parse
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "manifests" / "examples").glob("*.yaml"))
 
+COLLECT, EVALUATE = {"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}
 LAYOUT = ClusterLayout(images=Images.of_release("1"))
 
 
@@ -41,3 +42,29 @@ def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
     read = read_back(job)
 
     assert read.evaluation.every_steps == 0
+
+
+def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
+    """Memory is written in bytes: a trainer compares it with what the kernel says."""
+    group = {
+        "name": "collect",
+        "role": "Collect",
+        "count": 2,
+        "minSimulators": 1,
+        "standby": True,
+        "recycle": {"afterResets": 24, "afterMinutes": 90, "aboveMemory": "400Mi"},
+    }
+
+    collect, *_, evaluate = read_back(make_job(simulators=[group, EVALUATE])).simulators
+
+    assert (collect.min_simulators, collect.standby) == (1, True)
+    assert collect.recycle == Recycle(after_resets=24, after_minutes=90, above_memory_bytes=400 * 2**20)
+    assert (evaluate.min_simulators, evaluate.standby) == (1, False)
+    assert evaluate.recycle == Recycle(after_resets=24)
+
+
+def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):
+    """Zero resets mean never, in the job as in the file."""
+    read = read_back(make_job(simulators=[COLLECT | {"recycle": {"afterResets": 0}}, EVALUATE]))
+
+    assert read.simulators[0].recycle is None

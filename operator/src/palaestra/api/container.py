@@ -42,9 +42,18 @@ class Variable(ApiModel):
         ),
         Rule(
             field="name",
-            holds=lambda variable: not variable.name.startswith(("PALAESTRA_", "ROS_")),
-            cel="!self.name.startsWith('PALAESTRA_') && !self.name.startsWith('ROS_')",
-            message="names beginning with PALAESTRA_ or ROS_ are set by Palaestra; choose another",
+            holds=lambda variable: (
+                variable.name.startswith("PALAESTRA_STUB_")
+                or not variable.name.startswith(("PALAESTRA_", "ROS_"))
+            ),
+            cel=(
+                "self.name.startsWith('PALAESTRA_STUB_') || "
+                "!self.name.startsWith('PALAESTRA_') && !self.name.startsWith('ROS_')"
+            ),
+            message=(
+                "names beginning with PALAESTRA_ or ROS_ are set by Palaestra, but for PALAESTRA_STUB_; "
+                "choose another"
+            ),
         ),
     )
 

@@ -24,6 +24,7 @@ VARIABLE = "^[A-Za-z_][A-Za-z0-9_]*$"
 IMAGE = "^[A-Za-z0-9][-A-Za-z0-9._:/@]*$"
 LABEL_VALUE = "^([A-Za-z0-9]([-A-Za-z0-9_.]*[A-Za-z0-9])?)?$"
 QUANTITY = "^[0-9]+([.][0-9]+)?(m|k|M|G|T|P|Ki|Mi|Gi|Ti|Pi)?$"
+MEMORY = "^[1-9][0-9]*(M|G|T|Mi|Gi|Ti)$"
 FOLDER = "^[A-Za-z0-9][-A-Za-z0-9._]*$"
 WORLD_FILE = "^/.+[.]wbt$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
@@ -37,6 +38,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     VARIABLE: ("the name of a variable", "use letters, digits and '_', no digit first"),
     IMAGE: ("an image", "write it as registry/name:tag"),
     QUANTITY: ("a quantity", "write a number and a unit, as 500m, 2, 512Mi or 1Gi"),
+    MEMORY: ("an amount of memory", "write a whole number and a unit, as 400Mi or 2Gi"),
     LABEL_VALUE: ("the value of a label", "use letters, digits, '-', '_' and '.'"),
     FOLDER: ("the name of a folder", "use letters, digits, '-', '_' and '.', no '/'"),
     WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt file"),
@@ -58,7 +60,9 @@ Word = Annotated[str, Field(min_length=1, max_length=256)]
 Sentence = Annotated[str, Field(max_length=4096)]
 Seconds = Annotated[int, Field(ge=1, le=31_536_000)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+Minutes = Annotated[int, Field(ge=1, le=525_600)]
 Count = Annotated[int, Field(ge=0, le=2_000_000_000)]
+Memory = Annotated[str, Field(max_length=32, pattern=MEMORY)]
 
 # Lists come from YAML as lists and are kept as tuples, so that a job cannot change.
 Listed = Annotated[tuple[T, ...], Field(strict=False)]

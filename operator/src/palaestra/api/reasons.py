@@ -14,7 +14,10 @@ LONGEST_FACT = 600  # of one fact that comes from elsewhere: the scheduler, a re
 
 
 class Reason(StrEnum):
-    """Why something is as it is, in one word."""
+    """Why something is as it is, in one word.
+
+    A word that an older release wrote into a status is read as what it is called now.
+    """
 
     ACCEPTED = "Accepted"
     INVALID_SPEC = "InvalidSpec"
@@ -34,11 +37,14 @@ class Reason(StrEnum):
     RESUMED = "Resumed"
     STARTING = "Starting"
     TRAINING = "Training"
+    DISRUPTED = "Disrupted"
     INTERRUPTED = "Interrupted"
+    TRAINER_FAILED = "TrainerFailed"
     RETRYING = "Retrying"
     UNSCHEDULABLE = "Unschedulable"
     IMAGE_PULL = "ImagePull"
     CONTAINER_REFUSED = "ContainerRefused"
+    VOLUME_NOT_MOUNTED = "VolumeNotMounted"
     PODS_REFUSED = "PodsRefused"
     RESTART_POLICY_DROPPED = "RestartPolicyDropped"
     SIDECAR_CRASH_LOOP = "SidecarCrashLoop"
@@ -47,18 +53,27 @@ class Reason(StrEnum):
     SIMULATOR_OUT_OF_MEMORY = "SimulatorOutOfMemory"
     TRAINER_OUT_OF_MEMORY = "TrainerOutOfMemory"
     EPHEMERAL_STORAGE = "EphemeralStorage"
+    STORAGE_FULL = "StorageFull"
     NODE_LOST = "NodeLost"
+    SIMULATOR_HUNG = "SimulatorHung"
     STALLED = "Stalled"
     DEADLINE_EXCEEDED = "DeadlineExceeded"
     BACKOFF_LIMIT_SPENT = "BackoffLimitSpent"
     CONFIGURATION_REFUSED = "ConfigurationRefused"
-    FAULT_BUDGET_SPENT = "FaultBudgetSpent"
+    SIMULATOR_BUDGET_SPENT = "SimulatorBudgetSpent"
     DIVERGED = "Diverged"
     NO_PROGRESS = "NoProgress"
     JOB_FAILED = "JobFailed"
     SUCCEEDED = "Succeeded"
     SOME_REPLICAS_FAILED = "SomeReplicasFailed"
     EXPIRED = "Expired"
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Reason | None":
+        return _RENAMED.get(value) if isinstance(value, str) else None
+
+
+_RENAMED = {"FaultBudgetSpent": Reason.SIMULATOR_BUDGET_SPENT}
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,16 +174,29 @@ ROWS: dict[Reason, Row] = {
         warning=False,
     ),
     Reason.TRAINING: Row("{what}", "at least one trainer runs", "nothing", warning=False),
-    Reason.INTERRUPTED: Row(
-        "pod {pod} was interrupted{words}; another goes on from the last checkpoint",
-        "an eviction, a preemption, a drain, or a deletion; it does not count against `backoffLimit`",
+    Reason.DISRUPTED: Row(
+        "pod {pod} was taken ({words}); the next one goes on from the last checkpoint",
+        "an eviction, a preemption, a drain, a lost node or a deletion; "
+        "it does not count against `backoffLimit`",
         "nothing; often: ask for nodes that stay",
         warning=False,
+    ),
+    Reason.INTERRUPTED: Row(
+        "the trainer of pod {pod} stopped at a checkpoint ({how}); the next one goes on from there",
+        "a signal that nobody has told of, or the ROS master was lost; "
+        "it does not count against `backoffLimit`",
+        "nothing; often: read `lastAttempt.log` in the status",
+        warning=False,
+    ),
+    Reason.TRAINER_FAILED: Row(
+        "{how}",
+        "the trainer ended as nobody expects; it is tried again while `backoffLimit` allows",
+        "read `lastAttempt.log` in the status",
     ),
     Reason.RETRYING: Row(
         "pod {pod} failed: {how}; another goes on from the last checkpoint",
         "a pod failed and counts against `backoffLimit`",
-        "read the trainer's log: `kubectl logs POD -c trainer`",
+        "read `lastAttempt.log` in the status, which has the last lines of the trainer",
     ),
     Reason.UNSCHEDULABLE: Row(
         "no node takes pod {pod}: {words}; make room or ask for less",
@@ -185,6 +213,12 @@ ROWS: dict[Reason, Row] = {
         "a program, a key of a Secret or a device that the container needs is not there; "
         "after the start deadline the replica fails",
         "the words are the kubelet's and name what is missing",
+    ),
+    Reason.VOLUME_NOT_MOUNTED: Row(
+        "pod {pod} waits for a volume: {words}; mend what is named",
+        "a claim, a ConfigMap or a Secret cannot be mounted, or another node still holds the volume; "
+        "the words are the cluster's",
+        "`kubectl describe pvc`; a volume on a lost node comes free when its Node object is deleted",
     ),
     Reason.PODS_REFUSED: Row(
         "no pod can be made: {words}",
@@ -214,12 +248,14 @@ ROWS: dict[Reason, Row] = {
         "update the nodes to 1.34 or newer",
     ),
     Reason.SIMULATOR_OUT_OF_MEMORY: Row(
-        "container {container} was killed for its memory {times} times; raise its memory limit",
-        "a simulator needs more than its limit",
+        "container {container} was killed for its memory ({limit}, {times} so far); "
+        "raise spec.simulators[].resources.limits.memory",
+        "a simulator's container needs more memory than its limit; the simulator itself did not crash",
         "raise `spec.simulators[].resources.limits.memory` in a new TrainingJob",
     ),
     Reason.TRAINER_OUT_OF_MEMORY: Row(
-        "the trainer was killed for its memory{times}; raise its limit, or lower buffer_size",
+        "the trainer was killed for its memory ({limit}, {times} so far); "
+        "raise spec.trainer.resources.limits.memory, or lower buffer_size",
         "the trainer needs more than its limit",
         "raise `spec.trainer.resources.limits.memory`, or lower the replay buffer, in a new TrainingJob",
     ),
@@ -228,15 +264,27 @@ ROWS: dict[Reason, Row] = {
         "the pod wrote more to temporary volumes than its limit, or the node's disk is full",
         "write less to /tmp, or enlarge the volume: `spec.storage.size` when it is ephemeral",
     ),
+    Reason.STORAGE_FULL: Row(
+        "the volume of the run is full: {words}; free some space, or ask for more with spec.storage.size",
+        "the run directory takes no more; the last checkpoint is whole, and from it the run is tried again "
+        "while `backoffLimit` allows",
+        "delete old runs on the volume, enlarge the claim, or lower `spec.trainer.checkpoint.keep`",
+    ),
     Reason.NODE_LOST: Row(
         "pod {pod} was to be gone {seconds} s ago and node {node} does not confirm it; "
         "delete the Node object or taint it node.kubernetes.io/out-of-service",
         "the node does not answer; no second pod is made while the first may still write",
         "`kubectl delete node NODE` once the machine is off",
     ),
+    Reason.SIMULATOR_HUNG: Row(
+        "{what}; read the simulator's log",
+        "the trainer waited for a simulator for `stallDeadlineSeconds` (exit code 82); it is tried again "
+        "while `backoffLimit` allows",
+        "`kubectl logs POD -c sim-GROUP-N`; raise the deadline if a step may take that long",
+    ),
     Reason.STALLED: Row(
         "{what}; read the stacks in the trainer's log",
-        "no environment step for `stallDeadlineSeconds`, by the trainer's own word",
+        "no step was learned from for `stallDeadlineSeconds`, by the trainer's word, though it may answer",
         "`kubectl logs POD -c trainer`; raise the deadline if a step may take that long",
     ),
     Reason.DEADLINE_EXCEEDED: Row(
@@ -255,16 +303,16 @@ ROWS: dict[Reason, Row] = {
         "algorithm, environment and options do not go together; it is not tried again",
         "make a new TrainingJob with the field that the message names mended",
     ),
-    Reason.FAULT_BUDGET_SPENT: Row(
+    Reason.SIMULATOR_BUDGET_SPENT: Row(
         "the simulators broke too often (exit code 80): {words}",
         "a simulator had more than `restart.limit` faults within `restart.withinSeconds`; "
         "it is not tried again",
-        "read the simulator's log; raise `restart.limit` if faults are to be borne",
+        "read `lastAttempt.faults` in the status; raise `restart.limit` if faults are to be borne",
     ),
     Reason.DIVERGED: Row(
         "the learner diverged (exit code 81): {words}",
-        "the networks hold NaN or infinity; it is not tried again",
-        "lower the learning rate, in a new TrainingJob",
+        "a reward, a loss or a weight is NaN or infinite; the message says which; it is not tried again",
+        "mend the reward or lower the learning rate, in a new TrainingJob; the last good checkpoint is kept",
     ),
     Reason.NO_PROGRESS: Row(
         "{pods} pods in a row were taken or interrupted without one new step; "

@@ -13,6 +13,8 @@ from palaestra.api.fields import (
     FileKey,
     GroupName,
     Image,
+    Memory,
+    Minutes,
     ObjectName,
     Seconds,
     Words,
@@ -94,10 +96,31 @@ class World(ApiModel):
 
 
 class Recycle(ApiModel):
-    """When a healthy simulator is started anew between two episodes."""
+    """When a healthy simulator is started anew between two episodes: at the first limit reached."""
 
-    after_resets: Count = 24
-    """Resets after which it is started anew; 0: never. Simulators leak memory and time."""
+    after_resets: Count | None = None
+    """Resets after which it is started anew; 0: never, absent: they are not counted."""
+
+    after_minutes: Minutes | None = None
+    """Minutes in use after which it is started anew; absent: never."""
+
+    above_memory: Memory | None = None
+    """Memory of all processes of one simulator above which it is started anew, as `400Mi`; absent:
+    never. Give less than the limit in `resources`."""
+
+    rules = (
+        Rule(
+            holds=lambda recycle: any(
+                limit is not None
+                for limit in (recycle.after_resets, recycle.after_minutes, recycle.above_memory)
+            ),
+            cel="has(self.afterResets) || has(self.afterMinutes) || has(self.aboveMemory)",
+            message="sets no limit; give afterResets, afterMinutes or aboveMemory",
+        ),
+    )
+
+
+AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended there with a bus error
 
 
 class Restart(ApiModel):
@@ -122,6 +145,10 @@ class SimulatorGroup(ApiModel):
     count: Annotated[int, Field(ge=1, le=16)] = 1
     """How many of them run in each replica."""
 
+    min_simulators: Annotated[int, Field(ge=1, le=16)] | None = None
+    """How many of them are enough to go on with: one whose restarts are used up is given up while
+    as many are left, and training begins while others still come up; absent: all of them."""
+
     image: Image | None = None
     """Container image; absent: the one of this release for the driver. Not used by
     `palaestra run`."""
@@ -136,8 +163,12 @@ class SimulatorGroup(ApiModel):
     world: World = World(builtin=Builtin.ARENA)
     """The source world, from exactly one of four places."""
 
-    recycle: Recycle = Recycle()
-    """When a healthy simulator is started anew between two episodes."""
+    recycle: Recycle = AFTER_24_RESETS
+    """When a healthy simulator is started anew between two episodes. Simulators leak memory and time."""
+
+    standby: bool = False
+    """True: a second simulator stands by in the same container and takes over at once when the first
+    is recycled or fails. The container then has twice the memory."""
 
     options: Words = ()
     """Options for the simulator's own command line, each one word."""
@@ -153,7 +184,7 @@ class SimulatorGroup(ApiModel):
     """Environment variables of the simulator's container."""
 
     resources: Resources = Resources()
-    """CPU and memory of one simulator."""
+    """CPU and memory of one simulator; memory is doubled for a standby."""
 
     rules = (
         Rule(
@@ -167,5 +198,11 @@ class SimulatorGroup(ApiModel):
             holds=lambda group: group.driver is not Driver.COMMAND or group.image is not None,
             cel="self.driver != 'command' || has(self.image)",
             message="driver command has no image of its own; name the one that holds your program",
+        ),
+        Rule(
+            field="minSimulators",
+            holds=lambda group: group.min_simulators is None or group.min_simulators <= group.count,
+            cel="!has(self.minSimulators) || self.minSimulators <= self.count",
+            message="is more than the group has; lower it or raise count",
         ),
     )

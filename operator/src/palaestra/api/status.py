@@ -11,6 +11,7 @@ from typing import Annotated
 from pydantic import Field
 
 from palaestra.api.fields import Count, Fraction, Image, Listed, Sentence, Word
+from palaestra.api.history import Faults, Goodput, LastAttempt, MemoryKills
 from palaestra.api.model import ApiModel
 from palaestra.api.simulators import Role
 
@@ -136,6 +137,15 @@ class SimulatorStatus(ApiModel):
     last_fault: Sentence | None = None
     """The last fault in a sentence; absent: none in this attempt."""
 
+    flapping: bool = False
+    """True: it breaks again and again."""
+
+    given_up: bool = False
+    """True: its restarts are used up and the run goes on without it."""
+
+    standby: Word | None = None
+    """`starting` or `ready`: its spare; absent: it has none."""
+
 
 class ReplicaStatus(ApiModel):
     """One training run."""
@@ -182,6 +192,10 @@ class ReplicaStatus(ApiModel):
     last_checkpoint: LastCheckpoint | None = None
     """The newest checkpoint; absent: none yet."""
 
+    last_progress: datetime | None = Field(default=None, strict=False)
+    """When `step` last moved, or an evaluation did; `stallDeadlineSeconds` counts from here. Absent: the
+    current attempt has not begun to train."""
+
     furthest_step: Count | None = None
     """The highest step of all attempts; a new attempt goes on from the last checkpoint, which may
     be behind it. Absent: not known yet."""
@@ -194,6 +208,22 @@ class ReplicaStatus(ApiModel):
 
     restarts: Restarts = Restarts()
     """What was started again, by cause."""
+
+    last_attempt: LastAttempt | None = None
+    """How the newest attempt that has ended did so; absent: none has."""
+
+    memory_kills: Annotated[Listed[MemoryKills], Field(max_length=64)] = ()
+    """Containers that were killed for their memory; empty: none."""
+
+    faults: Faults | None = None
+    """Faults of its simulators by kind, over all attempts; absent: not known yet."""
+
+    goodput: Goodput | None = None
+    """What the time was spent on, in seconds; absent: not known yet."""
+
+    steps_lost: Count | None = None
+    """Environment steps that were played in vain, for faults and interruptions, over all attempts;
+    absent: not known yet."""
 
 
 class Release(ApiModel):

@@ -39,7 +39,7 @@ class Counted:
 
 def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
     """Return the counts after what is seen; `old` is what the status said."""
-    newer = _newer(old, seen.pods)
+    newer = newer_pods(old, seen.pods)
     attempt = _attempt(old, seen, newer)
     restarts = _restarts(old, seen, newer, attempt)
     furthest = _furthest(old, seen)
@@ -56,6 +56,17 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
     )
 
 
+def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
+    """Return the pods made after the one that the status names, oldest first."""
+    named = old.pod
+    if named is None:
+        return tuple(pods)
+    uids = [each.uid for each in pods]
+    if named.uid in uids:
+        return tuple(pods[uids.index(named.uid) + 1 :])
+    return tuple(each for each in pods if each.created > named.created)
+
+
 def failed_by_itself(pod: PodView) -> bool:
     """Return whether the end of a pod counts against `backoffLimit`, as the podFailurePolicy has it."""
     interrupted = pod.trainer is not None and exit_code(pod) == ExitCode.INTERRUPTED
@@ -67,17 +78,6 @@ def exit_code(pod: PodView) -> int | None:
     trainer = pod.trainer
     ended = trainer is not None and trainer.running_since is None and trainer.exit is not None
     return trainer.exit.code if ended and trainer and trainer.exit else None
-
-
-def _newer(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
-    """Return the pods made after the one that the status names, oldest first."""
-    named = old.pod
-    if named is None:
-        return tuple(pods)
-    uids = [each.uid for each in pods]
-    if named.uid in uids:
-        return tuple(pods[uids.index(named.uid) + 1 :])
-    return tuple(each for each in pods if each.created > named.created)
 
 
 def _attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:

@@ -10,6 +10,7 @@ from palaestra.api.reasons import Reason
 from palaestra.decide.conditions import Told
 from palaestra.decide.counting import failed_by_itself
 from palaestra.decide.moments import after, seconds_between
+from palaestra.decide.progress import last_progress
 from palaestra.decide.situation import Deadline, DeadlineCheck, Situation, first_waiting, told
 from palaestra.decide.troubles import (
     CRASHES,
@@ -22,7 +23,6 @@ from palaestra.decide.troubles import (
     restart_policy_dropped,
     storage_eviction,
 )
-from palaestra.observe.reading import as_time
 from palaestra.observe.views import ContainerView, PodView
 from palaestra_sim.protocol.status import SimulatorStatus
 
@@ -78,7 +78,7 @@ def sidecar_kept_crashing(it: Situation) -> Deadline | None:
     looping = next((each for each in crashing(pod) if each.restarts >= CRASHES), None)
     if pod is None or pod.started is None or looping is None or not _waits_for_simulators(it, pod):
         return None
-    return Deadline(at=after(pod.started, it.start_deadline_s(looping.name)), told=of_crash(looping))
+    return Deadline(at=after(pod.started, it.start_deadline_s(looping.name)), told=of_crash(it, looping))
 
 
 def simulator_never_started(it: Situation) -> Deadline | None:
@@ -105,13 +105,12 @@ def trainer_never_started(it: Situation) -> Deadline | None:
 
 
 def stalled(it: Situation) -> Deadline | None:
-    """The trainer itself says that no environment steps, and its watchdog has not ended it."""
-    polled = it.seen.polled
-    moved = as_time(polled.status.last_progress) if polled and polled.status.last_progress else None
-    if moved is None or not _fresh(it):
+    """The trainer answers, its step count does not move, and its watchdog has not ended it."""
+    moved = last_progress(it)
+    if moved is None or not it.trains or not _fresh(it):
         return None
     seconds = it.job.spec.stall_deadline_seconds
-    what = f"no environment step since {moved:%Y-%m-%dT%H:%M:%SZ}, for more than {seconds} s"
+    what = f"no step was learned from since {moved:%Y-%m-%dT%H:%M:%SZ}, for more than {seconds} s"
     return Deadline(at=after(moved, seconds + STALL_GRACE_S), told=told(Reason.STALLED, what=what))
 
 

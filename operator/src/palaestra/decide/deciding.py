@@ -14,6 +14,7 @@ from palaestra.decide.ending import TERMINAL, expired, expires
 from palaestra.decide.happenings import of_actions, of_change
 from palaestra.decide.moments import after, next_of, whole
 from palaestra.decide.preparing import Prepared
+from palaestra.decide.remembering import late_word
 from palaestra.decide.replicas import Decided, decided
 from palaestra.decide.situation import Situation
 from palaestra.decide.summary import active, columns, completed, standing, started
@@ -31,7 +32,8 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, now: dateti
     now = whole(now)
     each = tuple(_replica(job, seen, prepared, now) for seen in observed.replicas)
     if job.status.phase in TERMINAL:
-        status = job.status.model_copy(update={"observed_generation": job.metadata.generation})
+        kept = {"observed_generation": job.metadata.generation, "replicas": _kept(job, each)}
+        status = job.status.model_copy(update=kept)
     else:
         status = _status(job, observed, prepared, tuple(it.status for it in each), now)
     expiry = expires(status, job.spec.ttl_seconds_after_finished)
@@ -51,12 +53,19 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, now: dateti
 def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, now: datetime) -> Decided:
     before = {each.index: each for each in job.status.replicas}
     old = before.get(seen.index, ReplicaStatus(index=seen.index))
-    if old.phase in TERMINAL or job.status.phase in TERMINAL:
-        return Decided(status=old, stop=_still_to_stop(old, seen))
     situation = Situation(
         job=job, old=old, seen=seen, counted=counted(old, seen), now=now, deadline=_deadline(job, now)
     )
+    if old.phase in TERMINAL or job.status.phase in TERMINAL:
+        late = old.model_copy(update={"last_attempt": late_word(situation)})
+        return Decided(status=late, stop=_still_to_stop(old, seen))
     return decided(situation, prepared.hold)
+
+
+def _kept(job: TrainingJob, each: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
+    """Return the replicas of a job that has ended; one that it never had is not made up."""
+    had = {it.index for it in job.status.replicas}
+    return tuple(it.status for it in each if it.status.index in had)
 
 
 def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Told | None:

@@ -6,9 +6,12 @@ from palaestra.api.reasons import ROWS, Reason, say
 from palaestra.api.status import Condition, ConditionStatus, ConditionType, Phase, ReplicaStatus, Status
 from palaestra.decide.conditions import condition
 from palaestra.decide.decision import Action, Create, Happening, HappeningType, SetSuspend, Stop
+from palaestra.decide.memory import limit_of
+from palaestra.plan.replica import TRAINER
 
 _ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
 _BY_ACTION = {Reason.PLANNED, Reason.SUSPENDED, Reason.RESUMED, Reason.EXPIRED}
+_BY_ATTEMPT = {Reason.DISRUPTED}  # one event an attempt, whatever was seen of the time between two
 
 
 def happening(reason: Reason, message: str, replica: int | None = None) -> Happening:
@@ -23,6 +26,8 @@ def of_change(old: Status, new: Status) -> Iterator[Happening]:
     before = {each.index: each for each in old.replicas}
     for each in new.replicas:
         yield from _of_replica(before.get(each.index), each)
+        yield from _of_attempt(before.get(each.index), each)
+        yield from _of_memory(before.get(each.index), each)
     for kind in _ENDS:
         yield from _of_condition(old, new, kind)
 
@@ -63,5 +68,25 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happe
     if before == (new.phase, new.reason) or new.reason is None or new.message is None:
         return
     reason = Reason(new.reason)
-    if reason not in _BY_ACTION:
+    if reason not in _BY_ACTION | _BY_ATTEMPT:
         yield happening(reason, new.message, new.index)
+
+
+def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
+    """Yield the event of an attempt that was disrupted: its pod may be gone, and the next one there."""
+    last, before = new.last_attempt, old.last_attempt if old is not None else None
+    if last is None or last.reason not in _BY_ATTEMPT:
+        return
+    if before is None or (before.attempt, before.reason) != (last.attempt, last.reason):
+        yield happening(Reason(last.reason), last.message, new.index)
+
+
+def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
+    """Yield an event for each container that was killed for its memory, unless the replica tells of it."""
+    before = {each.container: each.times for each in old.memory_kills} if old is not None else {}
+    told = {each.message for each in _of_replica(old, new)}
+    for each in new.memory_kills:
+        whose = Reason.TRAINER_OUT_OF_MEMORY if each.container == TRAINER else Reason.SIMULATOR_OUT_OF_MEMORY
+        message = say(whose, container=each.container, limit=limit_of(each.limit), times=each.times)
+        if each.times > before.get(each.container, 0) and message not in told:
+            yield happening(whose, message, new.index)

@@ -10,13 +10,13 @@ from datetime import datetime
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
+from palaestra.decide.attempts import CAUSES, Attempt, first, stop_of, success
 from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code
 from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation, Verdict, told
-from palaestra.decide.troubles import how_it_failed, killed_for_memory, storage_eviction
+from palaestra.decide.troubles import how_it_failed
 from palaestra.observe.views import JobEnd, JobView, PodView
-from palaestra_sim.protocol.status import ExitCode
 
 OutcomeCheck = Callable[[Situation, JobView], Told | None]
 
@@ -31,7 +31,7 @@ def ended(it: Situation) -> Verdict | None:
     if job is None or (by is not None and it.now < by):
         return None
     if job.end is JobEnd.COMPLETE:
-        return Verdict(phase=Phase.SUCCEEDED, told=told(Reason.SUCCEEDED, what=_success(it)))
+        return Verdict(phase=Phase.SUCCEEDED, told=told(Reason.SUCCEEDED, what=success(it.seen.termination)))
     if job.end is None and job.stopped is None:
         return None
     found = (reason for check in OUTCOMES if (reason := check(it, job)) is not None)
@@ -40,51 +40,15 @@ def ended(it: Situation) -> Verdict | None:
 
 def stopped(_: Situation, job: JobView) -> Told | None:
     """We stopped it; the mark on the Job says why."""
-    if job.stopped is None:
-        return None
-    reason, message = job.stopped
-    known = Reason(reason) if reason in set(Reason) else Reason.JOB_FAILED
-    return Told(reason=known, message=message or f"stopped: {reason}")
+    return stop_of(job)
 
 
-def configuration_refused(it: Situation, job: JobView) -> Told | None:
-    """The trainer says: do not try this again."""
-    return _of_code(it, job, ExitCode.CONFIGURATION, Reason.CONFIGURATION_REFUSED)
-
-
-def fault_budget_spent(it: Situation, job: JobView) -> Told | None:
-    """The trainer gave up on a simulator."""
-    return _of_code(it, job, ExitCode.FAULT_BUDGET, Reason.FAULT_BUDGET_SPENT)
-
-
-def diverged(it: Situation, job: JobView) -> Told | None:
-    """The learner did."""
-    return _of_code(it, job, ExitCode.DIVERGED, Reason.DIVERGED)
-
-
-def trainer_out_of_memory(it: Situation, _: JobView) -> Told | None:
-    """Trying again needs as much memory."""
+def would_end_the_same(it: Situation, job: JobView) -> Told | None:
+    """The last attempt ended by itself, for a cause that has a name."""
     pod = it.seen.pod
-    if pod is None or pod.trainer is None or not killed_for_memory(pod.trainer):
-        return None
-    failures = it.seen.job.failures if it.seen.job else 0
-    return told(
-        Reason.TRAINER_OUT_OF_MEMORY, times=f" in the last of {failures} pods" if failures > 1 else ""
-    )
-
-
-def stalled_too_often(it: Situation, job: JobView) -> Told | None:
-    """The trainer's watchdog ended it, each time."""
-    if _code(it, job) != ExitCode.STALLED:
-        return None
-    word = it.seen.termination
-    what = word.reason if word else f"no environment step for {it.job.spec.stall_deadline_seconds} s"
-    return told(Reason.STALLED, what=what)
-
-
-def evicted_for_storage(it: Situation, _: JobView) -> Told | None:
-    """The pod wrote more than it may."""
-    return None if it.seen.pod is None else storage_eviction(it.seen.pod)
+    name = pod.name if pod is not None else ""
+    last = Attempt(it=it, number=it.counted.attempt, name=name, pod=pod, code=_code(it, job))
+    return first(CAUSES, last)
 
 
 def backoff_limit_spent(it: Situation, job: JobView) -> Told | None:
@@ -97,12 +61,7 @@ def backoff_limit_spent(it: Situation, job: JobView) -> Told | None:
 
 OUTCOMES: tuple[OutcomeCheck, ...] = (
     stopped,
-    configuration_refused,
-    fault_budget_spent,
-    diverged,
-    trainer_out_of_memory,
-    evicted_for_storage,
-    stalled_too_often,
+    would_end_the_same,
     backoff_limit_spent,
 )
 
@@ -118,20 +77,6 @@ def last_word_by(it: Situation) -> datetime | None:
     return after(job.ended, LAST_WORD_S)
 
 
-def _success(it: Situation) -> str:
-    word = it.seen.termination
-    if word is None:
-        return "the training is complete"
-    rate = f", success rate {word.success_rate:.2f}" if word.success_rate is not None else ""
-    return f"the training is complete: {word.step} steps{rate}"
-
-
-def _of_code(it: Situation, job: JobView, code: ExitCode, reason: Reason) -> Told | None:
-    if _code(it, job) != code:
-        return None
-    return told(reason, words=_words(it))
-
-
 def _code(it: Situation, job: JobView) -> int | None:
     pod: PodView | None = it.seen.pod
     code = exit_code(pod) if pod is not None else None
@@ -139,12 +84,6 @@ def _code(it: Situation, job: JobView) -> int | None:
         return code
     match = _EXIT_CODE.search(job.end_message)
     return int(match[1]) if match else None
-
-
-def _words(it: Situation) -> str:
-    if it.seen.termination is not None:
-        return it.seen.termination.reason
-    return how_it_failed(it, it.seen.pod) if it.seen.pod is not None else "its pod is gone; no last word"
 
 
 def _unknown(job: JobView) -> Told:

@@ -3,25 +3,19 @@
 from dataclasses import dataclass
 from datetime import datetime
 
-from palaestra.api import Role
-from palaestra.api.lines import one_line
 from palaestra.api.reasons import Reason
-from palaestra.api.status import (
-    LastCheckpoint,
-    Phase,
-    ReplicaStatus,
-    SimulatorPhase,
-    SimulatorStatus,
-)
+from palaestra.api.status import Phase, ReplicaStatus
+from palaestra.decide.attempts import paused
 from palaestra.decide.conditions import Told
 from palaestra.decide.deadlines import DEADLINES
 from palaestra.decide.ending import TERMINAL
+from palaestra.decide.memory import memory_kills
 from palaestra.decide.outcomes import ended, last_word_by
 from palaestra.decide.preparing import Hold
+from palaestra.decide.progress import progress
+from palaestra.decide.remembering import last_attempt
 from palaestra.decide.situation import Situation, Verdict, told
 from palaestra.decide.troubles import TROUBLES, lost_at, objects_refused
-from palaestra.observe.reading import MOST_COUNT, as_time
-from palaestra_sim.protocol.status import CheckpointStatus, TrainerStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,14 +46,12 @@ def decided(it: Situation, hold: Hold | None) -> Decided:
 def _standing(it: Situation, hold: Hold | None) -> Verdict:
     """Return where a replica stands that goes on."""
     job, spec = it.seen.job, it.job.spec
-    queue = spec.scheduling.queue_name
     if job is None and hold is not None:
         return Verdict(phase=Phase.PENDING, told=hold.told)
     if job is None and (denied := objects_refused(it)) is not None:
         return Verdict(phase=Phase.SUSPENDED if spec.suspend else Phase.PENDING, told=denied)
     if (job is None and spec.suspend) or (job is not None and job.suspended):
-        why = told(Reason.QUEUED, queue=queue) if queue is not None else told(Reason.SUSPENDED)
-        return Verdict(phase=Phase.SUSPENDED, told=why)
+        return Verdict(phase=Phase.SUSPENDED, told=paused(it))
     trouble = next((found for check in TROUBLES if (found := check(it)) is not None), None)
     trainer = it.seen.pod.trainer if it.seen.pod is not None and job is not None else None
     if trainer is not None and trainer.exit is not None and not trouble:
@@ -105,53 +97,8 @@ def _status(it: Situation, verdict: Verdict) -> ReplicaStatus:
             "simulator_restarts": counts.simulator_restarts,
             "furthest_step": counts.furthest_step,
             "fruitless": counts.fruitless,
-            **_progress(it, verdict.phase),
+            "last_attempt": last_attempt(it, verdict if verdict.phase in TERMINAL else None),
+            "memory_kills": memory_kills(it),
+            **progress(it, verdict.phase),
         }
     )
-
-
-def _progress(it: Situation, phase: Phase) -> dict[str, object]:
-    """Return what the trainer last told; what it does not tell any more stays as it was.
-
-    One that has not looked into its run directory yet says step 0, whatever was learned before.
-    """
-    polled = it.seen.polled.status if it.seen.polled and phase not in TERMINAL else None
-    ended_with = it.seen.termination
-    told_last = ended_with or polled
-    fields: dict[str, object] = {"steps_per_second": None}
-    if told_last is not None and not (told_last.attempt is None and told_last.step == 0):
-        fields["step"] = min(told_last.step, MOST_COUNT)
-        fields["success_rate"] = _or(told_last.success_rate, it.old.success_rate)
-        fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or it.old.last_checkpoint
-    if polled is not None and ended_with is None:
-        fields |= {
-            "target": min(polled.target, MOST_COUNT),
-            "mean_return": _or(polled.mean_return, it.old.mean_return),
-            "steps_per_second": polled.steps_per_second,
-            "simulators": _simulators(polled),
-        }
-    return fields
-
-
-def _simulators(polled: TrainerStatus) -> tuple[SimulatorStatus, ...]:
-    return tuple(
-        SimulatorStatus(
-            name=one_line(each.name, 255) or "unnamed",
-            role=Role(each.role),
-            state=SimulatorPhase(each.state),
-            restarts=min(each.restarts, MOST_COUNT),
-            last_fault=None if each.last_fault is None else one_line(each.last_fault, 500),
-        )
-        for each in polled.simulators
-    )
-
-
-def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
-    at = as_time(checkpoint.time) if checkpoint is not None else None
-    if checkpoint is None or at is None:
-        return None
-    return LastCheckpoint(step=min(checkpoint.step, MOST_COUNT), time=at)
-
-
-def _or(new: float | None, old: float | None) -> float | None:
-    return old if new is None else new

@@ -9,11 +9,13 @@ from datetime import datetime
 from palaestra.api.reasons import Reason
 from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code, failed_by_itself
+from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
 from palaestra.decide.moments import after, seconds_between
 from palaestra.decide.situation import Situation, TroubleCheck, first_waiting, told
 from palaestra.observe.pods import dropped
 from palaestra.observe.views import ContainerKind, ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
+from palaestra_sim.protocol.status import Termination
 
 LOST_AFTER_S = 30  # past the moment at which a deleted pod was to be gone
 CRASHES = 3  # of one sidecar, before they are called a loop
@@ -25,7 +27,7 @@ MAKING = frozenset(
     {"CreateContainerConfigError", "CreateContainerError", "RunContainerError", "PreStartHookError",
      "PostStartHookError"}
 )  # fmt: skip
-OUT_OF_MEMORY = "OOMKilled"
+FULL = ("StorageFull", "DiskFull")  # how a last word begins; the second in older releases
 
 
 def name_taken(it: Situation) -> Told | None:
@@ -94,16 +96,23 @@ def container_refused(it: Situation) -> Told | None:
     return told(Reason.CONTAINER_REFUSED, container=stuck.name, words=words)
 
 
+def volume_not_mounted(it: Situation) -> Told | None:
+    """The node has the pod, and a volume does not come; only the pod's events tell."""
+    if it.pod is None or not it.seen.unmounted:
+        return None
+    return told(Reason.VOLUME_NOT_MOUNTED, pod=it.pod.name, words=it.seen.unmounted)
+
+
 def sidecar_out_of_memory(it: Situation) -> Told | None:
     """A sidecar was killed for its memory and is on its way back."""
     stuck = next((each for each in crashing(it.pod) if killed_for_memory(each)), None)
-    return None if stuck is None else of_crash(stuck)
+    return None if stuck is None else of_crash(it, stuck)
 
 
 def sidecar_crash_loops(it: Situation) -> Told | None:
     """A sidecar does not stay up; Kubernetes never fails a pod for that."""
     looping = next((each for each in crashing(it.pod) if each.restarts >= CRASHES), None)
-    return None if looping is None else of_crash(looping)
+    return None if looping is None else of_crash(it, looping)
 
 
 def pod_filled_its_storage(it: Situation) -> Told | None:
@@ -116,13 +125,17 @@ def pod_was_taken(it: Situation) -> Told | None:
     pod = it.seen.pod
     if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
         return None
-    words = pod.disruption or pod.message or _exit_words(pod)
-    return told(Reason.INTERRUPTED, pod=pod.name, words=f" ({words})" if words else "")
+    if pod.disruption or pod.gone_by is not None:
+        return told(Reason.DISRUPTED, pod=pod.name, words=pod.disruption or "it was deleted")
+    return told(Reason.INTERRUPTED, pod=pod.name, how=how_it_failed(it, pod))
 
 
-def _exit_words(pod: PodView) -> str:
-    code = exit_code(pod)
-    return "" if code is None else f"exit code {code}"
+def volume_is_full(it: Situation) -> Told | None:
+    """The newest pod could not write to the volume, and another will try."""
+    pod = it.seen.pod
+    if pod is None or not failed_by_itself(pod) or no_other_comes(it, pod):
+        return None
+    return full_volume(it.seen.termination)
 
 
 def pod_failed(it: Situation) -> Told | None:
@@ -140,12 +153,14 @@ TROUBLES: tuple[TroubleCheck, ...] = (
     node_lost,
     restart_policy_dropped,
     unschedulable,
+    volume_not_mounted,
     image_does_not_come,
     container_refused,
     sidecar_out_of_memory,
     sidecar_crash_loops,
     pod_filled_its_storage,
     pod_was_taken,
+    volume_is_full,
     pod_failed,
 )
 
@@ -175,16 +190,20 @@ def storage_eviction(pod: PodView) -> Told | None:
     return told(Reason.EPHEMERAL_STORAGE, pod=pod.name, words=pod.message)
 
 
-def killed_for_memory(container: ContainerView) -> bool:
-    """Return whether a container's last end was the kernel's, for its memory."""
-    return container.exit is not None and container.exit.reason == OUT_OF_MEMORY
+def full_volume(word: Termination | None) -> Told | None:
+    """Return what to say of a trainer that could not write to its volume; None: it could."""
+    if word is None or not word.reason.startswith(FULL):
+        return None
+    fact = word.reason.partition(": ")[2].partition("; ")[0]  # its remedy is ours
+    return told(Reason.STORAGE_FULL, words=fact or "no space left")
 
 
-def of_crash(container: ContainerView) -> Told:
+def of_crash(it: Situation, container: ContainerView) -> Told:
     """Return what to say of a sidecar that crashed."""
-    times = max(container.restarts, 1)
     if killed_for_memory(container):
-        return told(Reason.SIMULATOR_OUT_OF_MEMORY, container=container.name, times=times)
+        times, limit = kills_of(it, container.name), limit_of(container.memory_limit)
+        return told(Reason.SIMULATOR_OUT_OF_MEMORY, container=container.name, limit=limit, times=times)
+    times = max(container.restarts, 1)
     code = container.exit.code if container.exit is not None else "unknown"
     return told(Reason.SIDECAR_CRASH_LOOP, container=container.name, times=times, how=f"exit code {code}")
 
@@ -198,19 +217,25 @@ def how_it_failed(it: Situation, pod: PodView) -> str:
     code = exit_code(pod)
     if word is not None and word.reason:
         return f"exit code {code}, {word.reason}"
-    if code is None and (before := _failed_before(pod)) is not None:
-        return before
+    if code is None and (before := _failed_before(pod)) is not None and before.exit is not None:
+        line = _last_line(before) or before.exit.reason or "no word"
+        return f"container {before.name}: exit code {before.exit.code}, {line}"
     words = _last_line(trainer) or pod.message or pod.reason or "no word from the trainer"
     return f"exit code {code}, {words}" if code is not None else words
 
 
-def _failed_before(pod: PodView) -> str | None:
-    """Return how a container failed that has to end well before the others start; None: none has."""
-    for each in pod.containers:
-        if each.kind is ContainerKind.INIT and each.exit is not None and each.exit.code:
-            line = _last_line(each) or each.exit.reason or "no word"
-            return f"container {each.name}: exit code {each.exit.code}, {line}"
-    return None
+def _failed_before(pod: PodView) -> ContainerView | None:
+    """Return the container that failed and has to end well before the others start; None: none has."""
+    init = (each for each in pod.containers if each.kind is ContainerKind.INIT)
+    return next((each for each in init if each.exit is not None and each.exit.code), None)
+
+
+def left_by(pod: PodView) -> str:
+    """Return the end of the log of a pod's trainer, or of what kept it from starting; "": nothing is left."""
+    failed = _failed_before(pod)
+    trainer = pod.trainer
+    ends = [each.exit for each in (trainer, failed) if each is not None and each.exit is not None]
+    return next((end.message for end in ends if end.message), "")
 
 
 def _last_line(container: ContainerView | None) -> str:

@@ -11,7 +11,7 @@ _OF_JOB = frozenset({"step", "successRate"})
 _FIRST = frozenset({"step", "target", "successRate", "lastCheckpoint"})  # never absent once they were there
 _OF_REPLICA = frozenset(
     {"step", "target", "successRate", "meanReturn", "stepsPerSecond", "simulators", "lastCheckpoint",
-     "furthestStep", "simulatorRestarts"}
+     "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
 
 

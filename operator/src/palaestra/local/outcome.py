@@ -17,7 +17,8 @@ class Outcome:
     """The end of a replica's run; what nobody measured is None.
 
     `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted` claims
-    that a person ended it. `faults` counts those of all simulators and pods.
+    that a person ended it. `faults` counts those of all simulators and pods. `trained_share` is the part
+    of the wall clock, 0 to 1, that was spent on steps and on learning from them.
     """
 
     exit_code: int
@@ -25,6 +26,7 @@ class Outcome:
     steps: int | None = None
     success_rate: float | None = None
     steps_per_second: float | None = None
+    trained_share: float | None = None
     faults: int | None = None
     pods: int = 1
     interrupted: bool = False
@@ -61,6 +63,7 @@ def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
         "success rate": _shown(outcome.success_rate, "{:.0%}"),
         "steps": _shown(outcome.steps, "{:,}"),
         "steps per second": _shown(outcome.steps_per_second, "{:.0f}"),
+        "trained": _shown(outcome.trained_share, "{:.0%} of the wall clock"),
         "faults": _shown(outcome.faults, "{}"),
         "run directory": str(run_directory),
         "look at it": f"{typed('tensorboard')} --logdir {run_directory / 'tensorboard'}",

@@ -117,14 +117,16 @@ def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
 
 def _outcome(directory: Path, code: int | None, pods: int) -> Outcome:
     """Return what the trainer said of its end: in summary.json, or in its termination message."""
-    said = {**_json(_termination(directory)), **_json(directory / "summary.json")}
+    word, summary = _json(_termination(directory)), _json(directory / "summary.json")
+    said = {**word, **summary}
     return Outcome(
         exit_code=int(ExitCode.INTERRUPTED) if code is None else code,
         reason=str(said.get("reason", "")),
         steps=said.get("step", said.get("steps")),
         success_rate=said.get("success_rate"),
-        steps_per_second=said.get("steps_per_second"),
-        faults=said.get("faults"),
+        steps_per_second=summary.get("steps_per_second"),
+        trained_share=summary.get("trained_share"),
+        faults=summary.get("faults"),
         pods=pods,
     )
 

@@ -1,5 +1,6 @@
 """Sort what was read by replica, and make values of it."""
 
+from collections.abc import Collection
 from datetime import datetime
 
 from palaestra.api import TrainingJob
@@ -19,6 +20,8 @@ from palaestra.observe.views import (
 )
 from palaestra.plan.replica import REPLICA_LABEL, UID_LABEL
 from palaestra_sim.protocol.status import ProtocolError, Termination
+
+UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})  # a kubelet's events, and a controller's
 
 
 def observe(job: TrainingJob, objects: Objects) -> Observed:
@@ -55,6 +58,7 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
         terminations={each.uid: word for each in pods if (word := _last_word(each)) is not None},
         refused=_refused(ours, newest, objects) if ours else None,
         denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
+        unmounted=_unmounted(newest, objects) if newest else "",
     )
 
 
@@ -97,15 +101,27 @@ def _last_word(pod: PodView) -> Termination | None:
 
 def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFailure | None:
     """Return the last refusal of a pod, unless one was made since."""
-    failures = [
-        CreateFailure(message=text(raw, "message"), at=_when(raw))
-        for raw in objects.events
-        if raw.get("reason") == "FailedCreate" and part(raw, "involvedObject").get("uid") == job.uid
-    ]
-    last = max(failures, key=lambda it: it.at, default=None)
-    if last is None or (newest is not None and newest.created >= last.at):
+    last = _last_event(objects, job.uid, {"FailedCreate"})
+    if last is None or (newest is not None and newest.created >= _when(last)):
         return None
-    return last
+    return CreateFailure(message=text(last, "message"), at=_when(last))
+
+
+def _unmounted(newest: PodView, objects: Objects) -> str:
+    """Return why the volumes of a pod that a node has taken are not there; "": they are, or nobody said."""
+    waits = newest.phase == "Pending" and not newest.mounted
+    last = _last_event(objects, newest.uid, UNMOUNTED) if waits else None
+    return text(last, "message")
+
+
+def _last_event(objects: Objects, uid: str, reasons: Collection[str]) -> Raw | None:
+    """Return the last event of one of these reasons about the object with this uid."""
+    found = (
+        raw
+        for raw in objects.events
+        if text(raw, "reason") in reasons and part(raw, "involvedObject").get("uid") == uid
+    )
+    return max(found, key=_when, default=None)
 
 
 def _when(event: Raw) -> datetime:

@@ -25,6 +25,7 @@ def pod_view(raw: Raw) -> PodView:
         reason=text(status, "reason", 60),
         message=text(status, "message"),
         ready=holds(raw, "Ready"),
+        mounted=holds(raw, "PodReadyToStartContainers"),
         node=text(part(raw, "spec"), "nodeName", 253),
         unschedulable=text(scheduled, "message") if _unschedulable(scheduled) else "",
         disruption=_disruption(raw),
@@ -87,6 +88,7 @@ def _container(planned: dict[str, Any], kind: ContainerKind, states: dict[Any, A
         waiting_message=text(waiting, "message"),
         exit=_exit(ended) if ended else None,
         restarts=count(status, "restartCount"),
+        memory_limit=text(part(planned, "resources", "limits"), "memory", 32),
     )
 
 

@@ -11,7 +11,7 @@ _METADATA = (
     "name", "namespace", "uid", "resourceVersion", "generation", "creationTimestamp",
     "deletionTimestamp", "labels", "ownerReferences",
 )  # fmt: skip
-_CONTAINER = ("name", "image", "restartPolicy")
+_CONTAINER = ("name", "image", "restartPolicy", "resources")
 _POD_STATUS = (
     "phase", "reason", "message", "startTime", "podIP", "conditions",
     "initContainerStatuses", "containerStatuses",

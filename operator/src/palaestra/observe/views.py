@@ -50,7 +50,7 @@ class Objects:
     Attributes:
         jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
             a Job that was found to have one of our names belongs among `jobs`, whoever owns it.
-        events: FailedCreate events about those Jobs.
+        events: FailedCreate events about those Jobs, and warnings about pods that wait for volumes.
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
         sources: what `references(job)` names; None: there is no such object. Of a Secret the
             metadata is enough.
@@ -99,6 +99,7 @@ class ContainerView:
         waiting, waiting_message: why it does not run yet, in the kubelet's words; "": it does not wait.
         exit: how it ended, if it has; of a sidecar that runs again, how it ended before.
         restarts: by the kubelet.
+        memory_limit: as its spec has it; "": none.
     """
 
     name: str
@@ -110,6 +111,7 @@ class ContainerView:
     waiting_message: str = ""
     exit: Exit | None = None
     restarts: int = 0
+    memory_limit: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +123,7 @@ class PodView:
         phase: Pending, Running, Succeeded, Failed or Unknown.
         reason, message: the pod's own, as of an eviction; mostly "".
         ready: the kubelet's word; False: it is not, or nobody knows.
+        mounted: its volumes are there: it has begun to pull images, or is past that.
         unschedulable: the scheduler's words; "": it was scheduled.
         disruption: why the cluster took it (condition DisruptionTarget); "": it did not.
         gone_by: when it was to be gone, its grace period included; None: nobody deleted it.
@@ -135,6 +138,7 @@ class PodView:
     reason: str = ""
     message: str = ""
     ready: bool = False
+    mounted: bool = False
     node: str = ""
     unschedulable: str = ""
     disruption: str = ""
@@ -220,6 +224,8 @@ class ReplicaObserved:
         terminations: last words of trainers by pod UID, those that are of our protocol.
         refused: why no pod could be made, if that is newer than the newest pod.
         denied: why an object of the replica could not be made; "": it could.
+        unmounted: why the newest pod's volumes are not there, in the cluster's words; "": they are, or
+            nobody said so.
     """
 
     index: int
@@ -231,6 +237,7 @@ class ReplicaObserved:
     terminations: Mapping[str, Termination] = field(default_factory=dict)
     refused: CreateFailure | None = None
     denied: str = ""
+    unmounted: str = ""
 
     @property
     def pod(self) -> PodView | None:

@@ -43,7 +43,7 @@ def ros_master(replica: Replica) -> Container:
             "timeoutSeconds": 10,
             "failureThreshold": 6,
         },
-        **_common(replica, ROS_MASTER, Resources(), planned.ROS_MASTER, ()),
+        **_common(replica, ROS_MASTER, planned.resources(Resources(), planned.ROS_MASTER), ()),
     }
 
 
@@ -51,7 +51,10 @@ def sidecar(replica: Replica, simulator: Simulator, worlds: Mapping[str, bytes])
     """Return the sidecar of one simulator, which the trainer tells when to start it."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
-    common = _common(replica, simulator.container, group.resources, planned.SIMULATOR, group.env)
+    quantities = planned.resources(group.resources, planned.SIMULATOR)
+    if group.standby:
+        quantities = planned.for_two(quantities)
+    common = _common(replica, simulator.container, quantities, group.env)
     program = SIDECAR
     if group.driver is Driver.COMMAND and places.sidecar is not None:
         program = f"{places.sidecar}/{SIDECAR}"
@@ -96,7 +99,7 @@ def trainer(replica: Replica) -> Container:
         "ports": [_port("metrics", port)],
         "terminationMessagePath": places.termination,
         "terminationMessagePolicy": "FallbackToLogsOnError",
-        **_common(replica, TRAINER, spec.resources, planned.TRAINER, spec.env),
+        **_common(replica, TRAINER, planned.resources(spec.resources, planned.TRAINER), spec.env),
     }
     if not spec.command:  # a program of the job's own need not serve anything
         # Importing PyTorch takes a busy node half a minute, before anything can answer.
@@ -123,16 +126,16 @@ def install_sidecar(replica: Replica) -> Container | None:
     }
 
 
+def shared_memory(container: str) -> str:
+    """Return the name of the volume that a simulator's container has for shared memory."""
+    return f"memory-{container}"
+
+
 def _common(
-    replica: Replica,
-    container: str,
-    wanted: Resources,
-    default: Resources,
-    own: tuple[Variable, ...],
+    replica: Replica, container: str, quantities: planned.Planned, own: tuple[Variable, ...]
 ) -> Container:
     """Return what every container has: environment, resources, security and mounts."""
     places = replica.places(container)
-    quantities = planned.resources(wanted, default)
     env = {
         **_environment(replica, container, planned.threads(quantities)),
         **{each.name: _variable(each) for each in own},
@@ -172,7 +175,7 @@ def _mounts(container: str, places: Places) -> list[dict[str, Any]]:
     if container == TRAINER:
         mounts.append({"name": "run", "mountPath": places.volume})
     elif container != ROS_MASTER and places.shared_memory is not None:
-        mounts.append({"name": f"memory-{container}", "mountPath": places.shared_memory})
+        mounts.append({"name": shared_memory(container), "mountPath": places.shared_memory})
     return mounts
 
 
@@ -193,6 +196,7 @@ def _identity(simulator: Simulator) -> tuple[str, ...]:
         f"--group={identity.group}",
         f"--index={identity.index}",
         *(("--clock",) if simulator.keeps_clock else ()),
+        *(("--standby",) if simulator.group.standby else ()),
     )
 
 

@@ -5,8 +5,9 @@ from typing import Any
 
 from palaestra.plan.claim import run_volume
 from palaestra.plan.config_map import config_volume
-from palaestra.plan.containers import install_sidecar, ros_master, sidecar, trainer
+from palaestra.plan.containers import install_sidecar, ros_master, shared_memory, sidecar, trainer
 from palaestra.plan.replica import Replica
+from palaestra.plan.resources import twice
 
 USER = 65532  # uid, gid and fsGroup of everything in the pod
 GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot notice
@@ -50,7 +51,7 @@ def pod_template(
             "volumes": [
                 config_volume(config_map),
                 run_volume(replica),
-                *_empty_volumes([*init, main]),
+                *_empty_volumes([*init, main], _sizes(replica)),
             ],
         },
     }
@@ -67,13 +68,21 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
     return fields
 
 
-def _empty_volumes(containers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _sizes(replica: Replica) -> dict[str, str]:
+    """Return the size of each simulator's shared memory by the name of its volume."""
+    return {
+        shared_memory(each.container): twice(MEMORY_SIZE) if each.group.standby else MEMORY_SIZE
+        for each in replica.simulators
+    }
+
+
+def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
     """Return an empty volume for every mount that has no other: each container has its own."""
     mounted = {mount["name"] for each in containers for mount in each["volumeMounts"]}
-    return [{"name": name, "emptyDir": _empty(name)} for name in sorted(mounted - {"config", "run"})]
+    return [{"name": name, "emptyDir": _empty(name, memory)} for name in sorted(mounted - {"config", "run"})]
 
 
-def _empty(name: str) -> dict[str, Any]:
-    if name.startswith("memory-"):
-        return {"medium": "Memory", "sizeLimit": MEMORY_SIZE}
+def _empty(name: str, memory: Mapping[str, str]) -> dict[str, Any]:
+    if name in memory:
+        return {"medium": "Memory", "sizeLimit": memory[name]}
     return {"sizeLimit": SCRATCH_SIZE}

@@ -6,11 +6,16 @@ asks for 425m. Small networks learn no faster with a second thread, so the train
 
 import math
 from collections.abc import Mapping
+from decimal import Decimal
 
 from palaestra.api.container import Resources
 
 Quantities = Mapping[str, str]
 CORES = {"m": 0.001, "": 1.0, "k": 1000.0}  # what CPUs are counted in
+BYTES = {
+    "M": 10**6, "G": 10**9, "T": 10**12,
+    "Mi": 2**20, "Gi": 2**30, "Ti": 2**40,
+}  # fmt: skip
 
 Planned = dict[str, dict[str, str]]
 
@@ -34,8 +39,36 @@ def resources(wanted: Resources, default: Resources) -> Planned:
     return {field: value for field, value in planned.items() if value}
 
 
+def for_two(planned: Planned) -> Planned:
+    """Return the resources of a container in which a second simulator stands by: twice the memory.
+
+    One of the two computes at a time, so they share the processor.
+    """
+    return {
+        field: {name: twice(value) if name == "memory" else value for name, value in quantities.items()}
+        for field, quantities in planned.items()
+    }
+
+
+def twice(quantity: str) -> str:
+    """Return a quantity doubled, in its own unit."""
+    number, unit = _split(quantity)
+    return f"{(2 * Decimal(number)).normalize():f}{unit}"
+
+
+def in_bytes(memory: str) -> int:
+    """Return how many bytes an amount of memory such as 400Mi is."""
+    number, unit = _split(memory)
+    return int(number) * BYTES[unit]
+
+
 def threads(planned: Planned) -> int:
     """Return how many threads the CPU limit is good for, 1 where there is none."""
-    limit = planned.get("limits", {}).get("cpu", "1")
-    number = limit.rstrip("mkMGTPi")
-    return max(math.ceil(float(number) * CORES[limit.removeprefix(number)]), 1)
+    number, unit = _split(planned.get("limits", {}).get("cpu", "1"))
+    return max(math.ceil(float(number) * CORES[unit]), 1)
+
+
+def _split(quantity: str) -> tuple[str, str]:
+    """Return number and unit of a quantity."""
+    number = quantity.rstrip("mkMGTPKi")
+    return number, quantity.removeprefix(number)

@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
+from palaestra.api.simulators import Recycle
 from palaestra.plan.replica import Replica, Simulator
+from palaestra.plan.resources import in_bytes
 from palaestra.plan.text import as_yaml
 from palaestra.plan.worlds import world_path
 from palaestra_sim.world import name_prefix
@@ -52,17 +54,31 @@ def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes
         "group": group.name,
         "index": simulator.identity.index,
         "role": group.role.value,
+        "minSimulators": group.min_simulators or group.count,
         "driver": group.driver.value,
         "options": list(group.options),
         "control": f"http://{LOOPBACK}:{port}",
         "world": world_path(replica, simulator, files),
         "namesPrefix": name_prefix(simulator.identity),
     }
-    if group.recycle.after_resets:
-        described["recycle"] = {"afterResets": group.recycle.after_resets}
+    if limits := _limits(group.recycle):
+        described["recycle"] = limits
+    if group.standby:
+        described["standby"] = True
     described["restart"] = {
         "limit": group.restart.limit,
         "withinSeconds": group.restart.within_seconds,
     }
     described["startDeadlineSeconds"] = group.start_deadline_seconds
     return described
+
+
+def _limits(recycle: Recycle) -> dict[str, int]:
+    """Return the limits that there are, memory in bytes."""
+    memory = recycle.above_memory
+    limits = {
+        "afterResets": recycle.after_resets,
+        "afterMinutes": recycle.after_minutes,
+        "aboveMemoryBytes": None if memory is None else in_bytes(memory),
+    }
+    return {name: limit for name, limit in limits.items() if limit}

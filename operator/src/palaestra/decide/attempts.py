@@ -1,0 +1,218 @@
+"""How one attempt of a replica ended, by its pod and its trainer's last word: the first check that knows.
+
+Why a pod was taken comes before what its trainer then did, as the Job's podFailurePolicy has it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from palaestra.api.reasons import Reason
+from palaestra.decide.conditions import Told
+from palaestra.decide.counting import exit_code, failed_by_itself
+from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
+from palaestra.decide.situation import Situation, told
+from palaestra.decide.troubles import full_volume, how_it_failed, storage_eviction
+from palaestra.observe.views import JobView, PodView
+from palaestra.plan.replica import TRAINER
+from palaestra_sim.protocol.status import ExitCode, Termination
+
+BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # what a deletion may lead to
+GONE = "its pod is gone; no last word"
+_HUNG = "SimulatorHung"  # how a last word begins
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Attempt:
+    """An attempt that has ended.
+
+    Attributes:
+        it: the replica.
+        number: from 1.
+        name: of its pod.
+        pod: None: it is gone.
+        code: exit code of its trainer; None: nobody knows.
+    """
+
+    it: Situation
+    number: int
+    name: str
+    pod: PodView | None
+    code: int | None
+
+    @property
+    def word(self) -> Termination | None:
+        """Return the trainer's last word."""
+        return self.it.seen.terminations.get(self.pod.uid) if self.pod is not None else None
+
+    @property
+    def words(self) -> str:
+        """Return why it ended, in the best words that there are."""
+        if self.word is not None:
+            return self.word.reason
+        return how_it_failed(self.it, self.pod) if self.pod is not None else GONE
+
+
+EndCheck = Callable[[Attempt], Told | None]
+
+
+def of_pod(it: Situation, pod: PodView, number: int) -> Attempt:
+    """Return the attempt of a pod that is still there."""
+    return Attempt(it=it, number=number, name=pod.name, pod=pod, code=exit_code(pod))
+
+
+def completed(attempt: Attempt) -> Told | None:
+    """The training is complete."""
+    return told(Reason.SUCCEEDED, what=success(attempt.word)) if attempt.code == ExitCode.DONE else None
+
+
+def evicted_for_storage(attempt: Attempt) -> Told | None:
+    """The pod wrote more than it may."""
+    return None if attempt.pod is None else storage_eviction(attempt.pod)
+
+
+def disrupted(attempt: Attempt) -> Told | None:
+    """The cluster took the pod, by its own word."""
+    if attempt.pod is None or not attempt.pod.disruption:
+        return None
+    return told(Reason.DISRUPTED, pod=attempt.name, words=attempt.pod.disruption)
+
+
+def gone(attempt: Attempt) -> Told | None:
+    """The pod went without a trace; it is told as what it was counted as."""
+    if attempt.pod is not None:
+        return None
+    before, after = attempt.it.old.restarts, attempt.it.counted.restarts
+    if after.trainer > before.trainer:
+        return told(Reason.TRAINER_FAILED, how=GONE)
+    if after.suspension > before.suspension:
+        return paused(attempt.it)
+    return told(Reason.DISRUPTED, pod=attempt.name, words=GONE)
+
+
+def deleted(attempt: Attempt) -> Told | None:
+    """The pod was deleted: by us, by Kueue, or by a person."""
+    pod, job = attempt.pod, attempt.it.seen.job
+    if attempt.code not in BY_SIGNAL or pod is None or pod.gone_by is None:
+        return None
+    if job is not None and (stop := stop_of(job)) is not None:
+        return stop
+    if job is not None and job.suspended:
+        return paused(attempt.it)
+    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # as the Job counts it
+        how = f"{how_it_failed(attempt.it, pod)}; its pod was deleted, and it did not save in time"
+        return told(Reason.TRAINER_FAILED, how=how)
+    return told(Reason.DISRUPTED, pod=attempt.name, words="it was deleted")
+
+
+def interrupted(attempt: Attempt) -> Told | None:
+    """The trainer has saved and stopped, and nobody says why it had to."""
+    if attempt.code != ExitCode.INTERRUPTED or attempt.pod is None:
+        return None
+    return told(Reason.INTERRUPTED, pod=attempt.name, how=how_it_failed(attempt.it, attempt.pod))
+
+
+def configuration_refused(attempt: Attempt) -> Told | None:
+    """The trainer says: do not try this again."""
+    return _of_code(attempt, ExitCode.CONFIGURATION, Reason.CONFIGURATION_REFUSED)
+
+
+def simulator_budget_spent(attempt: Attempt) -> Told | None:
+    """The trainer gave up on a simulator."""
+    return _of_code(attempt, ExitCode.FAULT_BUDGET, Reason.SIMULATOR_BUDGET_SPENT)
+
+
+def diverged(attempt: Attempt) -> Told | None:
+    """The learner did."""
+    return _of_code(attempt, ExitCode.DIVERGED, Reason.DIVERGED)
+
+
+def trainer_out_of_memory(attempt: Attempt) -> Told | None:
+    """Trying again needs as much memory."""
+    trainer = attempt.pod.trainer if attempt.pod is not None else None
+    if trainer is None or not killed_for_memory(trainer):
+        return None
+    return told(
+        Reason.TRAINER_OUT_OF_MEMORY,
+        limit=limit_of(trainer.memory_limit),
+        times=kills_of(attempt.it, TRAINER),
+    )
+
+
+def simulator_hung(attempt: Attempt) -> Told | None:
+    """The trainer waited for one simulator until it gave up."""
+    if attempt.code != ExitCode.STALLED or attempt.word is None or not attempt.word.reason.startswith(_HUNG):
+        return None
+    return told(Reason.SIMULATOR_HUNG, what=attempt.word.reason)
+
+
+def stalled(attempt: Attempt) -> Told | None:
+    """The trainer's watchdog ended it."""
+    if attempt.code != ExitCode.STALLED:
+        return None
+    seconds = attempt.it.job.spec.stall_deadline_seconds
+    what = attempt.word.reason if attempt.word else f"no environment step for {seconds} s"
+    return told(Reason.STALLED, what=what)
+
+
+def storage_full(attempt: Attempt) -> Told | None:
+    """The volume takes no more."""
+    return full_volume(attempt.word)
+
+
+# What a pod may come to by itself; it would come to the same again.
+CAUSES: tuple[EndCheck, ...] = (
+    configuration_refused,
+    simulator_budget_spent,
+    diverged,
+    trainer_out_of_memory,
+    evicted_for_storage,
+    simulator_hung,
+    stalled,
+    storage_full,
+)
+ENDS: tuple[EndCheck, ...] = (
+    completed,
+    evicted_for_storage,
+    disrupted,
+    gone,
+    deleted,
+    interrupted,
+    *CAUSES,
+)
+
+
+def why(attempt: Attempt) -> Told:
+    """Return why an attempt ended, in the words of the first check that knows."""
+    return first(ENDS, attempt) or told(Reason.TRAINER_FAILED, how=attempt.words)
+
+
+def first(checks: tuple[EndCheck, ...], attempt: Attempt) -> Told | None:
+    """Return what the first check says that knows."""
+    return next((found for check in checks if (found := check(attempt)) is not None), None)
+
+
+def stop_of(job: JobView) -> Told | None:
+    """Return why we stopped a replica, by the mark on its Job; None: we did not."""
+    if job.stopped is None:
+        return None
+    reason, message = job.stopped
+    known = Reason(reason) if reason in set(Reason) else Reason.JOB_FAILED
+    return Told(reason=known, message=message or f"stopped: {reason}")
+
+
+def paused(it: Situation) -> Told:
+    """Return why a Job is suspended: with a queue that is Kueue's doing."""
+    queue = it.job.spec.scheduling.queue_name
+    return told(Reason.SUSPENDED) if queue is None else told(Reason.QUEUED, queue=queue)
+
+
+def success(word: Termination | None) -> str:
+    """Return how far a training came that is complete."""
+    if word is None:
+        return "the training is complete"
+    rate = f", success rate {word.success_rate:.2f}" if word.success_rate is not None else ""
+    return f"the training is complete: {word.step} steps{rate}"
+
+
+def _of_code(attempt: Attempt, code: ExitCode, reason: Reason) -> Told | None:
+    return told(reason, words=attempt.words) if attempt.code == code else None

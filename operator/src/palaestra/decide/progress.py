@@ -1,0 +1,108 @@
+"""What the trainer last told, as the status has it, and when it last came forward.
+
+What it does not tell any more stays as it was: unknown is neither zero nor stalled.
+"""
+
+from datetime import datetime
+
+from palaestra.api import Role
+from palaestra.api.history import Faults, Goodput
+from palaestra.api.lines import one_line
+from palaestra.api.status import LastCheckpoint, Phase, SimulatorPhase, SimulatorStatus
+from palaestra.decide.ending import TERMINAL
+from palaestra.decide.situation import Situation
+from palaestra.observe.reading import MOST_COUNT, as_time
+from palaestra_sim.protocol.status import CheckpointStatus, Termination, TrainerStatus
+
+EVALUATING = "evaluating"  # the trainer's phase while nothing is learned from
+LONGEST_NAME = 63  # of a simulator; those of our plan have 23 characters at most
+LONGEST_FAULT = 200
+
+
+def progress(it: Situation, phase: Phase) -> dict[str, object]:
+    """Return the fields of a replica's status that its trainer knows, those of which it told.
+
+    One that has not looked into its run directory yet says step 0, whatever was learned before.
+    """
+    polled = it.seen.polled.status if it.seen.polled and phase not in TERMINAL else None
+    ended_with = it.seen.termination
+    told_last = ended_with or polled
+    fields: dict[str, object] = {"steps_per_second": None, "last_progress": last_progress(it)}
+    if told_last is not None and (step := _step(told_last)) is not None:
+        fields["step"] = step
+        fields["success_rate"] = _or(told_last.success_rate, it.old.success_rate)
+        fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or it.old.last_checkpoint
+    if polled is not None and ended_with is None:
+        fields |= {
+            "target": min(polled.target, MOST_COUNT),
+            "mean_return": _or(polled.mean_return, it.old.mean_return),
+            "steps_per_second": polled.steps_per_second,
+            "simulators": _simulators(polled),
+            **_spent(it, polled),
+        }
+    return fields
+
+
+def last_progress(it: Situation) -> datetime | None:
+    """Return when the step count of the current attempt last moved, or an evaluation did.
+
+    None: it has not begun to train, as far as is known. That an environment steps is no progress by
+    itself: nothing may be learned from it.
+    """
+    same_attempt = it.old.pod is not None and it.counted.pod == it.old.pod
+    known = it.old.last_progress if same_attempt else None
+    if it.seen.polled is None or not it.trains:
+        return known
+    status = it.seen.polled.status
+    step = _step(status)
+    moved = (step is not None and step != it.old.step) or status.phase == EVALUATING
+    if known is not None and not moved:
+        return known
+    stepped = as_time(status.last_progress) if status.last_progress else None
+    return min(stepped or it.now, it.now)
+
+
+def _step(told: TrainerStatus | Termination) -> int | None:
+    """Return how far a run is; None: its trainer does not know yet."""
+    return None if told.attempt is None and told.step == 0 else min(told.step, MOST_COUNT)
+
+
+def _spent(it: Situation, polled: TrainerStatus) -> dict[str, object]:
+    """Return what the run cost so far; a trainer of an older release does not tell."""
+    if not polled.goodput:
+        return {}
+    before = it.old.goodput or Goodput()
+    seconds = {cause: min(int(spent), MOST_COUNT) for cause, spent in polled.goodput.items()}
+    faults = {kind: min(times, MOST_COUNT) for kind, times in polled.faults.items()}
+    return {
+        "goodput": before.model_copy(update=seconds),
+        "faults": (it.old.faults or Faults()).model_copy(update=faults),
+        "steps_lost": min(polled.steps_lost, MOST_COUNT),
+    }
+
+
+def _simulators(polled: TrainerStatus) -> tuple[SimulatorStatus, ...]:
+    return tuple(
+        SimulatorStatus(
+            name=one_line(each.name, LONGEST_NAME) or "unnamed",
+            role=Role(each.role),
+            state=SimulatorPhase(each.state),
+            restarts=min(each.restarts, MOST_COUNT),
+            last_fault=None if each.last_fault is None else one_line(each.last_fault, LONGEST_FAULT),
+            flapping=each.flapping,
+            given_up=each.given_up,
+            standby=each.standby,
+        )
+        for each in polled.simulators
+    )
+
+
+def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
+    at = as_time(checkpoint.time) if checkpoint is not None else None
+    if checkpoint is None or at is None:
+        return None
+    return LastCheckpoint(step=min(checkpoint.step, MOST_COUNT), time=at)
+
+
+def _or(new: float | None, old: float | None) -> float | None:
+    return old if new is None else new

@@ -1,0 +1,109 @@
+"""What is kept of the newest attempt that has ended: a pod's logs die with it, a status does not.
+
+It is written down as soon as the trainer has ended and stays when the pod is gone. A pod that nobody saw
+end is remembered once another has taken its place.
+"""
+
+from palaestra.api.history import LONGEST_LINE, MOST_FAULTS, MOST_LINES, Fault, LastAttempt
+from palaestra.api.lines import one_line
+from palaestra.api.reasons import LONGEST_MESSAGE
+from palaestra.decide.attempts import Attempt, of_pod, why
+from palaestra.decide.conditions import Told
+from palaestra.decide.counting import exit_code, newer_pods
+from palaestra.decide.progress import LONGEST_NAME
+from palaestra.decide.situation import Situation, Verdict
+from palaestra.decide.troubles import left_by
+from palaestra.observe.reading import MOST_COUNT, as_time
+from palaestra.observe.views import PodView
+from palaestra_sim.protocol.status import FaultRecord
+
+
+def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | None:
+    """Return what is kept of the newest attempt that has ended; None: none has.
+
+    `end` is the replica's, if it has ended: it tells of a pod that is gone.
+    """
+    known, newest = it.old.last_attempt, it.seen.pod
+    attempt = of_pod(it, newest, it.counted.attempt) if newest and has_ended(newest) else _replaced(it)
+    if attempt is not None and not (attempt.pod is None and _knows(known, attempt.number)):
+        return _record(attempt, why(attempt))
+    if end is not None and newest is None and it.counted.attempt and not _knows(known, it.counted.attempt):
+        number, name = it.counted.attempt, it.counted.pod.name if it.counted.pod else ""
+        return _record(Attempt(it=it, number=number, name=name, pod=None, code=None), end.told)
+    return known
+
+
+def late_word(it: Situation) -> LastAttempt | None:
+    """Return what is kept of the last attempt of a replica that was called ended before its pod had."""
+    known, newest = it.old.last_attempt, it.seen.pod
+    ours = newest is not None and it.old.pod is not None and newest.uid == it.old.pod.uid
+    if newest is None or not ours or not has_ended(newest) or _knows(known, it.old.attempt):
+        return known
+    attempt = of_pod(it, newest, it.old.attempt)
+    return _record(attempt, why(attempt))
+
+
+def has_ended(pod: PodView) -> bool:
+    """Return whether a pod's trainer has ended, or nothing of the pod runs any more."""
+    return pod.ended or exit_code(pod) is not None
+
+
+def _knows(known: LastAttempt | None, number: int) -> bool:
+    return known is not None and known.attempt >= number
+
+
+def _replaced(it: Situation) -> Attempt | None:
+    """Return the attempt before the newest pod, if that pod is seen for the first time."""
+    named, newer = it.old.pod, newer_pods(it.old, it.seen.pods)
+    if not newer:
+        return None
+    if len(newer) > 1:
+        return of_pod(it, newer[-2], it.counted.attempt - 1)
+    if named is None:
+        return None
+    pod = next((each for each in it.seen.pods if each.uid == named.uid), None)
+    if pod is not None:
+        return of_pod(it, pod, it.old.attempt)
+    return Attempt(it=it, number=it.old.attempt, name=named.name, pod=None, code=None)
+
+
+def _record(attempt: Attempt, told: Told) -> LastAttempt:
+    word, named = attempt.word, attempt.it.old.pod
+    restarts = word.restarts if word is not None else None
+    if restarts is None and named is not None and attempt.name == named.name:
+        restarts = attempt.it.old.simulator_restarts
+    return LastAttempt(
+        attempt=attempt.number,
+        exit_code=attempt.code,
+        reason=told.reason.value,
+        message=one_line(told.message, LONGEST_MESSAGE),
+        log=_log(attempt),
+        faults=tuple(_faults(word.faults if word is not None else ())),
+        restarts=min(restarts or 0, MOST_COUNT),
+    )
+
+
+def _log(attempt: Attempt) -> tuple[str, ...]:
+    """Return the last lines of a trainer's log: its last word has some, and Kubernetes does otherwise."""
+    lines: tuple[str, ...] = ()
+    if attempt.word is not None:
+        lines = attempt.word.log
+    elif attempt.pod is not None:
+        lines = tuple(left_by(attempt.pod).splitlines())
+    told = (one_line(line, LONGEST_LINE) for line in lines)
+    return tuple(line for line in told if line)[-MOST_LINES:]
+
+
+def _faults(records: tuple[FaultRecord, ...]) -> list[Fault]:
+    """Return the last faults; one whose time is in no calendar of ours is none."""
+    timed = [(each, at) for each in records if (at := as_time(each.time)) is not None]
+    return [
+        Fault(
+            time=at,
+            simulator=one_line(each.simulator, LONGEST_NAME) or "unnamed",
+            kind=each.kind,
+            fact=one_line(each.fact, LONGEST_LINE),
+            step=min(each.step, MOST_COUNT),
+        )
+        for each, at in timed[-MOST_FAULTS:]
+    ]

@@ -1,0 +1,116 @@
+"""What is kept of an attempt when its pod is gone, at a real API server, with a kubelet that is played."""
+
+import pytest
+
+from palaestra.cluster.resources import PODS
+from palaestra_sim.protocol.status import FaultRecord, Termination
+from tests.integration.operator.cluster import eventually
+
+FAULT = FaultRecord(
+    time="2026-01-31T11:59:00Z", simulator="collect-0", kind="hung", fact="no answer within 5 s", step=7
+)
+SPENT = Termination(
+    step=20,
+    reason="SimulatorBudgetSpent: collect-0: 11 restarts within 600 s",
+    attempt=1,
+    restarts=10,
+    log=("simulator restarted", "budget spent"),
+    faults=(FAULT,),
+)
+SAVED = Termination(step=20, reason="Interrupted: SIGTERM received", log=("checkpoint written",))
+
+
+def replica(place):
+    """Return what the status says of the replica."""
+    return next(iter(place.status().get("replicas", ())), {})
+
+
+def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, control_plane):
+    """A pod's logs die with it; `kubectl describe` shows what is kept."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.run(pod)
+    place.end(pod, 80, SPENT)
+    place.until("Failed")
+
+    place.api.delete(PODS, place.name, pod["metadata"]["name"])
+    eventually(lambda: place.get(PODS, pod["metadata"]["name"]) is None)
+
+    kept = replica(place)["lastAttempt"]
+    assert (kept["attempt"], kept["exitCode"], kept["reason"]) == (1, 80, "SimulatorBudgetSpent")
+    assert kept["log"] == ["simulator restarted", "budget spent"]
+    assert [each["fact"] for each in kept["faults"]] == ["no answer within 5 s"]
+    described = control_plane.kubectl("-n", place.name, "describe", "trainingjob", "job").stdout
+    assert "Last Attempt:" in described
+    assert "budget spent" in described
+    assert "no answer within 5 s" in described
+
+
+def evict(place, pod):
+    """Let the cluster take a pod, whose trainer saves and stops."""
+    place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting")
+    place.end(pod, 75, SAVED)
+
+
+def lose(place, pod):
+    """Let a pod go with its node, as the garbage collector does once the Node object is gone."""
+    place.take(pod, "DeletionByPodGC", "node not found", phase="Failed")
+    place.api.delete(PODS, place.name, pod["metadata"]["name"])
+
+
+@pytest.mark.parametrize("take", [evict, lose])
+def test_a_disruption_is_counted_and_told_and_is_no_failure(take, place, start):
+    """With a backoffLimit of 0 the next pod is made all the same."""
+    start()
+    place.train(backoffLimit=0)
+    [first] = place.pods()
+    place.run(first)
+    place.until("Running")
+
+    take(place, first)
+    eventually(lambda: replica(place).get("lastAttempt"))
+    [second] = eventually(lambda: others(place, first))
+    place.run(second)
+    eventually(lambda: replica(place).get("attempt") == 2)
+
+    told = replica(place)
+    assert told["lastAttempt"]["reason"] == "Disrupted"
+    assert (told["restarts"]["disruption"], told["restarts"]["trainer"]) == (1, 0)
+    eventually(lambda: "Disrupted" in place.events())
+    assert [each["count"] for each in place.about() if each["reason"] == "Disrupted"] == [1]
+
+
+def others(place, pod):
+    """Return the pods that have not ended, but for one."""
+    return [each for each in place.pods() if each["metadata"]["uid"] != pod["metadata"]["uid"]]
+
+
+def test_a_simulator_that_was_killed_for_its_memory_is_told_with_its_limit(place, start):
+    """Its container runs again at once, so nothing else would tell it from a crash."""
+    start()
+    group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
+    place.train(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
+    [pod] = place.pods()
+    place.run(pod)
+    place.until("Running")
+
+    place.kill(pod, "sim-collect-0")
+
+    [kills] = eventually(lambda: replica(place).get("memoryKills"))
+    assert (kills["container"], kills["times"], kills["limit"]) == ("sim-collect-0", 1, "512Mi")
+    eventually(lambda: "SimulatorOutOfMemory" in place.events())
+    assert replica(place)["phase"] == "Running"
+
+
+def test_a_volume_that_cannot_be_mounted_is_told(place, start):
+    """Only an event on the pod does; by its own status it starts."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.bind(pod)
+    place.complain(pod, "FailedMount", 'MountVolume.SetUp failed for volume "run": no such file')
+
+    eventually(lambda: replica(place).get("reason") == "VolumeNotMounted")
+
+    assert 'volume "run": no such file' in replica(place)["message"]

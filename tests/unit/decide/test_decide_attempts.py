@@ -1,0 +1,285 @@
+"""What is kept of the last attempt: why it ended, its last lines and its faults, when its pod is gone."""
+
+import pytest
+
+from palaestra.api.status import Phase
+from palaestra_sim.protocol.status import FaultRecord
+
+
+def last(scene):
+    """Return number, exit code and reason of the last attempt."""
+    kept = scene.replica().last_attempt
+    return (kept.attempt, kept.exit_code, kept.reason)
+
+
+def disrupted(decision):
+    """Return the messages of the events about disruptions."""
+    return [each.message for each in decision.events if each.reason == "Disrupted"]
+
+
+def test_the_first_attempt_has_none_before_it(training):
+    """What is not known is absent."""
+    scene, _ = training()
+
+    assert scene.replica().last_attempt is None
+
+
+def test_the_last_lines_and_the_faults_outlive_the_pod(training, last_word):
+    """A pod's logs die with it."""
+    scene, pod = training()
+    fault = FaultRecord(
+        time="2026-01-31T11:59:00Z", simulator="collect-0", kind="hung", fact="no answer in 5 s", step=7
+    )
+    word = last_word(
+        reason="SimulatorBudgetSpent: collect-0: 11 restarts",
+        log=("first line", "last line"),
+        faults=(fault,),
+        restarts=10,
+    )
+    scene.end(pod, 80, word)
+    scene.end_job("Failed", 0, "PodFailurePolicy")
+    scene.settle()
+    scene.objects["pods"].clear()
+
+    scene.settle(600)
+
+    kept = scene.replica().last_attempt
+    assert last(scene) == (1, 80, "SimulatorBudgetSpent")
+    assert kept.message == (
+        "the simulators broke too often (exit code 80): SimulatorBudgetSpent: collect-0: 11 restarts"
+    )
+    assert (kept.log, kept.restarts) == (("first line", "last line"), 10)
+    [told] = kept.faults
+    assert (told.simulator, told.kind, told.fact, told.step) == ("collect-0", "hung", "no answer in 5 s", 7)
+
+
+def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(training):
+    """Kubernetes puts it into the termination message; the last ten lines are kept, each cut."""
+    scene, pod = training()
+    lines = [f"line {i}" for i in range(30)] + ["", "x" * 500]
+    scene.end(pod, 137, "\n".join(lines))
+
+    scene.settle()
+
+    kept = scene.replica().last_attempt
+    assert kept.log[:2] == ("line 21", "line 22")
+    assert (len(kept.log), len(kept.log[-1])) == (10, 200)
+    assert last(scene) == (1, 137, "TrainerFailed")
+
+
+def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_groups):
+    """The trainer never started and has none."""
+    scene = accepted(simulators=command_groups)
+    pod = scene.new_pod()
+    scene.container(pod, "install-sidecar", code=1, message="cp: one\ncp: no space left on device\n")
+    pod["status"]["phase"] = "Failed"
+
+    scene.settle()
+
+    assert scene.replica().last_attempt.log == ("cp: one", "cp: no space left on device")
+
+
+@pytest.mark.parametrize(
+    ("code", "word", "reason"),
+    [
+        (0, "Completed: it", "Succeeded"),
+        (2, "ConfigurationWrong: it", "ConfigurationRefused"),
+        (70, "Unexpected: it", "TrainerFailed"),
+        (75, "MasterLost: it", "Interrupted"),
+        (80, "FaultBudgetSpent: it", "SimulatorBudgetSpent"),
+        (81, "Diverged: loss is NaN at step 5", "Diverged"),
+        (82, "SimulatorHung: it", "SimulatorHung"),
+        (82, "Stalled: it", "Stalled"),
+        (1, "StorageFull: it", "StorageFull"),
+        (1, "DiskFull: it", "StorageFull"),
+    ],
+)
+def test_how_an_attempt_ended_is_one_of_the_reasons(training, last_word, code, word, reason):
+    """By exit code and last word, those of an older release too."""
+    scene, pod = training()
+    scene.end(pod, code, last_word(reason=word))
+
+    scene.settle()
+
+    assert last(scene) == (1, code, reason)
+
+
+def test_a_trainer_that_was_killed_for_its_memory_did_not_just_end_with_137(training):
+    """The remedy is another one."""
+    scene, pod = training()
+    scene.end(pod, 137, reason="OOMKilled")
+
+    scene.settle()
+
+    assert last(scene) == (1, 137, "TrainerOutOfMemory")
+
+
+def evict(scene, pod):
+    """Let a drain take the pod: its trainer saves and stops."""
+    scene.take(pod, "Eviction API: evicting")
+
+
+def preempt(scene, pod):
+    """Let the scheduler take the pod: its trainer is too slow."""
+    scene.take(pod, "preempted")
+    scene.end(pod, 137)
+
+
+def lose_with_its_node(scene, pod):  # noqa: ARG001 - all are called alike
+    """Delete the Node object of a node that is off: the garbage collector takes the pod as it was."""
+    pod["status"]["phase"] = "Failed"
+    pod["status"]["conditions"] = [
+        {"type": "DisruptionTarget", "status": "True", "reason": "DeletionByPodGC", "message": "node is gone"}
+    ]
+
+
+def remove(scene, pod):
+    """Let the pod be gone before anybody sees how it ended."""
+    scene.objects["pods"].remove(pod)
+
+
+def delete(scene, pod):
+    """Delete the pod, as a person does."""
+    pod["metadata"]["deletionTimestamp"] = scene.stamp(60)
+    scene.end(pod, 75)
+
+
+@pytest.mark.parametrize("take", [evict, preempt, lose_with_its_node, remove, delete])
+@pytest.mark.parametrize("looks", [True, False], ids=["seen", "seen late"])
+def test_a_disruption_is_counted_and_told_once_and_is_no_failure(training, take, looks):
+    """Whoever took the pod, and whether or not somebody looked before the next one was there."""
+    scene, pod = training(backoffLimit=0)
+    take(scene, pod)
+    told = disrupted(scene.settle(5)) if looks else []
+    scene.pass_(5)
+    scene.running_pod()
+
+    told += disrupted(scene.settle(5))
+
+    replica = scene.replica()
+    assert (replica.phase, replica.reason, replica.attempt) == (Phase.RUNNING, "Training", 2)
+    assert (replica.restarts.disruption, replica.restarts.trainer) == (1, 0)
+    assert last(scene)[0::2] == (1, "Disrupted")
+    assert len(told) == 1
+    assert told[0].startswith(f"pod {pod['metadata']['name']} was taken (")
+
+
+def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):
+    """Kubernetes counts it as one: nobody but a person has deleted it."""
+    scene, pod = training()
+    pod["metadata"]["deletionTimestamp"] = scene.stamp(60)
+    scene.end(pod, 137)
+    scene.count_failures(1)
+    scene.settle(5)
+    scene.pass_(5)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert last(scene) == (1, 137, "TrainerFailed")
+    assert "its pod was deleted, and it did not save in time" in scene.replica().last_attempt.message
+    assert (scene.replica().restarts.trainer, scene.replica().restarts.disruption) == (1, 0)
+
+
+def test_two_disruptions_in_a_row_are_two_events(training):
+    """Though the replica never got beyond waiting for a pod in between."""
+    scene, pod = training()
+    evict(scene, pod)
+    told = disrupted(scene.settle(5))
+    evict(scene, scene.running_pod())
+
+    told += disrupted(scene.settle(5))
+
+    assert len(set(told)) == 2
+    assert (last(scene)[0], scene.replica().restarts.disruption) == (2, 1)
+
+
+def test_of_attempts_that_nobody_saw_the_last_is_kept(training, last_word):
+    """An operator was away for two of them."""
+    scene, pod = training()
+    scene.end(pod, 70, last_word(reason="Unexpected: first"))
+    scene.pass_(15)
+    scene.end(scene.running_pod(), 70, last_word(reason="Unexpected: second"))
+    scene.pass_(15)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert last(scene) == (2, 70, "TrainerFailed")
+    assert scene.replica().last_attempt.message == "Unexpected: second"
+
+
+def test_an_older_pod_that_is_still_there_is_not_taken_for_the_last(training, last_word):
+    """The one that the status names was deleted; a failed one before it was not."""
+    scene, pod = training()
+    scene.end(pod, 70, last_word())
+    scene.count_failures(1)
+    scene.settle(5)
+    scene.pass_(5)
+    second = scene.running_pod()
+    scene.settle(5)
+    scene.objects["pods"].remove(second)
+    scene.pass_(5)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert last(scene) == (2, None, "Disrupted")
+
+
+def test_a_failed_pod_that_was_tidied_away_is_not_called_disrupted(training):
+    """The Job has booked its failure, so that is what it is counted as."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.count_failures(1)
+    scene.pass_(5)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert last(scene) == (1, None, "TrainerFailed")
+
+
+def test_a_suspended_attempt_ended_by_suspension(training):
+    """Its pod was deleted because somebody asked for it."""
+    scene, pod = training()
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    delete(scene, pod)
+
+    decision = scene.settle(5)
+
+    assert last(scene) == (1, 75, "Suspended")
+    assert disrupted(decision) == []
+
+
+def test_the_last_lines_of_an_attempt_that_we_stopped_come_after_the_end(training, last_word):
+    """A replica has failed once its Job is stopped; what its trainer still says is kept all the same."""
+    scene, pod = training(activeDeadlineSeconds=60)
+    scene.step(60)
+    scene.settle()
+    assert scene.status.phase is Phase.FAILED
+    pod["metadata"]["deletionTimestamp"] = scene.stamp(60)
+    scene.end(pod, 75, last_word(reason="Interrupted: SIGTERM received", log=("checkpoint written",)))
+
+    decision = scene.settle(5)
+
+    assert last(scene) == (1, 75, "DeadlineExceeded")
+    assert scene.replica().last_attempt.log == ("checkpoint written",)
+    assert (decision.events, decision.actions) == ((), ())
+    before = scene.raw["status"]
+    scene.objects["pods"].clear()
+    scene.settle(600)
+    assert scene.raw["status"] == before
+
+
+def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(training):
+    """Somebody has tidied up; the Job's words are left."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    words = "Container trainer for pod default/x failed with exit code 81 matching FailJob rule at index 2"
+    scene.end_job("Failed", 0, "PodFailurePolicy", words)
+
+    scene.settle()
+
+    assert (last(scene)[0], last(scene)[2]) == (1, "Diverged")
