@@ -19,6 +19,7 @@ import gymnasium
 import palaestra_trainer.environments  # noqa: F401 - registers MoveToTargetEnv-v0
 from palaestra_trainer import training
 from palaestra_trainer.configuration import Configuration, load
+from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.logs import configure_logs
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.testing import fake_arena
@@ -42,6 +43,7 @@ class FakeSimulator:
         self.name = name
         self.log: list[str] = []
         self._hangs = 0 in deaths
+        self._abandoned = threading.Event()
         self.robot, self.scene = fake_arena(deaths)
         task = configuration.environment
         made = gymnasium.make(task.id, robot=self.robot, scene=self.scene, reward=task.reward, **task.options)
@@ -52,12 +54,16 @@ class FakeSimulator:
         """Resets since the last restart."""
         return self.env.resets
 
+    def due(self) -> None:
+        """It does not wear out."""
+
     def start(self) -> None:
         """Begin to live, or never come up."""
         self.log.append("start")
         if self._hangs:
             sys.stderr.write("never comes up\n")
-            threading.Event().wait()
+            self._abandoned.wait()
+            raise SimulatorDead(self.name, "abandoned")
 
     def stop(self) -> None:
         """Note it."""
@@ -68,6 +74,10 @@ class FakeSimulator:
         self.log.append("restart")
         self.robot.restart()
         self.env.resets = 0
+
+    def abandon(self) -> None:
+        """Come up no more."""
+        self._abandoned.set()
 
     def pause(self) -> None:
         """Note it."""

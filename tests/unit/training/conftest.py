@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from palaestra_trainer.configuration import Configuration, parse
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault
 from palaestra_trainer.run_directory import RunDirectory
 
+PATIENCE_S = 20.0
 GOAL = 3
 MAX_STEPS = 8
 TINY = {"policy_kwargs": {"net_arch": [8]}}
@@ -80,7 +82,11 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
 
 
 class FakeMember:
-    """A member that breaks at chosen steps, resets and starts, counted from 1 over its life."""
+    """A member that breaks at chosen steps, resets and starts, counted from 1 over its life.
+
+    It is due to be recycled after so many resets as `recycle_after` says. Where `held`, a restart waits until
+    `release` is set, or fails once it is abandoned.
+    """
 
     def __init__(
         self,
@@ -89,13 +95,25 @@ class FakeMember:
         steps: Mapping[int, SimulatorFault] | Sequence[int] = (),
         resets: Sequence[int] = (),
         starts: Sequence[int] = (),
+        recycle_after: int | None = None,
+        held: bool = False,
     ) -> None:
         self.name = name
         self.env: gymnasium.Env[Any, Any] = Corridor(self)
         self.log: list[str] = []
         self.resets = 0
+        self._recycle_after = recycle_after
+        self.release = threading.Event()
+        self._abandoned = False
+        if not held:
+            self.release.set()
         self._faults = {"step": steps, "reset": resets, "start": starts}
         self._counts = dict.fromkeys(self._faults, 0)
+
+    def due(self) -> str | None:
+        """Return why it is to be recycled, if it is."""
+        worn = self._recycle_after is not None and self.resets >= self._recycle_after
+        return f"{self.resets} resets" if worn else None
 
     def start(self) -> None:
         """Start, or break."""
@@ -110,8 +128,16 @@ class FakeMember:
     def restart(self) -> None:
         """Start again, or break."""
         self.log.append("restart")
+        assert self.release.wait(PATIENCE_S)
+        if self._abandoned:
+            raise SimulatorDead(self.name, "was abandoned")
         self._take("start")
         self.resets = 0
+
+    def abandon(self) -> None:
+        """Let a restart that is held fail."""
+        self._abandoned = True
+        self.release.set()
 
     def pause(self) -> None:
         """Note it."""

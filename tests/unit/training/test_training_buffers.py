@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stable_baselines3.common.buffers import RolloutBuffer
 
+from palaestra_trainer.algorithms import buffers
 from palaestra_trainer.algorithms.buffers import ValidReplayBuffer, ValidRolloutBuffer, valid_rows
 
 SPACE = spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -32,6 +33,13 @@ def add(buffer, marks, valid):
         np.zeros(len(marks), bool),
         [{"valid": it} for it in valid],
     )
+
+
+def in_order(buffer):
+    """Return the rows in use by column, oldest first, as lists."""
+    shift = buffer.positions.next if buffer.positions.full else 0
+    used = {name: column[: buffer.size()] for name, column in buffer.rows().items()}
+    return {name: np.roll(column, -shift, axis=0).squeeze((1,)).tolist() for name, column in used.items()}
 
 
 def rollout(rewards, valid, starts, *, kind=ValidRolloutBuffer, gamma=0.9):
@@ -66,7 +74,7 @@ def test_a_replay_buffer_holds_the_newest_valid_rows_in_order(steps):
         add(buffer, marks, valid)
         expected += [mark for mark, is_valid in zip(marks, valid, strict=True) if is_valid]
 
-    assert buffer.arrays()["rewards"].flatten().tolist() == expected[-8:]
+    assert in_order(buffer)["rewards"] == expected[-8:]
     assert buffer.size() == min(len(expected), 8)
 
 
@@ -77,10 +85,10 @@ def test_the_row_before_a_fault_ends_as_truncated():
 
     add(buffer, [3, 4], [False, True])
 
-    arrays = buffer.arrays()
-    assert arrays["rewards"].flatten().tolist() == [1, 2, 4]
-    assert arrays["dones"].flatten().tolist() == [1, 0, 0]
-    assert arrays["timeouts"].flatten().tolist() == [1, 0, 0]
+    rows = in_order(buffer)
+    assert rows["rewards"] == [1, 2, 4]
+    assert rows["dones"] == [1, 0, 0]
+    assert rows["timeouts"] == [1, 0, 0]
 
 
 def test_a_fault_at_once_truncates_nothing():
@@ -93,20 +101,52 @@ def test_a_fault_at_once_truncates_nothing():
 
 
 @pytest.mark.parametrize("steps", [0, 1, 3, 4, 7])
-@pytest.mark.parametrize("size", [8, 4])
-def test_a_replay_buffer_is_kept_and_filled_again(steps, size):
-    """Also into a smaller one: then the oldest rows are left out."""
-    before = replay(size=8)
+def test_a_replay_buffer_goes_back_to_where_it_stood(steps):
+    """What was stored since is stored again, at the same places, before anything is sampled."""
+    buffer = replay(size=8)
     for number in range(steps):
-        add(before, [2 * number, 2 * number + 1], [True, True])
-    after = replay(size=size)
+        add(buffer, [2 * number, 2 * number + 1], [True, True])
+    stood = buffer.positions
+    add(buffer, [98, 99], [True, False])
+    expected, after = in_order(buffer), buffer.positions
 
-    after.fill(before.arrays())
+    buffer.positions = stood
+    add(buffer, [98, 99], [True, False])
 
-    rewards = before.arrays()["rewards"].flatten().tolist()
-    assert after.arrays()["rewards"].flatten().tolist() == rewards[-size:]
-    add(after, [98, 99], [True, True])
-    assert after.arrays()["rewards"].flatten().tolist() == [*rewards, 98, 99][-size:]
+    assert buffer.positions == after
+    assert in_order(buffer) == expected
+
+
+@pytest.mark.parametrize("steps", [2, 7])
+def test_a_replay_buffer_can_do_without_some_rows(steps):
+    """Those that a damaged file held; the others stay in order, and the oldest is overwritten first."""
+    buffer = replay(size=8)
+    for number in range(steps):
+        add(buffer, [2 * number, 2 * number + 1], [True, True])
+    before = in_order(buffer)["rewards"]
+    lost = buffer.rows()["rewards"][2:4].flatten().tolist()
+
+    kept = np.ones(8, bool)
+    kept[2:4] = False
+    buffer.keep(kept)
+
+    assert in_order(buffer)["rewards"] == [mark for mark in before if mark not in lost]
+    add(buffer, [98, 99], [True, True])
+    assert in_order(buffer)["rewards"][-2:] == [98, 99]
+
+
+def test_a_replay_buffer_knows_which_chunks_changed(monkeypatch):
+    """Only those are written to a checkpoint again."""
+    monkeypatch.setattr(buffers, "CHUNK_BYTES", 4 * 28)  # a row has two observations, an action and 3 numbers
+    buffer = replay(size=10)
+    add(buffer, [1, 2], [True, True])
+    first = set(buffer.changed)
+    buffer.changed.clear()
+    add(buffer, [3, 4], [True, True])
+    add(buffer, [5, 6], [True, False])
+
+    assert buffer.chunk_rows == 4
+    assert (first, buffer.changed) == ({0}, {0, 1})
 
 
 def test_without_faults_a_rollout_is_what_stable_baselines_computes():

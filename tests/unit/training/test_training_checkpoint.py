@@ -4,122 +4,381 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import pickle
+import shutil
 import zipfile
 
 import numpy as np
 import pytest
+import structlog
 import torch
 
 from palaestra_trainer import checkpoint
-from palaestra_trainer.algorithms import make_model
+from palaestra_trainer.algorithms import buffers, make_model
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.member import Keeper
+from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 HYPERPARAMETERS = {
-    "DQN": {"learning_starts": 10, "batch_size": 8, "buffer_size": 200, "policy_kwargs": {"net_arch": [8]}},
+    "DQN": {
+        "learning_starts": 10,
+        "batch_size": 8,
+        "gradient_steps": 1,
+        "buffer_size": 200,
+        "policy_kwargs": {"net_arch": [8]},
+    },
     "PPO": {"n_steps": 16, "batch_size": 8, "policy_kwargs": {"net_arch": [8]}},
 }
+CHUNK_ROWS = 16
+
+
+@pytest.fixture(autouse=True)
+def _small_chunks(monkeypatch):
+    """Let some dozens of rows be several chunks: a row of the corridor has 36 bytes."""
+    monkeypatch.setattr(buffers, "CHUNK_BYTES", 36 * CHUNK_ROWS)
+
+
+class Trained:
+    """A model that was trained for some steps, and its checkpoints."""
+
+    def __init__(self, model, env, configuration, folder):
+        self.model = model
+        self.configuration = configuration
+        self.folder = folder
+        self._env = env
+        self.saver = checkpoint.Saver(folder, keep=3)
+
+    def learn(self, steps):
+        """Train on."""
+        self.model.learn(steps, reset_num_timesteps=False)
+        return self
+
+    def save(self, step=None):
+        """Save a checkpoint; return whether it was written."""
+        state = checkpoint.State.of(self.model, self._env.snapshot(), {"returns": [1.5]})
+        step = self.model.num_timesteps if step is None else step
+        return self.saver.save(
+            self.model, state, checkpoint.describe(self.configuration, step, {"episodes": 4})
+        )
+
+    def resume(self):
+        """Let the model be what the newest checkpoint holds; return its state."""
+        found = checkpoint.newest(self.folder)
+        state = checkpoint.restore(found, self.model)
+        self._env.resume(state.members)
+        state.put_back(self.model)
+        self.saver = checkpoint.Saver(self.folder, keep=3, resumed=found)
+        return state
+
+    def path(self, step):
+        """Return the folder of a checkpoint."""
+        return self.folder / str(step)
+
+    def experience(self, step):
+        """Return the files of a checkpoint's experience by name."""
+        return {file.name: file for file in sorted((self.path(step) / "experience").iterdir())}
 
 
 @pytest.fixture
-def model_of(make_member, make_configuration):
-    """Make a model with its configuration, trained for some steps."""
+def trained(make_member, make_configuration, tmp_path):
+    """Train a model for some steps."""
 
     def make(name="DQN", steps=40):
         configuration = make_configuration(algorithm={"name": name, "hyperparameters": HYPERPARAMETERS[name]})
         env = SimulatorsVecEnv([Keeper(make_member())], run_seed=1)
         model = make_model(configuration.algorithm, env, seed=1)
-        return (model.learn(steps) if steps else model), configuration
+        made = Trained(model, env, configuration, tmp_path / "checkpoints")
+        return made.learn(steps) if steps else made
 
     return make
 
 
-def manifest_of(configuration, step=40):
-    """Return a manifest for a step."""
-    return checkpoint.describe(configuration, step, [5], {"episodes": 4})
+def rows(model):
+    """Return the experience of a model, oldest first."""
+    return {name: column[: model.replay_buffer.size()] for name, column in model.replay_buffer.rows().items()}
+
+
+def equal(one, other):
+    """Return whether two buffers hold the same rows at the same places."""
+    return all(np.array_equal(column, rows(other)[name]) for name, column in rows(one).items())
 
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
-def test_what_is_saved_is_restored(model_of, tmp_path, name):
-    """Networks, optimiser, counters and experience."""
-    before, configuration = model_of(name)
-    after, _ = model_of(name, steps=0)
-    checkpoint.save(tmp_path, before, manifest_of(configuration), keep=3)
+def test_what_is_saved_is_restored(trained, name):
+    """Networks, optimiser, counts, statistics and random generators."""
+    before, after = trained(name), trained(name, steps=0)
+    before.save()
 
-    found = checkpoint.newest(tmp_path)
-    checkpoint.restore(found, after, configuration)
+    state = after.resume()
 
-    assert found.manifest.episodes == [5]
-    assert found.manifest.counters == {"episodes": 4}
-    assert after.num_timesteps == 40
-    assert after._n_updates == before._n_updates
-    for one, other in zip(before.policy.parameters(), after.policy.parameters(), strict=True):
+    assert checkpoint.newest(before.folder).manifest.counters == {"episodes": 4}
+    assert state.rollout == {"returns": [1.5]}
+    assert state.members[0].episode == before.model.get_env().snapshot()[0].episode
+    assert after.model.num_timesteps == before.model.num_timesteps >= 40
+    assert after.model._n_updates == before.model._n_updates
+    assert after.model.ep_info_buffer == before.model.ep_info_buffer
+    assert np.array_equal(after.model._last_obs, before.model._last_obs)
+    for one, other in zip(before.model.policy.parameters(), after.model.policy.parameters(), strict=True):
         assert torch.equal(one, other)
-    state = after.policy.optimizer.state_dict()["state"]
-    assert len(state) == len(before.policy.optimizer.state_dict()["state"]) > 0
+    optimizer = after.model.policy.optimizer.state_dict()["state"]
+    assert len(optimizer) == len(before.model.policy.optimizer.state_dict()["state"]) > 0
 
 
-def test_the_replay_buffer_is_restored(model_of, tmp_path):
-    """Else a resumed run would begin to learn from nothing."""
-    before, configuration = model_of()
-    after, _ = model_of(steps=0)
-    checkpoint.save(tmp_path, before, manifest_of(configuration), keep=3)
+@pytest.mark.parametrize("name", ["DQN", "PPO"])
+def test_random_numbers_go_on_where_they_were(trained, name):
+    """Of NumPy, PyTorch and the action space: else exploration would differ, or be repeated."""
+    before = trained(name)
+    before.save()
 
-    checkpoint.restore(checkpoint.newest(tmp_path), after, configuration)
+    def draw(model):
+        return (np.random.rand(), torch.rand(1).item(), [model.action_space.sample() for _ in range(9)])  # noqa: NPY002 - the one that training draws from
 
-    for name, array in before.replay_buffer.arrays().items():
-        assert np.array_equal(array, after.replay_buffer.arrays()[name])
+    expected = draw(before.model)
+    after = trained(name, steps=0)
+    after.resume()
+
+    assert draw(after.model) == expected
 
 
-def test_the_newest_checkpoints_are_kept(model_of, tmp_path):
+@pytest.mark.parametrize("steps", [40, 230], ids=["half full", "gone round"])
+def test_the_replay_buffer_is_restored(trained, steps):
+    """Row by row at the same place, since samples are drawn by place."""
+    before, after = trained(steps=steps), trained(steps=0)
+    before.save()
+
+    after.resume()
+
+    assert after.model.replay_buffer.positions == before.model.replay_buffer.positions
+    assert equal(before.model, after.model)
+
+
+def test_only_chunks_that_changed_are_written_again(trained):
+    """The others are the files of the checkpoint before; a million rows would take too long."""
+    model = trained(steps=100)
+    model.save()
+    model.learn(20).save()
+
+    first, second = model.experience(100), model.experience(120)
+    shared = [name for name in second if name in first and second[name].samefile(first[name])]
+    assert list(second) == [f"{chunk:05}.npy" for chunk in range(8)]
+    assert shared == [f"{chunk:05}.npy" for chunk in range(6)]
+
+
+def test_a_resumed_run_shares_chunks_too(trained):
+    """It knows what it has read."""
+    trained(steps=100).save()
+    model = trained(steps=0)
+    model.resume()
+    model.learn(20).save()
+
+    shared = model.experience(120)["00000.npy"].samefile(model.experience(100)["00000.npy"])
+    resumed = trained(steps=0)
+    resumed.resume()
+    assert shared
+    assert equal(model.model, resumed.model)
+
+
+def test_a_row_that_ends_as_truncated_afterwards_is_written_again(trained):
+    """A fault changes the row before it, which may be in a chunk that was saved."""
+    model = trained(steps=32)
+    model.save()
+    buffer = model.model.replay_buffer
+    buffer.positions = buffer.positions._replace(newest=(3,))
+    buffer.dones[3] = 0.0
+    empty = np.zeros((1, 2), np.float32)
+    buffer.add(empty, empty, np.zeros(1), np.zeros(1), np.ones(1), [{"valid": False}])
+
+    assert buffer.changed == {0}
+
+
+def test_chunks_are_copied_where_the_volume_has_no_links(trained, monkeypatch):
+    """Some network volumes have none."""
+    model = trained(steps=100)
+    model.save()
+
+    def refuse(*_paths):
+        raise OSError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "link", refuse)
+    model.learn(20).save()
+
+    resumed = trained(steps=0)
+    resumed.resume()
+    assert not model.experience(120)["00000.npy"].samefile(model.experience(100)["00000.npy"])
+    assert equal(model.model, resumed.model)
+
+
+def test_a_chunk_whose_file_is_gone_is_written_again(trained):
+    """Somebody may have tidied up."""
+    model = trained(steps=100)
+    model.save()
+    model.experience(100)["00000.npy"].unlink()
+
+    model.learn(20).save()
+
+    assert checkpoint.newest(model.folder).manifest.step == 120
+
+
+def test_the_newest_checkpoints_are_kept(trained):
     """Newest by step, not by name: 100 is after 20."""
-    model, configuration = model_of(steps=0)
-    for step in (20, 100, 3):
-        checkpoint.save(tmp_path, model, manifest_of(configuration, step), keep=2)
+    model = trained(steps=0).learn(1)
+    for step in (3, 20, 30, 100):
+        model.save(step)
 
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["100", "20"]
-    assert checkpoint.newest(tmp_path).manifest.step == 100
+    assert sorted(path.name for path in model.folder.iterdir()) == ["100", "20", "30"]
+    assert checkpoint.newest(model.folder).manifest.step == 100
 
 
-def test_a_step_is_saved_again(model_of, tmp_path):
+def test_checkpoints_beyond_the_step_are_removed(trained):
+    """They are damaged, else the run had gone on from them; they must not displace good ones."""
+    model = trained()
+    for step in (10, 20, 30):
+        model.save(step)
+    (model.path(30) / "model.zip").unlink()
+    model.resume()
+
+    model.save(25)
+
+    assert sorted(path.name for path in model.folder.iterdir()) == ["10", "20", "25"]
+
+
+def test_a_step_is_saved_again(trained):
     """A run that is interrupted right after a checkpoint does so."""
-    model, configuration = model_of(steps=0)
-    for _ in range(2):
-        assert checkpoint.save(tmp_path, model, manifest_of(configuration), keep=2)
+    model = trained()
 
-    assert checkpoint.newest(tmp_path).manifest.step == 40
+    assert model.save()
+    assert model.save()
+
+    assert [path.name for path in model.folder.iterdir()] == ["40"]
+    assert checkpoint.newest(model.folder).manifest.step == 40
+
+
+def flip(path):
+    """Change one bit in the middle, as a bad disk does."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    replace(path, bytes(content))
 
 
 def truncate(path):
     """Lose the end, as a crash of the machine does."""
-    path.write_bytes(path.read_bytes()[:-10])
+    replace(path, path.read_bytes()[:-10])
 
 
-DAMAGES = {
-    "model truncated": lambda folder: truncate(folder / "model.zip"),
-    "experience truncated": lambda folder: truncate(folder / "replay.npz"),
-    "manifest truncated": lambda folder: truncate(folder / "manifest.json"),
-    "manifest missing": lambda folder: (folder / "manifest.json").unlink(),
-    "model missing": lambda folder: (folder / "model.zip").unlink(),
-    "manifest is a list": lambda folder: (folder / "manifest.json").write_text("[]"),
-    "manifest is empty": lambda folder: (folder / "manifest.json").write_text('{"format": 1}'),
-    "another format": lambda folder: (folder / "manifest.json").write_text('{"format": 99}'),
-}
+def replace(path, content):
+    """Damage this file, and none that it is shared with."""
+    path.unlink()
+    path.write_bytes(content)
 
 
-@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())
-def test_a_damaged_checkpoint_is_skipped(model_of, tmp_path, damage):
-    """The one before it is older and whole."""
-    model, configuration = model_of(steps=0)
+FILES = [
+    "manifest.json",
+    "model.zip",
+    "state.json",
+    "state.npz",
+    "experience/00000.npy",
+    "experience/00002.npy",
+]
+
+
+@pytest.mark.parametrize("damage", [truncate, flip, os.remove])
+@pytest.mark.parametrize("file", FILES)
+def test_a_checkpoint_with_a_damaged_file_is_skipped(trained, file, damage):
+    """With a warning; the one before is older and whole, and the run goes on from it."""
+    model = trained()
     for step in (10, 20):
-        checkpoint.save(tmp_path, model, manifest_of(configuration, step), keep=3)
+        model.save(step)
+    damage(model.path(20) / file)
 
-    damage(tmp_path / "20")
+    with structlog.testing.capture_logs() as logs:
+        found = checkpoint.newest(model.folder)
 
-    assert checkpoint.newest(tmp_path).manifest.step == 10
+    assert found.manifest.step == 10
+    assert [(line["event"], line["log_level"]) for line in logs] == [
+        ("damaged checkpoint skipped", "warning")
+    ]
+    checkpoint.restore(found, model.model)
+
+
+@pytest.mark.parametrize("content", ["[]", "{}", '{"format": 2}', "null", '{"format": 99}'])
+def test_a_manifest_that_is_none_is_damage(trained, content):
+    """Whatever it says, its digest is not there."""
+    model = trained()
+    for step in (10, 20):
+        model.save(step)
+    (model.path(20) / "manifest.json").write_text(content)
+
+    assert checkpoint.newest(model.folder).manifest.step == 10
+
+
+def test_every_bit_of_a_manifest_counts(trained):
+    """It says where the run goes on, and is named by no other file."""
+    model = trained()
+    model.save()
+    path = model.path(40) / "manifest.json"
+    whole = path.read_bytes()
+    compact = json.dumps(json.loads(whole))
+
+    for place in range(len(compact)):
+        damaged = bytearray(compact.encode())
+        damaged[place] ^= 1
+        path.write_bytes(damaged)
+        assert checkpoint.newest(model.folder) is None, damaged[place - 20 : place + 20]
+
+
+def test_damage_to_shared_experience_does_not_end_a_run(trained):
+    """One bad file may be in every checkpoint; the rows of the other chunks are whole."""
+    model = trained(steps=100)
+    model.save()
+    model.learn(20).save()
+    content = bytearray(model.experience(120)["00001.npy"].read_bytes())
+    content[-1] ^= 1
+    model.experience(120)["00001.npy"].write_bytes(content)
+
+    resumed = trained(steps=0)
+    resumed.resume()
+    left = resumed.model.replay_buffer
+
+    assert resumed.model.num_timesteps == 120
+    assert left.size() == 120 - CHUNK_ROWS
+    expected = np.delete(rows(model.model)["observations"], slice(CHUNK_ROWS, 2 * CHUNK_ROWS), axis=0)
+    assert np.array_equal(rows(resumed.model)["observations"], expected)
+    resumed.learn(10).save()
+    assert not checkpoint.newest(resumed.folder).lost
+
+
+def test_what_is_left_of_a_buffer_that_has_gone_round_is_in_order(trained):
+    """The oldest first, so that it is the first to be overwritten."""
+    model = trained(steps=230)
+    model.save()
+    (model.path(230) / "experience/00000.npy").unlink()
+
+    resumed = trained(steps=0)
+    resumed.resume()
+
+    order = [*range(30, 200), *range(CHUNK_ROWS, 30)]
+    assert np.array_equal(rows(resumed.model)["observations"], rows(model.model)["observations"][order])
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_a_checkpoint_of_another_format_is_refused(trained, number):
+    """Beginning anew would waste what it cost; older and newer releases can read their own."""
+    model = trained()
+    model.save(10)
+    model.save(20)
+    path = model.path(20)
+    checkpoint.Manifest(step=20, seed=1, algorithm={}, environment={}, format=number).write(path)
+    if number == 1:  # which had no digest of itself
+        content = json.loads((path / "manifest.json").read_text())
+        del content["digest"]
+        (path / "manifest.json").write_text(json.dumps(content))
+
+    with pytest.raises(
+        ConfigurationError, match=rf"20: is of format {number}.* which reads 2; go on with the"
+    ):
+        checkpoint.newest(model.folder)
 
 
 def test_without_a_checkpoint_there_is_none(tmp_path):
@@ -127,41 +386,68 @@ def test_without_a_checkpoint_there_is_none(tmp_path):
     assert checkpoint.newest(tmp_path / "none") is None
 
 
-def test_a_full_disk_leaves_what_was_there(model_of, tmp_path, monkeypatch):
-    """Training goes on; the next checkpoint may fit again."""
-    model, configuration = model_of(steps=0)
-    checkpoint.save(tmp_path, model, manifest_of(configuration, 10), keep=1)
+def fail(number):
+    """Return a function that fails as the system does."""
 
-    def full(*_args, **_options):
-        raise OSError(errno.ENOSPC, "No space left on device")
+    def write(*_args, **_options):
+        raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr(model, "save", full)
-
-    assert checkpoint.save(tmp_path, model, manifest_of(configuration, 20), keep=1) is False
-    assert [path.name for path in tmp_path.iterdir()] == ["10"]
+    return write
 
 
-def test_another_failure_to_write_is_not_hidden(model_of, tmp_path, monkeypatch):
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
+@pytest.mark.parametrize("where", ["model.save", "np.savez", "np.save"])
+def test_a_full_disk_leaves_what_was_there(trained, monkeypatch, where, number):
+    """Training goes on; the next checkpoint may fit again, and lacks nothing."""
+    model = trained(steps=100)
+    model.save()
+    model.learn(20)
+    with monkeypatch.context() as full:
+        place, name = where.split(".")
+        full.setattr({"model": model.model, "np": np}[place], name, fail(number))
+        written = model.save()
+    left = [path.name for path in model.folder.iterdir()]
+
+    model.learn(20).save()
+
+    resumed = trained(steps=0)
+    resumed.resume()
+    assert (written, left) == (False, ["100"])
+    assert resumed.model.num_timesteps == 140
+    assert equal(model.model, resumed.model)
+
+
+def test_another_failure_to_write_is_not_hidden(trained, monkeypatch):
     """A volume that is read-only will stay so."""
-    model, configuration = model_of(steps=0)
-
-    def refuse(*_args, **_options):
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    monkeypatch.setattr(model, "save", refuse)
+    model = trained()
+    monkeypatch.setattr(model.model, "save", fail(errno.EROFS))
 
     with pytest.raises(OSError, match="Read-only"):
-        checkpoint.save(tmp_path, model, manifest_of(configuration), keep=1)
+        model.save()
 
 
-def test_a_draft_that_a_crash_left_is_removed(model_of, tmp_path):
-    """It would fill the volume in the end."""
-    model, configuration = model_of(steps=0)
-    (tmp_path / ".7.draft").mkdir()
+def test_a_draft_is_never_taken_for_a_checkpoint(trained):
+    """A trainer was killed when all of it was written but its name."""
+    model = trained()
+    model.save(10)
+    model.save(20)
+    model.path(20).rename(model.folder / ".20.draft")
 
-    checkpoint.save(tmp_path, model, manifest_of(configuration), keep=1)
+    assert checkpoint.newest(model.folder).manifest.step == 10
+    assert [path.name for path in model.folder.iterdir()] == ["10"]
 
-    assert [path.name for path in tmp_path.iterdir()] == ["40"]
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_kill_while_a_step_is_saved_again_loses_nothing(trained, there):
+    """Between the two moments at which the old and the new folder change their names, or right after."""
+    model = trained()
+    model.save()
+    shutil.copytree(model.path(40), model.folder / ".40.replaced")
+    if not there:
+        shutil.rmtree(model.path(40))
+
+    assert checkpoint.newest(model.folder).manifest.step == 40
+    assert [path.name for path in model.folder.iterdir()] == ["40"]
 
 
 @pytest.mark.parametrize(
@@ -172,20 +458,19 @@ def test_a_draft_that_a_crash_left_is_removed(model_of, tmp_path):
         ({"environment": {"id": "Other-v0"}}, "environment.id"),
     ],
 )
-def test_another_run_is_not_continued(model_of, make_configuration, tmp_path, changes, field):
+def test_another_run_is_not_continued(trained, make_configuration, changes, field):
     """Its networks would fit, and mean something else."""
-    model, configuration = model_of(steps=0)
-    checkpoint.save(tmp_path, model, manifest_of(configuration), keep=1)
-    other = make_configuration(**({"algorithm": configuration.algorithm.model_dump()} | changes))
+    model = trained()
+    model.save()
+    other = make_configuration(**({"algorithm": model.configuration.algorithm.model_dump()} | changes))
 
     with pytest.raises(ConfigurationError, match=f"{field}: the run in .* use another run directory"):
-        checkpoint.restore(checkpoint.newest(tmp_path), model, other)
+        checkpoint.refuse_another_run(checkpoint.newest(model.folder), other)
 
 
-def test_tensors_of_another_shape_are_a_configuration_error(model_of, make_member, tmp_path):
+def test_tensors_of_another_shape_are_a_configuration_error(trained, make_member, tmp_path):
     """The file is whole, but not what was configured."""
-    model, _ = model_of(steps=0)
-    model.save(tmp_path / "model.zip")
+    trained(steps=0).model.save(tmp_path / "model.zip")
     wide = Algorithm(
         name="DQN", hyperparameters=HYPERPARAMETERS["DQN"] | {"policy_kwargs": {"net_arch": [9]}}
     )
@@ -203,9 +488,9 @@ class Bomb:
         return (pytest.fail, ("unpickled",))
 
 
-def test_nothing_in_a_model_is_unpickled(model_of, tmp_path):
+def test_nothing_in_a_model_is_unpickled(trained, tmp_path):
     """Whoever may write to a volume may not run code in the trainer."""
-    model, _ = model_of(steps=0)
+    model = trained(steps=0).model
     model.save(tmp_path / "model.zip")
     with zipfile.ZipFile(tmp_path / "model.zip", "a") as archive:
         content = {"x": {":type:": "Bomb", ":serialized:": pickle.dumps(Bomb()).hex()}}
@@ -215,23 +500,17 @@ def test_nothing_in_a_model_is_unpickled(model_of, tmp_path):
     checkpoint.load_tensors(tmp_path / "model.zip", model)
 
 
-def test_a_replay_buffer_of_objects_is_refused(model_of, tmp_path):
-    """Arrays of objects are pickles."""
-    model, configuration = model_of(steps=0)
-    checkpoint.save(tmp_path, model, manifest_of(configuration), keep=1)
-    found = checkpoint.newest(tmp_path)
-    np.savez(found.path / "replay.npz", rewards=np.array([Bomb()], dtype=object))
+@pytest.mark.parametrize("file", ["state.npz", "experience/00000.npy"])
+def test_arrays_of_objects_are_refused(trained, file):
+    """They are pickles."""
+    model = trained()
+    model.save()
+    found = checkpoint.newest(model.folder)
+    objects = np.array([Bomb()], dtype=object)
+    if file.endswith("npz"):
+        np.savez(found.path / file, observation=objects)
+    else:
+        np.save(found.path / file, objects)
 
     with pytest.raises(ValueError, match="allow_pickle=False"):
-        checkpoint.restore(found, model, configuration)
-
-
-def test_a_model_with_nan_is_not_finite(model_of):
-    """It is asked before it is saved."""
-    model, _ = model_of(steps=0)
-    assert checkpoint.finite(model)
-
-    with torch.no_grad():
-        next(iter(model.policy.parameters())).fill_(float("nan"))
-
-    assert not checkpoint.finite(model)
+        checkpoint.restore(found, model.model)

@@ -32,7 +32,9 @@ simulators:
   control: http://127.0.0.1:7100
   world: /w/collect-0.wbt
   namesPrefix: move_to_target_r1_collect_0a
-  recycle: {afterResets: 24}
+  minSimulators: 1
+  recycle: {afterResets: 24, afterMinutes: 90, aboveMemoryBytes: 419430400}
+  standby: true
   restart: {limit: 10, withinSeconds: 600}
   startDeadlineSeconds: 60
 """
@@ -52,6 +54,7 @@ def test_every_field_of_the_contract_is_read(tmp_path):
     configuration = load(path)
 
     assert configuration.simulators[0].recycle.after_resets == 24
+    assert configuration.simulators[0].standby
     assert configuration.evaluation.stop_at_success_rate == 0.95
     assert configuration.command == ("python", "mine.py")
 

@@ -10,18 +10,22 @@ import sys
 import threading
 
 import pytest
+import structlog
 
-from palaestra_sim.protocol.status import ExitCode, Termination
+from palaestra_sim.protocol.status import Cause, ExitCode, Termination
 from palaestra_trainer.errors import (
     ConfigurationError,
+    Diverged,
     FaultBudgetSpent,
     MasterLost,
     SimulatorDead,
     SimulatorHung,
 )
 from palaestra_trainer.interruption import Interrupted, Interruption
-from palaestra_trainer.termination import Diverged, end_of, write_last_word
-from palaestra_trainer.watchdog import Watchdog
+from palaestra_trainer.logs import configure_logs, last_lines
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.termination import end_of, write_last_word
+from palaestra_trainer.watchdog import Watchdog, stalled
 
 
 @pytest.mark.parametrize(
@@ -30,12 +34,12 @@ from palaestra_trainer.watchdog import Watchdog
         (Interrupted("SIGTERM received"), 75, "Interrupted"),
         (MasterLost("gone"), 75, "MasterLost"),
         (ConfigurationError("steps: 0"), 2, "ConfigurationWrong"),
-        (FaultBudgetSpent("x"), 80, "FaultBudgetSpent"),
+        (FaultBudgetSpent("x"), 80, "SimulatorBudgetSpent"),
         (Diverged("NaN"), 81, "Diverged"),
-        (SimulatorHung("x", "slow"), 82, "Stalled"),
+        (SimulatorHung("x", "slow"), 82, "SimulatorHung"),
         (SimulatorDead("x", "gone"), 1, "SimulatorUnavailable"),
-        (OSError(errno.ENOSPC, "full", "run/x"), 1, "DiskFull"),
-        (OSError(errno.ENOSPC, "full"), 1, "DiskFull"),
+        (OSError(errno.ENOSPC, "full", "run/x"), 1, "StorageFull"),
+        (OSError(errno.ENOSPC, "full"), 1, "StorageFull"),
         (RuntimeError("bug"), 1, "Unexpected"),
     ],
 )
@@ -144,3 +148,78 @@ def test_a_full_disk_is_told_also_when_the_system_names_no_file():
     end = end_of(OSError(errno.ENOSPC, "full"))
 
     assert end.message == "the run directory: disk full; free some space"
+
+
+@pytest.fixture
+def progress():
+    """Return the progress of a run whose simulators are up and that has not stepped for 90 s."""
+    now = [0.0]
+    made = Progress(100, [("collect-0", "Collect"), ("evaluate-0", "Evaluate")], lambda: now[0])
+    made.started("collect-0")
+    made.started("evaluate-0")
+    now[0] = 90.0
+    return made
+
+
+def test_a_stall_while_a_simulator_is_down_is_that_simulator_s(progress):
+    """It is named, so that a person reads its log and not the trainer's."""
+    progress.fault("collect-0", SimulatorHung("collect-0", "no answer"))
+
+    end = stalled(progress)
+
+    assert (end.code, end.reason) == (82, "SimulatorHung")
+    assert end.message == "no environment step for 90 s while starting; not up: collect-0"
+
+
+def test_a_stall_amid_a_step_is_a_simulator_s_as_well(progress):
+    """Nobody has noticed yet which one hangs."""
+    with progress.spending(Cause.TRANSPORT):
+        end = stalled(progress)
+
+    assert end.reason == "SimulatorHung"
+    assert end.message == "no environment step for 90 s while training; a simulator's step does not end"
+
+
+@pytest.mark.parametrize(("cause", "phase"), [(Cause.LEARNING, "training"), (Cause.CHECKPOINTING, "saving")])
+def test_a_stall_while_nobody_waits_for_simulators_is_the_trainer_s(progress, cause, phase):
+    """A disk that hangs, or an endless update; restarting a simulator would not help."""
+    with progress.spending(cause):
+        end = stalled(progress)
+
+    assert (end.code, end.reason) == (82, "Stalled")
+    assert end.message == f"no environment step for 90 s while {phase}"
+
+
+@pytest.fixture
+def log(capsys):
+    """Return a logger that is configured as a trainer's; afterwards it is as it was."""
+    before = structlog.get_config()
+    configure_logs()
+    yield structlog.get_logger("tests")
+    structlog.configure(**before)
+    capsys.readouterr()
+
+
+def test_the_last_ten_lines_of_the_log_are_kept(log, capsys):
+    """As they stand in the log, the newest last."""
+    for number in range(12):
+        log.info("line", number=number)
+
+    shown = capsys.readouterr().err.splitlines()
+    assert last_lines() == tuple(shown[-10:])
+    assert last_lines()[-1].endswith("line number=11")
+
+
+def test_of_an_error_the_end_of_its_traceback_is_kept(log):
+    """That is where it says what went wrong."""
+
+    def fail():
+        raise ZeroDivisionError("a bug")
+
+    try:
+        fail()
+    except ZeroDivisionError:
+        log.exception("unexpected error")
+
+    assert last_lines()[-1] == "ZeroDivisionError: a bug"
+    assert "in fail" in "".join(last_lines())

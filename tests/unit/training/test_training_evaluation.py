@@ -6,7 +6,9 @@ import pytest
 
 from palaestra_trainer.errors import FaultBudgetSpent
 from palaestra_trainer.evaluation import evaluate, evaluate_on_all
-from palaestra_trainer.simulators.member import Care, Keeper
+from palaestra_trainer.interruption import Interrupted
+from palaestra_trainer.simulators.budget import Care, Group
+from palaestra_trainer.simulators.keeper import Keeper
 
 
 class Walker:
@@ -87,6 +89,58 @@ def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
         evaluate_on_all(Walker(), keepers, range(10_000))
 
     assert len(other.env.seeds) < 5_000
+
+
+def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
+    """Whoever waits for the evaluation does not wait for the repair."""
+    broken = make_member("evaluate-0", steps=[1], held=True)
+    other = make_member("evaluate-1")
+
+    evaluation = evaluate_on_all(Walker(), [Keeper(broken), Keeper(other)], [10, 21, 32, 43])
+
+    assert [episode.seed for episode in evaluation.episodes] == [10, 21, 32, 43]
+    assert evaluation.faults == 1
+    assert sorted(other.env.seeds) == [10, 21, 32, 43]
+    broken.release.set()
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_member, alone):
+    """Also if they have ended all of their own by then."""
+    group = Group(2, least=1)
+    keepers = [
+        Keeper(make_member("evaluate-0", steps=range(1, 100)), Care(restart_limit=1), group=group),
+        Keeper(make_member("evaluate-1"), group=group),
+    ]
+
+    for _ in range(2):
+        evaluation = evaluate_on_all(Walker(), keepers, [10] if alone else range(20))
+        assert len(evaluation.episodes) == (1 if alone else 20)
+
+    assert keepers[1].member.env.seeds
+
+
+def test_without_any_simulator_left_there_is_no_evaluation(make_member):
+    """It would wait for ever."""
+    keeper = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=0), group=Group(2, least=1))
+
+    with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):
+        evaluate(Walker(), keeper, [10])
+
+
+def test_a_signal_does_not_wait_for_a_simulator_that_is_mended(make_member):
+    """It may take a minute to come up, several times."""
+    member = make_member(steps=[1], held=True)
+    looks = []
+
+    def check():
+        looks.append(1)
+        if "restart" in member.log and len(looks) > 3:
+            raise Interrupted("SIGTERM received")
+
+    with pytest.raises(Interrupted):
+        evaluate(Walker(), member, [10], check)
+    member.release.set()
 
 
 def test_more_success_counts_before_more_return(make_member):

@@ -5,15 +5,40 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from concurrent.futures import wait
+from pathlib import Path
 
 import pytest
 
+from palaestra_trainer.configuration import parse
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorHung
 from palaestra_trainer.interruption import Interrupted, Interruption
-from palaestra_trainer.simulators.fleet import Fleet
+from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.fleet import Fleet, resting
+from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.member import Nobody
 
 DEADLINE_S = 5.0
+
+
+class Told(Nobody):
+    """A watcher that keeps what it was told."""
+
+    def __init__(self):
+        self.told = []
+
+    def restarted(self, simulator, *, recycled):
+        """Keep it."""
+        assert not recycled
+        self.told.append(f"restarted {simulator}")
+
+    def flapping(self, simulator):
+        """Keep it."""
+        self.told.append(f"flapping {simulator}")
+
+    def given_up(self, simulator):
+        """Keep it."""
+        self.told.append(f"given up {simulator}")
 
 
 @pytest.fixture
@@ -41,7 +66,7 @@ def test_one_that_does_not_come_up_ends_the_start(make_fleet):
     """After as many tries as its budget has."""
     fleet, members = make_fleet(starts=range(1, 100))
 
-    with pytest.raises(FaultBudgetSpent, match="collect-0: 10 restarts"):
+    with pytest.raises(FaultBudgetSpent, match="collect-0: flapping: 10 restarts"):
         fleet.start()
 
     assert members[0].log == ["start", *["restart"] * 10]
@@ -65,7 +90,112 @@ def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_membe
         fleet.start(interruption.check)
     released.set()
     for thread in threading.enumerate():
-        if thread.name == "fleet-collect-0":
+        if thread.name == "keeper-collect-0":
             thread.join(DEADLINE_S)
 
     assert member.log == ["start"]
+
+
+def with_fewer(configuration, least):
+    """Return the configuration with `minSimulators` for each group."""
+    content = configuration.model_dump(by_alias=True)
+    for simulator in content["simulators"]:
+        simulator["minSimulators"] = least
+    return parse(content)
+
+
+def test_training_begins_when_enough_of_each_group_are_up(make_configuration, make_member):
+    """The one that does not come up is mended while the others learn."""
+    members = [make_member("collect-0", starts=[1], held=True), make_member("collect-1")]
+    watcher = Told()
+    fleet = Fleet(with_fewer(make_configuration(collectors=2, evaluators=0), 1), members, watcher)
+
+    fleet.start()
+
+    assert [keeper.busy for keeper in fleet.collecting] == [True, False]
+    assert "restarted collect-0" not in watcher.told
+    members[0].release.set()
+    wait([work for keeper in fleet.collecting if (work := keeper.under_way)], DEADLINE_S)
+    assert all(keeper.up() for keeper in fleet.collecting)
+    assert watcher.told[-1] == "restarted collect-0"
+
+
+def test_training_does_not_begin_before_every_one_was_tried(make_configuration, make_member):
+    """Most often all come up; the first steps should be everybody's."""
+    released = threading.Event()
+    slow = make_member("collect-0")
+    slow.start = lambda: released.wait(DEADLINE_S)
+    looks = []
+
+    def check():
+        looks.append(1)
+        if len(looks) == 3:
+            released.set()
+
+    fleet = Fleet(
+        with_fewer(make_configuration(collectors=2, evaluators=0), 1),
+        [slow, make_member("collect-1")],
+        Nobody(),
+    )
+
+    fleet.start(check)
+
+    assert len(looks) >= 3
+    assert all(keeper.up() for keeper in fleet.collecting)
+
+
+def test_a_simulator_that_never_comes_up_is_given_up_if_enough_are_left(make_configuration, make_member):
+    """One broken machine in a pool must not keep the others from learning."""
+    members = [make_member("collect-0", starts=range(1, 100)), make_member("collect-1")]
+    watcher = Told()
+    fleet = Fleet(with_fewer(make_configuration(collectors=2, evaluators=0), 1), members, watcher)
+
+    fleet.start()
+    wait([work for keeper in fleet.collecting if (work := keeper.under_way)], DEADLINE_S)
+
+    assert [keeper.lost for keeper in fleet.collecting] == [True, False]
+    assert watcher.told[-1] == "given up collect-0"
+    assert watcher.told.count("flapping collect-0") == 8
+
+
+def test_stopping_ends_a_mending_that_is_under_way(make_fleet):
+    """No thread may touch a simulator that its owner has stopped."""
+    fleet, members = make_fleet(held=True)
+    fleet.start()
+    (keeper,) = fleet.collecting
+    keeper.begin_mending(SimulatorHung("collect-0", "slow"))
+
+    fleet.stop()
+
+    assert not keeper.busy
+    assert members[0].log == ["start", "restart", "stop"]
+
+
+def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
+    """It is its thread's alone."""
+    fleet, members = make_fleet(held=True)
+    fleet.start()
+    fleet.collecting[0].begin_mending(SimulatorHung("collect-0", "slow"))
+
+    with resting(fleet.collecting):
+        pass
+
+    fleet.stop()
+    assert members[0].log == ["start", "restart", "stop"]
+
+
+def test_fifty_faults_leave_nothing_behind(make_member):
+    """Neither threads nor descriptors: a week of training has many more."""
+    keeper = Keeper(make_member(), Care(restart_limit=50))
+    threads, descriptors = threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
+
+    for number in range(50):
+        keeper.begin_mending(SimulatorHung("collect-0", f"fault {number}"))
+        await_one([keeper])
+        assert keeper.up()
+    for thread in threading.enumerate():
+        if thread.name == "keeper-collect-0":
+            thread.join(DEADLINE_S)
+
+    assert threading.active_count() == threads
+    assert len(list(Path("/proc/self/fd").iterdir())) == descriptors

@@ -10,7 +10,7 @@ import urllib.request
 
 import pytest
 
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_sim.protocol.status import Cause, TrainerStatus
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.evaluation import Episode, Evaluation
 from palaestra_trainer.progress import Counters, Progress
@@ -83,7 +83,7 @@ def test_speed_is_that_of_the_last_half_minute(progress, clock):
 
 def test_a_fault_is_told_of_its_simulator(progress):
     """Which one, in which state, and why."""
-    progress.ready()
+    progress.started("collect-0")
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
     broken = progress.status().simulators[0]
     progress.restarted("collect-0", recycled=False)
@@ -112,9 +112,10 @@ def test_a_simulator_is_ready_when_it_is_up_and_not_when_all_are(progress):
 
 def test_a_run_that_goes_on_never_says_step_0(progress):
     """From the moment that its checkpoint is found, before any simulator is up."""
-    progress.resumed(40)
+    progress.resumed(40, Counters(episodes=3))
 
-    assert (progress.status().step, progress.status().last_checkpoint.step) == (40, 40)
+    status = progress.status()
+    assert (status.step, status.last_checkpoint.step, status.episodes) == (40, 40, 3)
 
 
 def test_restarts_of_this_attempt_are_those_of_all_simulators(progress):
@@ -136,24 +137,137 @@ def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
     assert (before, progress.idle_s()) == (50.0, 0.0)
 
 
-def test_counters_go_into_a_checkpoint_and_come_back(progress):
+def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
     """A run's faults are those of all its attempts."""
     progress.fault("collect-0", SimulatorHung("collect-0", "slow"))
-    progress.counters.seconds = 1.5
+    clock.now = 1.5
 
-    again = Counters.from_json(json.loads(json.dumps(progress.counters.to_json())))
+    again = Counters.from_json(json.loads(json.dumps(progress.counted().to_json())))
 
-    assert again == progress.counters
+    assert again == progress.counted()
+    assert again.faults["hung"] == 1
+    assert again.seconds == 1.5
 
 
-def test_time_is_counted_once(progress, clock):
-    """Each checkpoint adds what passed since the one before, and the end the rest."""
-    counted = []
-    for now in (2.0, 5.0, 5.0):
-        clock.now = now
-        counted.append(progress.count_time().seconds)
+def test_a_checkpoint_of_an_older_release_has_fewer_counters():
+    """What it did not count is not known, and counted from now on."""
+    assert Counters.from_json({"episodes": 7, "seconds": 3.0}) == Counters(episodes=7)
 
-    assert counted == [2.0, 5.0, 5.0]
+
+def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
+    """By cause, and each second once, however often it is asked for."""
+    with progress.spending(Cause.LEARNING):
+        clock.now = 5.0
+    before = progress.counted()
+    again = Progress(100, [("collect-0", "Collect")], clock)
+    again.resumed(40, before)
+    clock.now = 7.0
+
+    counted = [again.counted() for _ in range(3)][-1]
+
+    assert (before.seconds, counted.seconds) == (5.0, 7.0)
+    assert {cause: it for cause, it in counted.goodput.items() if it} == {"learning": 5.0, "starting": 2.0}
+
+
+def test_a_phase_is_what_time_is_spent_on(progress):
+    """One word, by which a person sees what the run does."""
+    phases = [progress.phase]
+    for cause in Cause:
+        with progress.spending(cause):
+            phases.append(progress.phase)
+
+    assert phases == [
+        "starting", "training", "training", "training", "evaluating", "saving", "starting", "recovering",
+    ]  # fmt: skip
+
+
+def test_slowness_is_counted_and_breaks_nothing(progress):
+    """A simulator that needs its time is not restarted for it."""
+    progress.started("collect-0")
+    progress.slow("collect-0", 0.4)
+    progress.fault("evaluate-0", SimulatorDead("evaluate-0", "gone"))
+
+    status = progress.status()
+    assert status.faults == {"dead": 1, "hung": 0, "slow": 1, "wrong_data": 0}
+    assert progress.counters.broken == 1
+    assert status.simulators[0].state == "ready"
+
+
+def test_a_simulator_that_breaks_again_and_again_is_flapping_until_it_is_steady(progress, clock):
+    """One crash in a night is an accident, three in ten minutes are none."""
+    progress.restarted("collect-0", recycled=False)
+    once = progress.status().simulators[0].flapping
+    progress.flapping("collect-0")
+    thrice = progress.status().simulators[0].flapping
+    clock.now = 600.0
+    later = progress.status().simulators[0].flapping
+
+    assert (once, thrice, later) == (False, True, False)
+
+
+def test_a_simulator_that_was_given_up_is_told_and_no_longer_missed(progress):
+    """The run goes on without it."""
+    progress.started("evaluate-0")
+    progress.given_up("collect-0")
+
+    lost = progress.status().simulators[0]
+    assert (lost.state, lost.given_up) == ("failed", True)
+    assert progress.counters.given_up == 1
+    assert progress.down() == []
+
+
+def test_a_spare_is_told_as_it_is_at_that_moment(progress):
+    """Without one there is nothing to tell."""
+    spare = ["starting"]
+    progress.has_standby("collect-0", lambda: spare[0])
+    first = progress.status().simulators
+    spare[0] = "ready"
+    then = progress.status().simulators
+
+    assert (first[0].standby, then[0].standby, then[1].standby) == ("starting", "ready", None)
+
+
+def test_the_last_ten_faults_are_remembered(progress):
+    """With what is needed to find the cause: when, who, what and how far the run was."""
+    for number in range(12):
+        progress.collected(number, [])
+        progress.fault("collect-0", SimulatorDead("collect-0", f"gone {number}"))
+
+    faults = progress.faults()
+    assert [fault.step for fault in faults] == list(range(2, 12))
+    assert (faults[-1].simulator, faults[-1].kind, faults[-1].fact) == (
+        "collect-0", "dead", "collect-0: gone 11",
+    )  # fmt: skip
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", faults[-1].time)
+
+
+def test_the_steps_of_an_episode_that_a_fault_cut_are_lost(progress):
+    """They were learnt from, and led nowhere."""
+    progress.collected(7, [{"valid": False, "sim_fault": {"step": 5}}, {"valid": True}])
+
+    assert progress.status().steps_lost == 5
+
+
+def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progress):
+    """As the checkpoint tells the next attempt; a run that goes on itself has lost none."""
+    progress.collected(47, [])
+
+    assert progress.counted(40).steps_lost == 7
+    assert progress.counted(47).steps_lost == 0
+    assert progress.counted().steps_lost == 0
+
+
+def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
+    """By cause and by kind, as TensorBoard names them."""
+    clock.now = 2.0
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
+    progress.slow("collect-0", 0.4)
+
+    scalars = progress.scalars()
+
+    assert (scalars["simulators/faults"], scalars["simulators/faults_dead"]) == (1, 1)
+    assert scalars["simulators/faults_slow"] == 1
+    assert scalars["goodput/starting_s"] == 2.0
 
 
 def test_what_the_docstring_promises_is_there(progress):
@@ -192,6 +306,8 @@ def test_metrics_are_the_same_numbers(progress):
     assert "palaestra_trainer_episodes_total 1.0" in text
     assert 'palaestra_simulator_faults_total{kind="dead"} 1.0' in text
     assert 'palaestra_simulator_faults_total{kind="hung"} 0.0' in text
+    assert 'palaestra_trainer_seconds_total{cause="starting"} 0.0' in text
+    assert "palaestra_trainer_steps_lost_total 0.0" in text
     assert "palaestra_trainer_success_ratio" not in text
 
 

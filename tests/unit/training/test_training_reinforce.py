@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from palaestra_trainer.algorithms import REINFORCE
 from palaestra_trainer.algorithms.episodes import EpisodeRecorder, returns_to_go
-from palaestra_trainer.simulators.member import Keeper
+from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 
@@ -39,6 +39,28 @@ def play(recorder, rows):
         dones = np.array([done for done, _ in row])
         valid = np.array([is_valid for _, is_valid in row])
         recorder.add(np.full(len(row), step), np.zeros(len(row)), np.ones(len(row)), dones, valid)
+
+
+def test_an_environment_that_is_away_is_not_waited_for():
+    """Its simulator may be mended for a minute, or have been given up."""
+    recorder = EpisodeRecorder(environments=2, wanted=2)
+
+    play(
+        recorder,
+        [[(True, True), (True, True)], [(False, True), (True, False)], [(True, True), (False, False)]],
+    )
+
+    assert recorder.complete
+    assert recorder.batch(gamma=1.0).returns.tolist() == [1.0, 2.0, 1.0, 1.0]
+
+
+def test_nothing_is_learned_from_nobody():
+    """Alone, the one that is away has to come back."""
+    recorder = EpisodeRecorder(environments=1, wanted=1)
+
+    play(recorder, [[(True, False)], [(False, False)], [(True, False)], [(False, True)]])
+
+    assert not recorder.complete
 
 
 @given(st.lists(st.floats(-10, 10), max_size=30), st.floats(0, 1))

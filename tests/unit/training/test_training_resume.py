@@ -39,7 +39,7 @@ def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
-    """It ends at the same total, plays new episodes, and counts what was before."""
+    """It ends at the same total, plays again what was under way, and counts what was before."""
     configuration = job(name)
     _, before = play(configuration, {"collect-0": {"steps": [5]}}, signal_after(42))
     saved = checkpoint.newest(directory.checkpoints).manifest
@@ -49,9 +49,9 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     summary = json.loads(directory.summary.read_text())
     seeds_before, seeds_after = (set(it["collect-0"].env.seeds) for it in (before, after))
     assert code == 0
-    assert summary["steps"] == (100 if name == "DQN" else 111)  # 15 valid rows, then 16 a rollout
+    assert summary["steps"] == (100 if name == "DQN" else 110)  # 14 valid rows, then 16 a rollout
     assert (summary["attempts"], summary["faults"]) == (2, 1)
-    assert len(seeds_before & seeds_after) <= (0 if name == "DQN" else 4)
+    assert len(seeds_before & seeds_after) <= (1 if name == "DQN" else 4)
     reasons = [line["reason"] for line in read_lines(directory.attempts)]
     assert reasons == ["new run", f"resumed at step {saved.step}"]
 
@@ -144,4 +144,5 @@ def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
 
     ended = checkpoint.newest(directory.checkpoints).manifest
     assert 0 < saved.step < 70
-    assert 0.0 < saved.counters["seconds"] < ended.counters["seconds"]
+    seconds = [sum(each.counters["goodput"].values()) for each in (saved, ended)]
+    assert 0.0 < seconds[0] < seconds[1]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
+from palaestra_sim.protocol.status import Cause
 from palaestra_trainer import checkpoint, training
 from palaestra_trainer.errors import ConfigurationError, MasterLost
 from palaestra_trainer.measuring import measure
@@ -94,12 +96,9 @@ def test_faults_are_survived_and_counted(play, job, directory, name):
     assert members["collect-0"].log.count("restart") == 2
 
 
-def test_simulators_are_recycled_without_a_fault(play, job, directory, make_configuration):
-    """After so many resets, between episodes."""
-    content = job().model_dump(by_alias=True)
-    for simulator in content["simulators"]:
-        simulator["recycle"] = {"afterResets": 5}
-    code, members = play(make_configuration(**content))
+def test_simulators_are_recycled_without_a_fault(play, job, directory):
+    """When they say that they are due, between episodes."""
+    code, members = play(job(), {name: {"recycle_after": 5} for name in ("collect-0", "evaluate-0")})
 
     summary = json.loads(directory.summary.read_text())
     assert code == 0
@@ -112,7 +111,7 @@ def test_a_spent_budget_ends_the_run_with_80_and_a_checkpoint(play, job, directo
     code, _ = play(job(), {"collect-0": {"steps": range(30, 100)}})
 
     assert code == 80
-    assert last_word().reason.startswith("FaultBudgetSpent: collect-0: 10 restarts")
+    assert last_word().reason.startswith("SimulatorBudgetSpent: collect-0: flapping: 10 restarts")
     assert checkpoint.newest(directory.checkpoints).manifest.step == last_word().last_checkpoint.step > 0
 
 
@@ -161,8 +160,53 @@ def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, dir
     code, _ = play(job(name, steps=2000), step_reward=float("nan"))
 
     assert code == 81
-    assert "Diverged" in last_word().reason
+    assert last_word().reason == (
+        "Diverged: episode 0, step 1: collect-0: the reward is nan (term walk); mend the environment's reward"
+    )
     assert checkpoint.newest(directory.checkpoints) is None
+
+
+@pytest.mark.parametrize(("name", "step"), [("DQN", 64), ("PPO", 5), ("A2C", 5)])
+def test_weights_that_diverge_end_the_run_at_that_update(play, job, directory, last_word, name, step):
+    """The checkpoint before it is kept, and nothing of it is in another."""
+    given = {
+        "DQN": {"learning_starts": 60, "batch_size": 8, "train_freq": 4},
+        "PPO": {"n_steps": 5, "batch_size": 5},
+        "A2C": {"n_steps": 5},
+    }
+    wild = {"policy_kwargs": {"net_arch": [8]}, "learning_rate": float("inf")}
+    algorithm = {"name": name, "hyperparameters": wild | given[name]}
+
+    code, _ = play(job(name, algorithm=algorithm, steps=2000, checkpoint={"everySteps": 50, "keep": 9}))
+
+    newest = checkpoint.newest(directory.checkpoints)
+    assert code == 81
+    assert re.match(rf"Diverged: step {step}: .*(loss is|holds) (nan|-?inf)", last_word().reason)
+    assert (newest.manifest.step if newest else None) == (52 if name == "DQN" else None)
+
+
+def test_a_last_word_has_the_last_faults(play, job, last_word):
+    """A pod's log dies with it."""
+    play(job(), {"collect-0": {"steps": [5, 30]}})
+
+    faults = last_word().faults
+    assert [(it.simulator, it.kind, it.step) for it in faults] == [
+        ("collect-0", "dead", 4),
+        ("collect-0", "dead", 28),
+    ]
+    assert faults[0].fact == "collect-0: died at step 5"
+
+
+def test_a_summary_says_what_the_wall_clock_went_into(play, job, directory):
+    """All of it, and which part trained."""
+    play(job("PPO"), {"collect-0": {"steps": [50]}})
+
+    summary = json.loads(directory.summary.read_text())
+    spent = summary["goodput"]
+    assert sum(spent.values()) == pytest.approx(summary["duration_s"], abs=0.06)
+    assert set(spent) == {cause.value for cause in Cause}
+    trained = sum(spent[cause] for cause in ("stepping", "transport", "learning"))
+    assert summary["trained_share"] == pytest.approx(trained / sum(spent.values()), abs=0.01)
 
 
 def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, last_word):
@@ -189,6 +233,9 @@ def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
         "reward/walk",
         "time/fps",
         "simulators/faults",
+        "simulators/faults_slow",
+        "goodput/learning_s",
+        "goodput/evaluating_s",
     }
 
 

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from palaestra_trainer.progress import Progress
+from palaestra_trainer.progress import Counters, Progress
 from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
 from palaestra_trainer.summary import finished, summarise, write_summary
 
@@ -62,13 +62,14 @@ def test_the_summary_is_of_the_best_evaluation(directory):
     """Whose policy model.zip is."""
     for step, rate in ((10, 0.5), (20, 0.9), (30, 0.7)):
         append_line(directory.evaluations, {"step": step, "success_rate": rate, "mean_return": 1.0})
-    progress = Progress(30, [("collect-0", "Collect")])
-    progress.step, progress.counters.seconds = 30, 2.0
+    progress = Progress(30, [("collect-0", "Collect")], lambda: 0.0)
+    progress.resumed(30, Counters(goodput={"learning": 1.5, "starting": 0.5}))
 
     summary = summarise(directory, progress)
 
     assert (summary["success_rate"], summary["best_step"]) == (0.9, 20)
     assert (summary["steps"], summary["steps_per_second"], summary["faults"]) == (30, 15.0, 0)
+    assert (summary["duration_s"], summary["trained_share"]) == (2.0, 0.75)
 
 
 def test_a_summary_makes_a_run_finished(directory, make_configuration):

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import threading
+
 import numpy as np
 import pytest
 from gymnasium import Wrapper, spaces
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.errors import FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
+from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
+from palaestra_trainer.interruption import Interrupted
 from palaestra_trainer.seeds import COLLECT, episode_seed
-from palaestra_trainer.simulators.member import Care, Keeper
+from palaestra_trainer.simulators.budget import Care, Group
+from palaestra_trainer.simulators.episode_state import EpisodeState
+from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from palaestra_trainer.turns import let_others
 
@@ -21,9 +27,9 @@ def make_env():
     """Make a VecEnv of members and close it in the end."""
     made = []
 
-    def make(*members, care=None, run_seed=1, episodes=None):
+    def make(*members, care=None, run_seed=1, **options):
         keepers = [Keeper(member, care) for member in members]
-        env = SimulatorsVecEnv(keepers, run_seed, episodes=episodes)
+        env = SimulatorsVecEnv(keepers, run_seed, **options)
         made.append(env)
         return env
 
@@ -35,6 +41,13 @@ def make_env():
 def walk(env, steps, action=RIGHT):
     """Return the rows of some equal steps."""
     return [env.step(np.full(env.num_envs, action)) for _ in range(steps)]
+
+
+def end_of_mending(name):
+    """Return when the thread that mends a member has ended."""
+    for thread in threading.enumerate():
+        if thread.name == f"keeper-{name}":
+            thread.join(20.0)
 
 
 @pytest.mark.parametrize("members", [1, 3])
@@ -82,14 +95,14 @@ def test_a_time_limit_is_told_from_an_end(make_env, make_member):
 def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
     """So a run can be told again, and resumed."""
     members = [make_member("collect-0"), make_member("collect-1")]
-    env = make_env(*members, run_seed=5, episodes=[7, 0])
+    env = make_env(*members, run_seed=5)
 
-    env.reset()
+    env.resume([EpisodeState(7, None), EpisodeState(0, None)])
     walk(env, 3)
 
     assert members[0].env.seeds == [episode_seed(5, COLLECT, 0, number) for number in (7, 8)]
     assert members[1].env.seeds == [episode_seed(5, COLLECT, 1, number) for number in (0, 1)]
-    assert env.episodes == [9, 2]
+    assert [state.episode for state in env.snapshot()] == [8, 1]
     assert [info["seed"] for info in env.reset_infos] == [members[i].env.seeds[-1] for i in (0, 1)]
 
 
@@ -102,37 +115,205 @@ def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member
 
     assert dones[0]
     assert rewards[0] == 0.0
-    assert observations[0][0] == 0.0
+    assert observations[0][0] == np.float32(0.1)
     assert infos[0]["valid"] is False
     assert infos[0]["TimeLimit.truncated"] is True
     assert infos[0]["terminal_observation"][0] == np.float32(0.1)
     assert infos[0]["sim_fault"]["kind"] == "dead"
     assert infos[0]["sim_fault"]["simulator"] == "collect-0"
+    assert infos[0]["sim_fault"]["step"] == 1
+    assert "recovering" not in infos[0]
     assert "episode" not in infos[0]
 
 
-def test_a_fault_restarts_its_simulator_alone(make_env, make_member):
-    """The others know nothing of it."""
-    members = [make_member("collect-0"), make_member("collect-1", steps=[2]), make_member("collect-2")]
+def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env, make_member):
+    """There is nobody else to go on; the row is one more that nothing is learnt from."""
+    member = make_member(steps=[2], held=True)
+    env = make_env(member)
+    env.reset()
+    walk(env, 2)
+    threading.Timer(0.05, member.release.set).start()
+
+    observations, rewards, dones, infos = walk(env, 1)[0]
+
+    assert member.log == ["restart"]
+    assert (dones[0], rewards[0], observations[0][0]) == (True, 0.0, 0.0)
+    assert (infos[0]["valid"], infos[0]["recovering"]) == (False, True)
+    assert "sim_fault" not in infos[0]
+    assert walk(env, 1)[0][3][0]["valid"] is True
+
+
+def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
+    """The others step on; its own rows are invalid, and nothing of it ends or begins."""
+    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
     env = make_env(*members)
     env.reset()
+    walk(env, 2)
 
-    _, _, dones, infos = walk(env, 2)[-1]
+    rows = walk(env, 20, LEFT)
 
-    assert [member.log for member in members] == [[], ["restart"], []]
-    assert dones.tolist() == [False, True, False]
-    assert [info["valid"] for info in infos] == [True, False, True]
+    assert all(infos[0]["valid"] for _, _, _, infos in rows)
+    assert not any(infos[1]["valid"] for _, _, _, infos in rows)
+    assert all(infos[1]["recovering"] for _, _, _, infos in rows)
+    assert not any(dones[1] for _, _, dones, _ in rows)
+    assert not any("sim_fault" in infos[1] for _, _, _, infos in rows)
+    assert [members[0].log, members[1].log] == [[], ["restart"]]
 
 
-def test_every_kind_of_fault_is_told_by_its_name(make_env, make_member):
+def test_a_mended_member_begins_its_next_episode(make_env, make_member):
+    """With the next seed, and in one more invalid row that ends whatever was before."""
+    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
+    env = make_env(*members)
+    env.reset()
+    walk(env, 3)
+    members[1].release.set()
+    end_of_mending("collect-1")
+
+    observations, _, dones, infos = walk(env, 1)[0]
+
+    assert dones[1]
+    assert infos[1]["valid"] is False
+    assert observations[1][0] == 0.0
+    assert env.reset_infos[1]["seed"] == members[1].env.seeds[-1] == episode_seed(1, COLLECT, 1, 1)
+    assert walk(env, 1)[0][3][1]["valid"] is True
+
+
+def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
+    """Rows that are all invalid would only burn the processor."""
+    members = [make_member(f"collect-{index}", steps=[1], held=True) for index in range(2)]
+    looks = []
+
+    def check():
+        looks.append(1)
+        if len(looks) == 3:
+            members[1].release.set()
+
+    env = make_env(*members, check=check)
+    env.reset()
+    walk(env, 1)
+
+    _, _, dones, infos = walk(env, 1)[0]
+
+    assert len(looks) >= 3
+    assert dones.tolist() == [False, True]
+    assert [info["valid"] for info in infos] == [False, False]
+    assert [info["valid"] for info in walk(env, 1)[0][3]] == [False, True]
+
+
+def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_member):
+    """A simulator may take a minute to come up; whoever evicts the pod gives it half of that."""
+
+    def check():
+        raise Interrupted("SIGTERM received")
+
+    env = make_env(make_member(steps=[1], held=True), check=check)
+    env.reset()
+    walk(env, 1)
+
+    with pytest.raises(Interrupted):
+        walk(env, 1)
+
+
+def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member):
+    """The episode had ended by itself; what broke is the next one, before its first step."""
+    env = make_env(make_member(resets=[2]))
+    env.reset()
+
+    rows = walk(env, 5)
+
+    assert [infos[0]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
+    assert "sim_fault" not in rows[2][3][0]
+    assert rows[2][0][0][0] == np.float32(0.3)
+    assert rows[3][3][0]["sim_fault"]["step"] == 0
+    assert rows[3][2][0]
+
+
+def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, make_member):
+    """The first reset may break too, and a row must have its shape."""
+    env = make_env(make_member(resets=[1]))
+
+    first = env.reset()
+
+    assert first.tolist() == [[0.0, 0.0]]
+    assert walk(env, 2)[-1][3][0]["valid"] is True
+
+
+def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
+    """REINFORCE begins anew amid episodes, whatever state the others are in."""
+    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
+    env = make_env(*members)
+    env.reset()
+    walk(env, 2)
+
+    observations = env.reset()
+
+    assert observations[:, 0].tolist() == [0.0, np.float32(0.1)]
+    assert [len(member.env.seeds) for member in members] == [2, 1]
+
+
+def test_a_snapshot_has_no_episode_of_a_member_that_is_mended(make_env, make_member):
+    """What it played is lost; a resumed run begins its next episode."""
+    members = [make_member("collect-0"), make_member("collect-1", steps=[2], held=True)]
+    env = make_env(*members)
+    env.reset()
+    walk(env, 2)
+
+    states = env.snapshot()
+
+    assert [state.episode for state in states] == [0, 1]
+    assert states[0].actions.tolist() == [RIGHT, RIGHT]
+    assert states[1].actions is None
+
+
+def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_env, make_member):
+    """Its part of the run is not exact any more, but it goes on."""
+    env = make_env(make_member(steps=[2]))
+
+    env.resume([EpisodeState(4, np.array([LEFT, LEFT, LEFT]))])
+
+    assert [(state.episode, state.actions) for state in env.snapshot()] == [(5, None)]
+    _, _, dones, infos = walk(env, 1)[0]
+    assert dones[0]
+    assert infos[0]["sim_fault"]["episode"] == 4
+    assert env.snapshot()[0].episode == 5
+
+
+def test_every_kind_of_fault_is_told_by_its_name_and_once(make_env, make_member):
     """A person who reads the counts looks for different causes."""
     faults = {1: SimulatorHung("x", "slow"), 2: WrongData("x", "NaN")}
     env = make_env(make_member(steps=faults))
     env.reset()
 
-    rows = walk(env, 2)
+    rows = walk(env, 5)
 
-    assert [infos[0]["sim_fault"]["kind"] for _, _, _, infos in rows] == ["hung", "wrong_data"]
+    told = [infos[0].get("sim_fault", {}).get("kind") for _, _, _, infos in rows]
+    assert told == ["hung", None, "wrong_data", None, None]
+
+
+def test_an_observation_that_is_no_number_is_a_fault(make_env, make_member):
+    """Once in a network, NaN is everywhere."""
+    member = make_member()
+    member.env = Wrapper(member.env)
+    env = make_env(member)
+    env.reset()
+    step = member.env.env.step
+    member.env.step = lambda action: (np.array([0.0, np.nan], np.float32), *step(action)[1:])
+
+    _, _, _, infos = walk(env, 1)[0]
+
+    assert infos[0]["sim_fault"]["kind"] == "wrong_data"
+    assert infos[0]["sim_fault"]["fact"] == "collect-0: observation[1] is nan"
+
+
+def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make_env, make_member):
+    """A restart would not help; the message says where to look."""
+    member = make_member()
+    member.env.step_reward = math.inf
+    env = make_env(member)
+    env.reset()
+
+    with pytest.raises(Diverged, match=r"episode 0, step 1: collect-0: the reward is inf \(term walk\)"):
+        walk(env, 1)
 
 
 def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_member):
@@ -141,9 +322,10 @@ def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_membe
     env = make_env(member)
     env.reset()
 
-    walk(env, 2)
+    rows = walk(env, 4)
 
     assert member.log == ["restart"] * 4
+    assert [infos[0]["valid"] for _, _, _, infos in rows] == [False, False, False, True]
 
 
 def test_a_spent_budget_ends_the_run(make_env, make_member):
@@ -151,8 +333,8 @@ def test_a_spent_budget_ends_the_run(make_env, make_member):
     env = make_env(make_member(steps=range(1, 100)), care=Care(restart_limit=2))
     env.reset()
 
-    with pytest.raises(FaultBudgetSpent, match=r"collect-0: 2 restarts within 600 s .* restart.limit"):
-        walk(env, 3)
+    with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 2 restarts within 600 s .* restart.limit"):
+        walk(env, 6)
 
 
 def test_a_budget_is_spent_within_its_window_only(make_member):
@@ -163,16 +345,41 @@ def test_a_budget_is_spent_within_its_window_only(make_member):
     env = SimulatorsVecEnv([keeper], 1)
     env.reset()
 
-    walk(env, 3)
+    walk(env, 6)
 
     with pytest.raises(FaultBudgetSpent):
-        walk(env, 1)
+        walk(env, 2)
+
+
+def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
+    """Three of four learn as well, only a little slower; with too few left it ends."""
+    group = Group(3, least=2)
+    members = [
+        make_member("collect-0", steps=range(1, 100)),
+        make_member("collect-1"),
+        make_member("collect-2", steps=range(40, 100)),
+    ]
+    keepers = [Keeper(member, Care(restart_limit=1), group=group) for member in members]
+    env = SimulatorsVecEnv(keepers, 1)
+    env.reset()
+    for steps in (1, 2):
+        walk(env, steps)
+        end_of_mending("collect-0")
+
+    rows = walk(env, 30)
+
+    assert keepers[0].lost
+    assert members[0].log == ["restart", "stop"]
+    assert all(infos[1]["valid"] and infos[2]["valid"] for _, _, _, infos in rows)
+    assert not any(dones[0] or infos[0]["valid"] for _, _, dones, infos in rows)
+    with pytest.raises(FaultBudgetSpent, match="collect-2: 1 restarts"):
+        walk(env, 500)
 
 
 def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_member):
     """Simulators leak; a restart in time costs less than a crash."""
-    member = make_member()
-    env = make_env(member, care=Care(recycle_after_resets=2))
+    member = make_member(recycle_after=2)
+    env = make_env(member)
     env.reset()
 
     rows = walk(env, 9)
@@ -182,15 +389,30 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
     assert member.resets == 2
 
 
-def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member):
-    """It is mended, and the episode begins."""
-    member = make_member(starts=[1])
-    env = make_env(member, care=Care(recycle_after_resets=1))
+def test_members_are_recycled_at_the_same_time(make_env, make_member):
+    """Those that began together wear out together: it must not take twice as long."""
+    both = threading.Barrier(2, timeout=20.0)
+    members = [make_member(f"collect-{index}", recycle_after=1) for index in range(2)]
+    for member in members:
+        member.restart = lambda member=member: (both.wait(), setattr(member, "resets", 0))
+    env = make_env(*members)
     env.reset()
 
-    walk(env, 3)
+    rows = walk(env, 3)
+
+    assert all(info["valid"] for _, _, _, infos in rows for info in infos)
+
+
+def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member):
+    """It is mended, and the episode begins."""
+    member = make_member(starts=[1], recycle_after=1)
+    env = make_env(member)
+    env.reset()
+
+    rows = walk(env, 5)
 
     assert member.log == ["restart", "restart"]
+    assert [infos[0]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
 
 
 def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, make_member):

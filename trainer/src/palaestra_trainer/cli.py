@@ -16,7 +16,8 @@ import structlog
 from palaestra_sim.protocol.status import ExitCode, Termination
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.logs import configure_logs
+from palaestra_trainer.interruption import leaving_when_asked
+from palaestra_trainer.logs import configure_logs, last_lines
 from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
 from palaestra_trainer.termination import UNEXPECTED, end_of, write_last_word
 
@@ -26,10 +27,10 @@ EXIT_CODES = """\
 exit codes:
   0   done
   2   the configuration is wrong; trying again cannot help
-  75  interrupted by a signal and saved; start it again to go on
+  75  interrupted by a signal, or the ROS master was lost, and saved; start it again to go on
   80  a simulator failed more often than its restart limit allows
-  81  diverged: the networks hold NaN or infinity
-  82  stalled: no environment step for stallDeadlineSeconds
+  81  diverged: a reward, a loss or a weight is NaN or infinite
+  82  stalled, or a simulator hung: no environment step for stallDeadlineSeconds
   1   anything else; trying again may help
 """
 TRAIN = f"""\
@@ -81,17 +82,18 @@ def train(arguments: Sequence[str] | None = None) -> int:
         directory = RunDirectory(_run_directory(chosen.run))
     except (TrainerError, OSError) as error:
         return _refuse(error)
-    # Imported here, because a wrong configuration should be told at once, not in 3 s.
-    from palaestra_trainer import display, training  # noqa: PLC0415
-    from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
+    with leaving_when_asked():
+        # Imported here, because a wrong configuration should be told at once, not in 3 s.
+        from palaestra_trainer import display, training  # noqa: PLC0415
+        from palaestra_trainer.simulators.connect import connect_members  # noqa: PLC0415
 
-    return training.run(
-        configuration,
-        directory,
-        connect,
-        display.for_stream(sys.stderr),
-        must_resume=chosen.resume,
-    )
+        return training.run(
+            configuration,
+            directory,
+            connect_members,
+            display.for_stream(sys.stderr),
+            must_resume=chosen.resume,
+        )
 
 
 def evaluate(arguments: Sequence[str] | None = None) -> int:
@@ -125,9 +127,9 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
     from palaestra_trainer.measuring import measure  # noqa: PLC0415 - see train()
-    from palaestra_trainer.simulators.connect import connect, connect_here  # noqa: PLC0415
+    from palaestra_trainer.simulators.connect import connect_here, connect_members  # noqa: PLC0415
 
-    members = connect if in_pod else partial(connect_here, run=directory.path)
+    members = connect_members if in_pod else partial(connect_here, run=directory.path)
     return measure(configuration, directory.model, members, episodes=episodes, stream=stream)
 
 
@@ -158,5 +160,5 @@ def _refuse(error: Exception) -> int:
     end = end_of(error)
     for line in end.message.splitlines():
         log.error(line, reason=end.reason)
-    write_last_word(Termination(step=0, reason=f"{end.reason}: {end.message}"))
+    write_last_word(Termination(step=0, reason=f"{end.reason}: {end.message}", log=last_lines()))
     return int(end.code)

@@ -3,13 +3,13 @@
 A rollout boundary is the one moment at which the model's state is whole:
 nothing collected is yet to be learned from. Everything that reads or keeps the
 model happens there. What is amid a rollout when the run is interrupted is
-played again after it resumes, with the same seeds.
+played again after it resumes, with the same seeds and the same random numbers.
 """
 
 from __future__ import annotations
 
 import time
-from collections import Counter, defaultdict
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,26 +17,28 @@ import structlog
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
+from palaestra_sim.protocol.status import Cause
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms.buffers import valid_rows
+from palaestra_trainer.checkpoint import Checkpoint, State
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.display import Display
+from palaestra_trainer.divergence import Learner
 from palaestra_trainer.errors import TrainerError
 from palaestra_trainer.evaluation import Evaluation, evaluate_on_all
 from palaestra_trainer.interruption import Interruption
+from palaestra_trainer.journal import Journal
 from palaestra_trainer.progress import Progress
 from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
 from palaestra_trainer.seeds import EVALUATE, episode_seeds
 from palaestra_trainer.simulators.fleet import Fleet, resting, running
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
-from palaestra_trainer.termination import Diverged
 
 log = structlog.get_logger(__name__)
 
 # Learning phases shorter than this are not worth two service calls a simulator.
 WORTH_RESTING_S = 0.5
-# Steps between two looks at whether the networks still hold numbers; a look takes 0.1 ms.
-FINITE_EVERY_STEPS = 500
+COUNTED_BY_STEP = ("episodes", "extra_steps")
 
 
 class Enough(TrainerError):
@@ -56,11 +58,11 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Boundary:
-    """Where the model last was whole: its step, and each collector's next episode."""
+class Resumed:
+    """What an attempt goes on from."""
 
-    step: int
-    episodes: list[int]
+    checkpoint: Checkpoint
+    state: State
 
 
 class Conductor(BaseCallback):
@@ -70,15 +72,22 @@ class Conductor(BaseCallback):
         best: success rate and mean return of the best evaluation so far, over all attempts.
     """
 
-    def __init__(self, run: Run, env: SimulatorsVecEnv, step: int) -> None:
+    def __init__(self, run: Run, env: SimulatorsVecEnv, resumed: Resumed | None = None) -> None:
         super().__init__()
         self._run = run
         self._env = env
-        self._boundary = Boundary(step, env.episodes)
-        self._saved = self._looked = step
-        self._evaluated = last_evaluated(run.directory, step)
-        self._step = step
-        self._terms: dict[int, Counter[str]] = defaultdict(Counter)
+        self._saver = checkpoint.Saver(
+            run.directory.checkpoints,
+            run.configuration.checkpoint.keep,
+            resumed.checkpoint if resumed else None,
+        )
+        self._journal = Journal(run.directory.journal)
+        self._boundary = self._resumed = resumed.state if resumed else None
+        self._step = self._saved = resumed.checkpoint.manifest.step if resumed else 0
+        self._evaluated = last_evaluated(run.directory, self._step)
+        self._terms: list[Counter[str]] = [
+            Counter(terms) for terms in (resumed.state.rollout["terms"] if resumed else [{}] * env.num_envs)
+        ]
         self._learning_s = 0.0
         self._rollout_ended: float | None = None
         self._resting = False
@@ -86,7 +95,7 @@ class Conductor(BaseCallback):
 
     def finish(self) -> None:
         """Evaluate and save what training ended with."""
-        self._look()
+        self._learner.check(self.model.num_timesteps)
         self._mark_boundary()
         if self._evaluated != self._step:
             self._evaluate_if_wanted()
@@ -95,45 +104,48 @@ class Conductor(BaseCallback):
         self.save()
 
     def save(self) -> None:
-        """Save the state of the last boundary."""
-        run = self._run
-        run.progress.phase = "saving"
-        manifest = checkpoint.describe(
-            run.configuration,
-            self._boundary.step,
-            self._boundary.episodes,
-            run.progress.count_time().to_json(),
-        )
+        """Save the state of the last boundary, if there has been one; the model is put back to it."""
+        run, state = self._run, self._boundary
+        if state is None:
+            return
+        step = int(state.numbers["num_timesteps"])
         started = time.monotonic()
-        if checkpoint.save(
-            run.directory.checkpoints, self.model, manifest, run.configuration.checkpoint.keep
-        ):
-            run.progress.saved(manifest.step)
-            seconds = round(time.monotonic() - started, 3)
-            log.info("checkpoint written", step=manifest.step, seconds=seconds)
-        self._saved = manifest.step
-        run.progress.phase = "training"
+        with run.progress.spending(Cause.CHECKPOINTING):
+            # What is counted by step is played again; faults and time are over for good.
+            counters = run.progress.counted(kept=step).to_json() | state.rollout["counters"]
+            manifest = checkpoint.describe(run.configuration, step, counters)
+            if self._saver.save(self.model, state, manifest):
+                run.progress.saved(step)
+                seconds = round(time.monotonic() - started, 3)
+                log.info("checkpoint written", step=step, seconds=seconds)
+        self._saved = step
+
+    def _init_callback(self) -> None:
+        self._learner = Learner(self.model)
 
     def _on_rollout_start(self) -> None:
         if self._rollout_ended is not None:
             self._learning_s = time.monotonic() - self._rollout_ended
+        if self._resumed:
+            # State-dependent exploration has drawn its noise for this rollout a second time.
+            self._resumed.put_back(self.model)
+            self._resumed = None
+        self._learner.check(self.model.num_timesteps)
+        self._mark_boundary()
+        self._run.interruption.check()
         if self._resting:
             self._env.run()
             self._resting = False
-        self._mark_boundary()
-        self._run.interruption.check()
-        if _passed(self._looked, self._step, FINITE_EVERY_STEPS):
-            self._look()
         if _passed(self._evaluated, self._step, self._run.configuration.evaluation.every_steps):
             self._evaluate_if_wanted()
         if _passed(self._saved, self._step, self._run.configuration.checkpoint.every_steps):
-            self._look()
             self.save()
 
     def _on_step(self) -> bool:
         infos = self.locals["infos"]
         self._step += int(valid_rows(infos).sum())
         self._run.progress.collected(self._step, infos)
+        self._journal.keep(self._run.progress)
         self._record_rewards(infos, self.locals["dones"])
         if self._run.display.due:
             self._run.display.show(self._run.progress.status())
@@ -144,9 +156,8 @@ class Conductor(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        counters = self._run.progress.counters
-        self.logger.record("simulators/faults", sum(counters.faults.values()))
-        self.logger.record("simulators/restarts", counters.restarts)
+        for name, value in self._run.progress.scalars().items():
+            self.logger.record(name, value)
         self._rollout_ended = time.monotonic()
         if self._learning_s >= WORTH_RESTING_S:
             self._env.pause()
@@ -154,22 +165,22 @@ class Conductor(BaseCallback):
 
     def _mark_boundary(self) -> None:
         self._step = self.model.num_timesteps
-        self._boundary = Boundary(self._step, self._env.episodes)
-
-    def _look(self) -> None:
-        self._looked = self._step
-        if not checkpoint.finite(self.model):
-            raise Diverged(
-                f"step {self._step}: the networks hold NaN or infinity; "
-                "lower algorithm.hyperparameters.learning_rate or clip gradients harder"
-            )
+        progress = self._run.progress
+        self._boundary = State.of(
+            self.model,
+            self._env.snapshot(),
+            {
+                "returns": progress.returns(),
+                "terms": [dict(terms) for terms in self._terms],
+                "counters": {name: getattr(progress.counters, name) for name in COUNTED_BY_STEP},
+            },
+        )
 
     def _evaluate_if_wanted(self) -> None:
         wanted = self._run.configuration.evaluation
         self._evaluated = self._step
         if not wanted.every_steps or not self._run.fleet.evaluating:
             return
-        self._look()
         evaluation = self._evaluate(wanted.episodes)
         self._keep(evaluation)
         goal = wanted.stop_at_success_rate
@@ -178,12 +189,14 @@ class Conductor(BaseCallback):
 
     def _evaluate(self, episodes: int) -> Evaluation:
         run = self._run
-        run.progress.phase = "evaluating"
         seeds = episode_seeds(run.configuration.seed, EVALUATE, episodes)
-        with resting(run.fleet.collecting), running(run.fleet.evaluating):
+        with (
+            run.progress.spending(Cause.EVALUATING),
+            resting(run.fleet.collecting),
+            running(run.fleet.evaluating),
+        ):
             evaluation = evaluate_on_all(self.model, run.fleet.evaluating, seeds, run.interruption.check)
         run.progress.evaluated(evaluation)
-        run.progress.phase = "training"
         self.logger.record("eval/success_rate", evaluation.success_rate)
         self.logger.record("eval/mean_reward", evaluation.mean_return)
         self.logger.record("eval/mean_ep_length", evaluation.mean_length)
@@ -202,7 +215,7 @@ class Conductor(BaseCallback):
         for row, info in enumerate(infos):
             self._terms[row].update(info.get("reward_terms", {}))
             if dones[row]:
-                terms = self._terms.pop(row)
+                terms, self._terms[row] = self._terms[row], Counter()
                 if "episode" in info:
                     for name, value in terms.items():
                         self.logger.record_mean(f"reward/{name}", value)

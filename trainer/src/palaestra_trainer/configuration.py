@@ -83,9 +83,17 @@ class Checkpoint(_Section):
 
 
 class Recycle(_Section):
-    """When a healthy simulator is restarted between episodes."""
+    """When a healthy simulator is restarted between episodes: at the first limit that it reaches.
 
-    after_resets: Positive
+    Attributes:
+        after_resets: so many resets after it came into use.
+        after_minutes: so many minutes after it came into use.
+        above_memory_bytes: when all of its processes together have more than this.
+    """
+
+    after_resets: Positive | None = None
+    after_minutes: Annotated[float, Field(gt=0)] | None = None
+    above_memory_bytes: Positive | None = None
 
 
 class Restart(_Section):
@@ -101,11 +109,13 @@ class SimulatorConfiguration(_Section):
     Attributes:
         name: `<group>-<index>`, unique in the file.
         role: Collect gathers experience, Evaluate measures the policy.
+        min_simulators: how many of its group are enough to go on with; None: all of them.
         control: address of its sidecar's control port.
         driver: how it is started: stub, webots or command.
         options: its command-line options.
         world: path of its generated world.
         names_prefix: readable start of the ROS names of its robots.
+        standby: its sidecar has a second simulator, which stands by for this one.
         start_deadline_seconds: it must have answered this long after its start.
     """
 
@@ -113,12 +123,14 @@ class SimulatorConfiguration(_Section):
     group: str
     index: Annotated[int, Field(ge=0)]
     role: Role
+    min_simulators: Positive | None = None
     control: str = ""
     driver: str = "stub"
     options: tuple[str, ...] = ()
     world: str = ""
     names_prefix: str = ""
     recycle: Recycle | None = None
+    standby: bool = False
     restart: Restart = Field(default_factory=Restart)
     start_deadline_seconds: Annotated[float, Field(gt=0)] = 60
 

@@ -4,6 +4,7 @@ TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
+├── Diverged             a number of the learner's is none; don't retry       exit 81
 ├── NoSuchSensor         this robot does not have it
 └── SimulatorFault       one simulator broke; restart it and go on
     ├── SimulatorDead    its connections are refused or were closed
@@ -32,6 +33,10 @@ class MasterLost(TrainerError, ConnectionError):
 
 class FaultBudgetSpent(TrainerError, RuntimeError):
     """A simulator failed more often than its restart limit allows."""
+
+
+class Diverged(TrainerError, ArithmeticError):
+    """A reward, a loss or a weight is NaN or infinite; retrying from here cannot help."""
 
 
 class NoSuchSensor(TrainerError, NotImplementedError):

@@ -1,14 +1,15 @@
 """Measuring a policy: whole episodes with given seeds, and what came of them.
 
-A faulted episode is played again with its seed, so an evaluation always has
-all of its episodes and two policies are compared on the same ones.
+A faulted episode is played again with its seed, by whichever simulator is free,
+so an evaluation always has all of its episodes and two policies are compared on
+the same ones.
 """
 
 from __future__ import annotations
 
-import itertools
 import threading
 import time
+from collections import deque
 from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass
@@ -17,9 +18,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.interruption import Check, go_on
-from palaestra_trainer.simulators.member import Keeper, Member
+from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
+from palaestra_trainer.simulators.member import Member
 
 
 class Policy(Protocol):
@@ -107,69 +109,119 @@ def evaluate(
         policy: what chooses the actions.
         member: the simulator it is played in, or the keeper of one.
         seeds: at least one; a faulted episode is played again with its own.
-        check: called before each episode; raises to give the evaluation up.
+        check: called before each step, and while a simulator is waited for; raises to give the evaluation up.
 
     Raises:
         FaultBudgetSpent: the simulator broke more often than its budget allows.
     """
     keeper = member if isinstance(member, Keeper) else Keeper(member)
-    started = time.monotonic()
-    episodes: list[Episode] = []
-    faults = 0
-    for seed in seeds:
-        check()
-        while True:
-            try:
-                episodes.append(_play(policy, keeper, seed))
-                break
-            except SimulatorFault as fault:
-                faults += 1
-                keeper.mend(fault)
-    return Evaluation(episodes=tuple(episodes), faults=faults, seconds=time.monotonic() - started)
+    return evaluate_on_all(policy, [keeper], seeds, check)
 
 
 def evaluate_on_all(
     policy: Policy, keepers: Sequence[Keeper], seeds: Iterable[int], check: Check = go_on
 ) -> Evaluation:
-    """Return the same as `evaluate`, with the episodes shared out to several simulators at once."""
-    wanted = list(seeds)
-    shares = [wanted[first :: len(keepers)] for first in range(len(keepers))]
-    busy = [(keeper, share) for keeper, share in zip(keepers, shares, strict=True) if share]
-    if len(busy) == 1:
-        return evaluate(policy, busy[0][0], wanted, check)
+    """Return the same as `evaluate`, with the episodes dealt out to several simulators at once.
+
+    One that breaks leaves its episode to the others while it is mended, and if it is given up.
+    """
     started = time.monotonic()
+    games = _Games(policy, seeds)
+    while games.missing:
+        left = sorted((keeper for keeper in keepers if not keeper.lost), key=lambda keeper: keeper.busy)
+        if not left:
+            raise FaultBudgetSpent("every evaluating simulator was given up; read the simulators' logs")
+        if len(left) == 1:
+            games.play_on(left[0], check)
+        else:
+            _play_at_once(games, left[: games.missing], check)
+    return Evaluation(episodes=games.in_order(), faults=games.faults, seconds=time.monotonic() - started)
+
+
+class _Games:
+    """The episodes of one evaluation: those to be played, and those that were.
+
+    Each is played by one thread, and put back if it was cut: so whoever is free stays until the last one is
+    over, as it may become its turn again.
+
+    Attributes:
+        faults: episodes that were cut.
+    """
+
+    def __init__(self, policy: Policy, seeds: Iterable[int]) -> None:
+        self.faults = 0
+        self._policy = policy
+        self._waiting = deque(enumerate(seeds))
+        self._played: dict[int, Episode] = {}
+        self._wanted = len(self._waiting)
+        self._changed = threading.Condition()
+
+    @property
+    def missing(self) -> int:
+        """How many episodes have not been played to their end."""
+        return self._wanted - len(self._played)
+
+    def in_order(self) -> tuple[Episode, ...]:
+        """Return the episodes in the order of their seeds."""
+        return tuple(self._played[place] for place in sorted(self._played))
+
+    def play_on(self, keeper: Keeper, check: Check) -> None:
+        """Play until none is missing, or the simulator is given up."""
+        while self.missing and not keeper.lost:
+            check()
+            if work := keeper.under_way:
+                wait([work], LOOK_EVERY_S)
+            elif keeper.up():
+                self._play_next(keeper, check)
+
+    def _play_next(self, keeper: Keeper, check: Check) -> None:
+        with self._changed:
+            if not self._waiting:
+                self._changed.wait(LOOK_EVERY_S)
+                return
+            place, seed = self._waiting.popleft()
+        try:
+            episode = _play(self._policy, keeper, seed, check)
+        except SimulatorFault as fault:
+            keeper.begin_mending(fault)
+            with self._changed:
+                self.faults += 1
+                self._waiting.appendleft((place, seed))
+                self._changed.notify_all()
+        else:
+            with self._changed:
+                self._played[place] = episode
+                self._changed.notify_all()
+
+
+def _play_at_once(games: _Games, keepers: Sequence[Keeper], check: Check) -> None:
     over = threading.Event()
 
     def check_all() -> None:
-        check()
         if over.is_set():
             raise CancelledError
 
-    with ThreadPoolExecutor(len(busy), "evaluate") as pool:
-        futures = [pool.submit(evaluate, policy, keeper, share, check_all) for keeper, share in busy]
+    with ThreadPoolExecutor(len(keepers), "evaluate") as pool:
+        playing = [pool.submit(games.play_on, keeper, check_all) for keeper in keepers]
         try:
-            done, _ = wait(futures, return_when=FIRST_EXCEPTION)
-            for future in done:
-                future.result()
+            while playing:
+                done, left = wait(playing, LOOK_EVERY_S, FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
+                playing = list(left)
+                check()
         finally:
             over.set()
-    parts = [future.result() for future in futures]
-    dealt = itertools.zip_longest(*(part.episodes for part in parts))
-    return Evaluation(
-        episodes=tuple(episode for deal in dealt for episode in deal if episode is not None),
-        faults=sum(part.faults for part in parts),
-        seconds=time.monotonic() - started,
-    )
 
 
-def _play(policy: Policy, keeper: Keeper, seed: int) -> Episode:
-    env = keeper.member.env
-    observation, _ = keeper.reset(itertools.repeat(seed))
+def _play(policy: Policy, keeper: Keeper, seed: int, check: Check) -> Episode:
+    observation, _ = keeper.reset(seed, check=check)
     total_reward, length, over = 0.0, 0, False
     info: dict[str, Any] = {}
     while not over:
+        check()
         action, _ = policy.predict(observation, deterministic=True)
-        observation, reward, terminated, truncated, info = env.step(np.asarray(action)[()])
+        observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
         keeper.watcher.stepped(1)
         total_reward += float(reward)
         length += 1

@@ -3,18 +3,22 @@
 The first signal is noted, and the run ends at the next place where it looks: at
 a boundary with a checkpoint, or while simulators start, when there is nothing
 to save, without waiting for one to come up. Nothing is raised out of the
-handler itself: it may run amid a lock's release. A second signal ends the
-process at once.
+handler itself: it may run amid a lock's release. What is waited for meanwhile
+is waited for `patience.LEFT_S` seconds more. A second signal ends the
+process at once, and so does one that comes before the run listens.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Self
 
+from palaestra_sim.protocol.status import ExitCode
+from palaestra_trainer import patience
 from palaestra_trainer.errors import TrainerError
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
@@ -29,6 +33,27 @@ def go_on() -> None:
 
 class Interrupted(TrainerError):
     """A signal asked the run to end; it can go on later."""
+
+
+@contextmanager
+def leaving_when_asked() -> Iterator[None]:
+    """Let a signal end the process at once as interrupted, wherever inside no `Interruption` listens.
+
+    For the seconds of its imports: it would die of the signal, or as the first process of a container
+    not notice it, though there is nothing to save yet.
+    """
+    before = {number: signal.signal(number, _leave) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    del frame
+    os.write(2, f"{signal.Signals(number).name}: ending; nothing was begun\n".encode())
+    os._exit(ExitCode.INTERRUPTED)
 
 
 class Interruption:
@@ -56,6 +81,7 @@ class Interruption:
         """Put back who listened before."""
         for number, before in self._before.items():
             signal.signal(number, before)
+        patience.renew()
 
     def check(self) -> None:
         """Raise Interrupted if a signal has come."""
@@ -65,6 +91,7 @@ class Interruption:
     def _note(self, number: int, frame: FrameType | None) -> None:
         del frame
         self.requested = signal.Signals(number)
+        patience.end()
         for later in SIGNALS:
             signal.signal(later, signal.SIG_DFL)
         # Not by a logger: this may run amid another line of it.

@@ -1,10 +1,19 @@
-"""How log lines look: constant message, values as fields, on standard error."""
+"""How log lines look: constant message, values as fields, on standard error.
+
+The last ones are kept: a pod's log dies with it, and its termination message does not.
+"""
 
 from __future__ import annotations
 
 import sys
+from collections import deque
+from typing import Any
 
 import structlog
+
+from palaestra_sim.protocol.status import MOST_LINES
+
+_last_lines: deque[str] = deque(maxlen=MOST_LINES)
 
 
 def configure_logs() -> None:
@@ -14,9 +23,21 @@ def configure_logs() -> None:
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             structlog.processors.format_exc_info,
-            structlog.dev.ConsoleRenderer(
-                colors=False, pad_event_to=0, exception_formatter=structlog.dev.plain_traceback
-            ),
+            _Renderer(colors=False, pad_event_to=0, exception_formatter=structlog.dev.plain_traceback),
         ],
         logger_factory=lambda *_: structlog.PrintLogger(sys.stderr),
     )
+
+
+def last_lines() -> tuple[str, ...]:
+    """Return the last lines that were logged, the newest last; waits for nobody."""
+    return tuple(_last_lines)
+
+
+class _Renderer(structlog.dev.ConsoleRenderer):
+    """Renders, and keeps the last lines."""
+
+    def __call__(self, logger: Any, name: str, event_dict: structlog.typing.EventDict) -> str:
+        text = super().__call__(logger, name, event_dict)
+        _last_lines.extend(line for line in text.splitlines() if line.strip())
+        return text

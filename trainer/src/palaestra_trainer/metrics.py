@@ -12,9 +12,8 @@ from prometheus_client import CollectorRegistry
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
+from palaestra_sim.protocol.status import FaultKind
 from palaestra_trainer.progress import Progress
-
-FAULT_KINDS = ("dead", "hung", "wrong_data")
 
 
 class _RunCollector(Collector):
@@ -22,7 +21,7 @@ class _RunCollector(Collector):
         self._progress = progress
 
     def collect(self) -> Iterator[Metric]:
-        status, counters = self._progress.status(), self._progress.counters
+        status, counters = self._progress.status(), self._progress.counted()
         gauges = {
             "palaestra_trainer_steps": ("Valid environment steps so far.", status.step),
             "palaestra_trainer_target_steps": ("Steps at which the run ends.", status.target),
@@ -51,14 +50,20 @@ class _RunCollector(Collector):
             "palaestra_trainer_episodes": ("Training episodes without a fault.", counters.episodes),
             "palaestra_simulator_restarts": ("Restarts after a fault.", counters.restarts),
             "palaestra_simulator_recycles": ("Restarts of healthy ones.", counters.recycled),
+            "palaestra_simulators_given_up": ("Those the run went on without.", counters.given_up),
             "palaestra_simulator_extra_steps": ("Steps for a late message.", counters.extra_steps),
+            "palaestra_trainer_steps_lost": ("Valid steps played in vain.", counters.steps_lost),
         }
         for name, (text, value) in totals.items():
             yield CounterMetricFamily(name, text, value)
         faults = CounterMetricFamily("palaestra_simulator_faults", "By kind.", labels=["kind"])
-        for kind in FAULT_KINDS:
+        for kind in FaultKind:
             faults.add_metric([kind], counters.faults[kind])
         yield faults
+        spent = CounterMetricFamily("palaestra_trainer_seconds", "Wall clock by cause.", labels=["cause"])
+        for cause, seconds in counters.goodput.items():
+            spent.add_metric([cause], seconds)
+        yield spent
 
 
 def registry(progress: Progress) -> CollectorRegistry:

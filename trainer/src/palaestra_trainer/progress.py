@@ -11,25 +11,29 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
 from statistics import fmean
+from types import MappingProxyType
 from typing import Any
 
-from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
+from palaestra_sim.protocol.status import Cause, CheckpointStatus, FaultKind, FaultRecord, TrainerStatus
 from palaestra_trainer.configuration import Role
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.evaluation import Evaluation
+from palaestra_trainer.goodput import Goodput
+from palaestra_trainer.standings import AskStandby, Standings
 
 EPISODES_IN_MEAN = 100  # as in Stable-Baselines3's rollout/ep_rew_mean
 SPEED_WINDOW_S = 30.0
-
-
-@dataclass(slots=True)
-class _Simulator:
-    role: Role
-    state: str = "starting"
-    restarts: int = 0
-    last_fault: str | None = None
+PHASES: Mapping[Cause, str] = MappingProxyType(
+    {
+        Cause.STARTING: "starting",
+        Cause.EVALUATING: "evaluating",
+        Cause.CHECKPOINTING: "saving",
+        Cause.RECOVERING: "recovering",
+    }
+)
 
 
 @dataclass(slots=True)
@@ -38,23 +42,38 @@ class Counters:
 
     Attributes:
         episodes: collected episodes that ended without a fault.
-        faults: by kind: dead, hung, wrong_data.
+        faults: by kind: dead, hung, wrong_data; and slow, which breaks nothing.
         restarts: of simulators, after faults.
         recycled: restarts of healthy simulators.
+        given_up: simulators that the run went on without.
         extra_steps: simulation steps taken because a message had not come.
-        seconds: wall time of training.
+        steps_lost: valid steps played in vain, see `TrainerStatus`.
+        goodput: seconds spent, by cause.
     """
 
     episodes: int = 0
     faults: Counter[str] = field(default_factory=Counter)
     restarts: int = 0
     recycled: int = 0
+    given_up: int = 0
     extra_steps: int = 0
-    seconds: float = 0.0
+    steps_lost: int = 0
+    goodput: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> float:
+        """Wall time of the run."""
+        return sum(self.goodput.values())
+
+    @property
+    def broken(self) -> int:
+        """Faults of all kinds; being slow is none."""
+        return self.faults.total() - self.faults[FaultKind.SLOW]
 
     def to_json(self) -> dict[str, Any]:
         """Return them as JSON data."""
-        return {name: getattr(self, name) for name in self.__slots__} | {"faults": dict(self.faults)}
+        own = {name: getattr(self, name) for name in self.__slots__}
+        return own | {"faults": dict(self.faults), "goodput": dict(self.goodput)}
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Counters:
@@ -70,8 +89,7 @@ class Progress:
     Attributes:
         step: valid environment steps so far, over all attempts.
         target: steps at which the run ends.
-        phase: what it does now: starting, training, evaluating, saving.
-        counters: what is counted over all attempts.
+        counters: what is counted over all attempts, but for the time of this one: see `counted`.
         success_rate: that of this attempt's last evaluation; None before it.
         checkpoint: the newest checkpoint; None without one.
         attempt: this one's number in the run directory's record; None before it is recorded.
@@ -85,18 +103,32 @@ class Progress:
     ) -> None:
         self.step = 0
         self.target = target
-        self.phase = "starting"
         self.counters = Counters()
         self.success_rate: float | None = None
         self.checkpoint: CheckpointStatus | None = None
         self.attempt: int | None = None
         self._clock = clock
         self._lock = threading.Lock()
-        self._simulators = {name: _Simulator(role=role) for name, role in simulators}
+        self._standings = Standings(simulators, clock)
+        self._goodput = Goodput(clock)
         self._returns: deque[float] = deque(maxlen=EPISODES_IN_MEAN)
         self._samples: deque[tuple[float, int]] = deque()
-        self._moved = self._counted = clock()
+        self._moved = clock()
         self._moved_at: float | None = None
+
+    @property
+    def phase(self) -> str:
+        """What the run does now: starting, training, evaluating, saving, recovering."""
+        return PHASES.get(self._goodput.cause, "training")
+
+    @property
+    def awaits_simulators(self) -> bool:
+        """Whether the run waits for simulators now, and nothing else."""
+        return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING}
+
+    def spending(self, cause: Cause) -> AbstractContextManager[None]:
+        """Spend the time inside on `cause`, see `Goodput`."""
+        return self._goodput.spending(cause)
 
     def stepped(self, steps: int) -> None:
         """Some simulator took environment steps, in training or evaluation."""
@@ -104,38 +136,70 @@ class Progress:
         self._moved = self._clock()
         self._moved_at = time.time()
 
-    def resumed(self, step: int) -> None:
+    def resumed(self, step: int, counters: Counters) -> None:
         """The run goes on from the checkpoint at `step`: whoever asks is told so from now on."""
         self.step = step
+        self.counters = replace(counters, faults=Counter(counters.faults))
         self.saved(step)
+
+    def returns(self) -> list[float]:
+        """Return the returns of the last episodes, the newest last; in training's thread."""
+        return list(self._returns)
+
+    def recall(self, returns: Sequence[float]) -> None:
+        """Know the returns of the last episodes before this attempt."""
+        self._returns.extend(returns)
 
     def fault(self, simulator: str, fault: SimulatorFault) -> None:
         """Count a fault of a simulator, which is down from now on."""
         with self._lock:
             self.counters.faults[fault.kind] += 1
-            entry = self._simulators[simulator]
-            entry.state, entry.last_fault = "failed", str(fault)
+            self._goodput.in_vain()
+            self._standings.broke(
+                FaultRecord(
+                    time=timestamp(time.time()),
+                    simulator=simulator,
+                    kind=fault.kind,
+                    fact=str(fault),
+                    step=self.step,
+                )
+            )
+
+    def slow(self, simulator: str, seconds: float) -> None:
+        """Count a step that took much longer than others; nothing is broken by it."""
+        del simulator, seconds
+        with self._lock:
+            self.counters.faults[FaultKind.SLOW] += 1
+
+    def flapping(self, simulator: str) -> None:
+        """A simulator breaks again and again."""
+        with self._lock:
+            self._standings.flaps(simulator)
+
+    def given_up(self, simulator: str) -> None:
+        """Count a simulator that won't come back; the run goes on without it."""
+        with self._lock:
+            self.counters.given_up += 1
+            self._standings.gave_up(simulator)
+
+    def has_standby(self, simulator: str, ask: AskStandby) -> None:
+        """Let `ask`, which any thread may call, tell how the simulator's spare is."""
+        self._standings.has_standby(simulator, ask)
 
     def started(self, simulator: str) -> None:
         """A simulator is up for the first time in this attempt."""
         with self._lock:
-            self._simulators[simulator].state = "ready"
+            self._standings.is_up(simulator)
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
         """Count a restart of a simulator, which is up from now on."""
         with self._lock:
-            self._simulators[simulator].state = "ready"
+            self._standings.is_up(simulator)
             if recycled:
                 self.counters.recycled += 1
             else:
                 self.counters.restarts += 1
-                self._simulators[simulator].restarts += 1
-
-    def ready(self) -> None:
-        """All simulators are up."""
-        with self._lock:
-            for simulator in self._simulators.values():
-                simulator.state = "ready"
+                self._standings.restarted(simulator)
 
     def collected(self, step: int, infos: Sequence[Mapping[str, Any]]) -> None:
         """Training is at `step`, after a vector step with these infos."""
@@ -143,6 +207,8 @@ class Progress:
             self.step = step
             for info in infos:
                 self.counters.extra_steps += int(info.get("extra_steps", 0))
+                if (fault := info.get("sim_fault")) is not None:
+                    self.counters.steps_lost += int(fault["step"])
                 if (episode := info.get("episode")) is not None:
                     self.counters.episodes += 1
                     self._returns.append(episode["r"])
@@ -160,20 +226,47 @@ class Progress:
         """A checkpoint was written."""
         self.checkpoint = CheckpointStatus(step=step, time=timestamp(time.time()))
 
-    def count_time(self) -> Counters:
-        """Add the seconds since the last call, or since the start, to the counters; return them."""
+    def counted(self, kept: int | None = None) -> Counters:
+        """Return the counters as they are now, or as they will be if the run goes on from step `kept`."""
+        lost = 0 if kept is None else max(self.step - kept, 0)
         with self._lock:
-            now = self._clock()
-            self.counters.seconds += now - self._counted
-            self._counted = now
-            return self.counters
+            so_far, before = self.counters, self.counters.goodput
+            return replace(
+                so_far,
+                faults=Counter(so_far.faults),
+                steps_lost=so_far.steps_lost + lost,
+                goodput={
+                    cause: before.get(cause, 0.0) + seconds
+                    for cause, seconds in self._goodput.seconds().items()
+                },
+            )
+
+    def scalars(self) -> dict[str, float]:
+        """Return what is drawn over the steps, by its name in TensorBoard."""
+        counters = self.counted()
+        faults = {f"simulators/faults_{kind}": counters.faults[kind] for kind in FaultKind}
+        spent = {f"goodput/{cause}_s": seconds for cause, seconds in counters.goodput.items()}
+        totals = {
+            "simulators/faults": counters.broken,
+            "simulators/restarts": counters.restarts,
+            "simulators/steps_lost": counters.steps_lost,
+        }
+        return totals | faults | spent
 
     def restarts(self) -> int:
         """Return the restarts of simulators after faults, in this attempt.
 
         Waits for nobody: the watchdog asks when the others hang.
         """
-        return sum(simulator.restarts for simulator in self._simulators.values())
+        return self._standings.restarts()
+
+    def faults(self) -> tuple[FaultRecord, ...]:
+        """Return the last faults of this attempt, the newest last; waits for nobody."""
+        return tuple(self._standings.faults)
+
+    def down(self) -> list[str]:
+        """Return the names of the simulators that are not up; waits for nobody."""
+        return self._standings.down()
 
     def idle_s(self) -> float:
         """Return the seconds since the last environment step of any simulator, or since the start."""
@@ -189,29 +282,23 @@ class Progress:
 
     def status(self) -> TrainerStatus:
         """Return what /status tells."""
-        speed = self.steps_per_second()
+        speed, counters = self.steps_per_second(), self.counted()
         with self._lock:
             return TrainerStatus(
                 step=self.step,
                 target=self.target,
-                episodes=self.counters.episodes,
+                episodes=counters.episodes,
                 mean_return=fmean(self._returns) if self._returns else None,
                 success_rate=self.success_rate,
                 steps_per_second=speed,
-                simulators=tuple(
-                    SimulatorStatus(
-                        name=name,
-                        role=simulator.role,
-                        state=simulator.state,
-                        restarts=simulator.restarts,
-                        last_fault=simulator.last_fault,
-                    )
-                    for name, simulator in self._simulators.items()
-                ),
+                simulators=self._standings.statuses(),
                 last_checkpoint=self.checkpoint,
                 last_progress=None if self._moved_at is None else timestamp(self._moved_at),
                 phase=self.phase,
                 attempt=self.attempt,
+                faults={kind.value: counters.faults[kind] for kind in FaultKind},
+                goodput={cause: round(seconds, 3) for cause, seconds in counters.goodput.items()},
+                steps_lost=counters.steps_lost,
             )
 
 

@@ -49,6 +49,11 @@ class RunDirectory:
         return self.path / "evaluations.jsonl"
 
     @property
+    def journal(self) -> Path:
+        """Where the run stood some seconds ago, which matters if it is killed."""
+        return self.path / "journal.json"
+
+    @property
     def model(self) -> Path:
         """The best model by evaluation, a Stable-Baselines3 zip."""
         return self.path / "model.zip"
@@ -90,7 +95,16 @@ def read_lines(path: Path) -> Iterator[dict[str, Any]]:
                 yield content
 
 
-def replace_file(path: Path, write: Callable[[Path], None]) -> None:
+def drop_lines(path: Path, unwanted: Callable[[dict[str, Any]], bool]) -> None:
+    """Replace a file of JSON lines, which may be absent, by one without the unwanted lines."""
+    lines = list(read_lines(path))
+    kept = [line for line in lines if not unwanted(line)]
+    if len(kept) < len(lines):
+        text = "".join(json.dumps(line) + "\n" for line in kept)
+        replace_file(path, lambda name: name.write_text(text, encoding="utf-8"))
+
+
+def replace_file(path: Path, write: Callable[[Path], object]) -> None:
     """Replace `path` by what `write` writes to the temporary name it is given.
 
     Raises:

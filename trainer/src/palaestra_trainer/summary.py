@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.goodput import trained_share
 from palaestra_trainer.progress import Progress
 from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_file
 
@@ -16,14 +17,15 @@ def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
 
     `success_rate` and `mean_return` are those of the best evaluation, whose
     policy model.zip is (null if nothing was evaluated); faults and restarts are
-    of all attempts, and so are `duration_s` and the speed that follows from it.
+    of all attempts, and so are `duration_s`, the speed that follows from it, and
+    `goodput`, its seconds by cause, of which `trained_share` trained.
     """
     best = max(
         read_lines(directory.evaluations),
         key=lambda line: (line["success_rate"], line["mean_return"]),
         default={},
     )
-    counters = progress.counters
+    counters = progress.counted()
     return {
         "target": progress.target,
         "steps": progress.step,
@@ -33,9 +35,12 @@ def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
         "best_step": best.get("step"),
         "steps_per_second": round(progress.step / max(counters.seconds, 1e-9), 1),
         "duration_s": round(counters.seconds, 1),
-        "faults": sum(counters.faults.values()),
+        "faults": counters.broken,
         "restarts": counters.restarts,
         "recycled": counters.recycled,
+        "steps_lost": counters.steps_lost,
+        "goodput": {cause: round(seconds, 3) for cause, seconds in counters.goodput.items()},
+        "trained_share": _rounded(trained_share(counters.goodput)),
         "attempts": sum(1 for _ in read_lines(directory.attempts)),
     }
 
@@ -61,3 +66,7 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
     if content["target"] < configuration.steps:
         return None
     return content
+
+
+def _rounded(share: float | None) -> float | None:
+    return None if share is None else round(share, 4)

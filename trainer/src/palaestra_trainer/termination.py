@@ -16,11 +16,11 @@ import structlog
 from palaestra_sim.protocol.status import ExitCode, Termination
 from palaestra_trainer.errors import (
     ConfigurationError,
+    Diverged,
     FaultBudgetSpent,
     MasterLost,
     SimulatorFault,
     SimulatorHung,
-    TrainerError,
 )
 from palaestra_trainer.interruption import Interrupted
 
@@ -29,10 +29,6 @@ log = structlog.get_logger(__name__)
 TERMINATION_VARIABLE = "PALAESTRA_TERMINATION_LOG"
 KUBERNETES_LOG = Path("/dev/termination-log")
 UNEXPECTED = 1
-
-
-class Diverged(TrainerError, ArithmeticError):
-    """The networks hold numbers that are none; retrying from here cannot help."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,9 +51,9 @@ ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),
     (ConfigurationError, ExitCode.CONFIGURATION, "ConfigurationWrong"),
-    (FaultBudgetSpent, ExitCode.FAULT_BUDGET, "FaultBudgetSpent"),
+    (FaultBudgetSpent, ExitCode.FAULT_BUDGET, "SimulatorBudgetSpent"),
     (Diverged, ExitCode.DIVERGED, "Diverged"),
-    (SimulatorHung, ExitCode.STALLED, "Stalled"),
+    (SimulatorHung, ExitCode.STALLED, "SimulatorHung"),
     (SimulatorFault, UNEXPECTED, "SimulatorUnavailable"),
 )
 
@@ -69,7 +65,7 @@ def end_of(error: BaseException) -> End:
             return End(code, reason, str(error))
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
         where = error.filename or "the run directory"
-        return End(UNEXPECTED, "DiskFull", f"{where}: disk full; free some space")
+        return End(UNEXPECTED, "StorageFull", f"{where}: disk full; free some space")
     return End(UNEXPECTED, "Unexpected", f"{type(error).__name__}: {error}")
 
 

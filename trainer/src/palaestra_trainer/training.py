@@ -17,28 +17,32 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
-from palaestra_sim.protocol.status import ExitCode, Termination
+from palaestra_sim.protocol.status import Cause, ExitCode, Termination
 from palaestra_trainer import algorithms, checkpoint
-from palaestra_trainer.conductor import Conductor, Enough, Run
+from palaestra_trainer.checkpoint import Checkpoint
+from palaestra_trainer.conductor import Conductor, Enough, Resumed, Run
 from palaestra_trainer.configuration import Configuration, dump
 from palaestra_trainer.display import Display, Lines
-from palaestra_trainer.errors import ConfigurationError, TrainerError
+from palaestra_trainer.divergence import Learner
+from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
 from palaestra_trainer.interruption import Interruption
+from palaestra_trainer.journal import Journal
+from palaestra_trainer.logs import last_lines
 from palaestra_trainer.progress import Counters, Progress
-from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.rejoining import rejoin
+from palaestra_trainer.run_directory import RunDirectory, drop_lines, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
-from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.simulators.member import Member, Spared
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from palaestra_trainer.status_server import StatusServer
 from palaestra_trainer.summary import finished, summarise, write_summary
-from palaestra_trainer.termination import Diverged, End, end_of, write_last_word
-from palaestra_trainer.watchdog import Watchdog
+from palaestra_trainer.termination import End, end_of, write_last_word
+from palaestra_trainer.watchdog import Watchdog, stalled
 
 log = structlog.get_logger(__name__)
 
 MakeMembers = Callable[[Configuration], Sequence[Member]]
 DONE = End(ExitCode.DONE, "Completed", "all steps are done")
-STALLED = End(ExitCode.STALLED, "Stalled", "no environment step for stallDeadlineSeconds")
 LOG_INTERVAL = {"DQN": 10, "SAC": 10, "A2C": 50}  # episodes, or rollouts on policy; others: 1
 
 
@@ -132,9 +136,11 @@ class Attempt:
             last_checkpoint=self._progress.checkpoint,
             attempt=self._progress.attempt,
             restarts=self._progress.restarts(),
+            log=last_lines(),
+            faults=self._progress.faults(),
         )
 
-    def _prepare(self, stack: ExitStack) -> tuple[Run, checkpoint.Checkpoint | None]:
+    def _prepare(self, stack: ExitStack) -> tuple[Run, Checkpoint | None]:
         """Return a run whose simulators are up, and the checkpoint that it goes on from.
 
         The attempt is on record before its simulators start: one that they end is an attempt too.
@@ -148,13 +154,15 @@ class Attempt:
         stack.enter_context(self._around.display)
         found = self._newest()
         self._begin(found)
-        if found:
-            progress.resumed(found.manifest.step)
-        fleet = Fleet(configuration, self._around.make_members(configuration), progress)
+        self._take_over(found)
+        members = self._around.make_members(configuration)
+        for member in members:
+            if isinstance(member, Spared):
+                progress.has_standby(member.name, member.spare)
+        fleet = Fleet(configuration, members, progress)
         stack.callback(fleet.stop)
         fleet.start(interruption.check)
         rest(fleet.evaluating)
-        progress.ready()
         run = Run(
             configuration=configuration,
             directory=self._directory,
@@ -165,42 +173,47 @@ class Attempt:
         )
         return run, found
 
-    def _newest(self) -> checkpoint.Checkpoint | None:
+    def _take_over(self, found: Checkpoint | None) -> None:
+        """Let the progress go on from that of the attempts before."""
+        journal = Journal(self._directory.journal)
+        if found is None:
+            self._progress.counters = journal.regained(0, Counters())
+            return
+        step, saved = found.manifest.step, Counters.from_json(found.manifest.counters)
+        self._progress.resumed(step, journal.regained(step, saved))
+
+    def _newest(self) -> Checkpoint | None:
         found = checkpoint.newest(self._directory.checkpoints)
         if found is None and self._around.must_resume:
             raise ConfigurationError(
                 f"{self._directory.path}: has no checkpoint to resume from; leave --resume out"
             )
+        if found:
+            checkpoint.refuse_another_run(found, self._configuration)
         return found
 
-    def _train(self, run: Run, found: checkpoint.Checkpoint | None, stack: ExitStack) -> None:
+    def _train(self, run: Run, found: Checkpoint | None, stack: ExitStack) -> None:
         use_threads(self._around.environment)
-        env = SimulatorsVecEnv(
-            run.fleet.collecting,
-            self._configuration.seed,
-            episodes=found.manifest.episodes if found else None,
-        )
+        env = SimulatorsVecEnv(run.fleet.collecting, self._configuration.seed, check=run.interruption.check)
         stack.callback(env.close)
-        model = self._make_model(env, found)
-        self._progress.phase = "training"
-        self._learn(model, Conductor(run, env, model.num_timesteps))
-        self._progress.count_time()
+        model = algorithms.make_model(self._configuration.algorithm, env, self._configuration.seed)
+        drop_lines(self._directory.evaluations, lambda line: line["step"] > self._progress.step)
+        resumed = self._resume(model, env, found) if found else None
+        model.set_logger(configure(str(self._directory.tensorboard), ["tensorboard"]))
+        with self._progress.spending(Cause.LEARNING):
+            self._learn(model, Conductor(run, env, resumed))
         write_summary(self._directory, summarise(self._directory, self._progress))
 
-    def _make_model(self, env: SimulatorsVecEnv, found: checkpoint.Checkpoint | None) -> BaseAlgorithm:
-        configuration = self._configuration
-        # A resumed attempt must not repeat the exploration of the one before.
-        step = found.manifest.step if found else 0
-        model = algorithms.make_model(configuration.algorithm, env, configuration.seed)
-        if found:
-            checkpoint.restore(found, model, configuration)
-            model.set_random_seed(configuration.seed + step)
-            env.seed(configuration.seed)
-            self._progress.counters = Counters.from_json(found.manifest.counters)
-        model.set_logger(configure(str(self._directory.tensorboard), ["tensorboard"]))
-        return model
+    def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: Checkpoint) -> Resumed:
+        """Bring model and simulators to where the checkpoint was made."""
+        saved = checkpoint.restore(found, model)
+        with self._progress.spending(Cause.RECOVERING):
+            state = rejoin(env, saved)
+        state.put_back(model)
+        self._progress.recall(state.rollout["returns"])
+        return Resumed(found, state)
 
-    def _begin(self, found: checkpoint.Checkpoint | None) -> None:
+    def _begin(self, found: Checkpoint | None) -> None:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
@@ -230,18 +243,17 @@ class Attempt:
         except TrainerError:
             conductor.save()
             raise
-        except ValueError as error:
+        except ValueError:
             # torch's distributions refuse NaN before anybody else sees it.
-            if checkpoint.finite(model):
-                raise
-            raise Diverged(f"the networks hold NaN or infinity ({error})") from error
+            Learner(model).check(model.num_timesteps)
+            raise
 
     def _watch(self, stack: ExitStack) -> None:
         stack.enter_context(
             Watchdog(
                 self._progress.idle_s,
                 self._configuration.stall_deadline_seconds,
-                lambda: write_last_word(self.last_word(STALLED)),
+                lambda: write_last_word(self.last_word(stalled(self._progress))),
             )
         )
 

@@ -16,6 +16,8 @@ from typing import Self
 import structlog
 
 from palaestra_sim.protocol.status import ExitCode
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.termination import End
 
 log = structlog.get_logger(__name__)
 
@@ -66,3 +68,13 @@ class Watchdog:
                 self._last_word()
                 self._leave(ExitCode.STALLED)
                 return
+
+
+def stalled(progress: Progress) -> End:
+    """Return what it means that no environment has stepped for so long; waits for nobody."""
+    fact = f"no environment step for {progress.idle_s():.0f} s while {progress.phase}"
+    if down := progress.down():
+        return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; not up: {', '.join(down)}")
+    if progress.awaits_simulators:
+        return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; a simulator's step does not end")
+    return End(ExitCode.STALLED, "Stalled", fact)

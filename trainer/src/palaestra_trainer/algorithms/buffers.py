@@ -7,8 +7,8 @@ bootstrapped and nobody is punished for a fault.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from typing import Any
+from collections.abc import Generator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -22,11 +22,35 @@ def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
     return np.array([info.get("valid", True) for info in infos], dtype=bool)
 
 
+COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+# Large enough that a million rows are some dozens of files, small enough that few steps cost little.
+CHUNK_BYTES = 4 << 20
+
+
+class Positions(NamedTuple):
+    """Where a replay buffer stands.
+
+    Attributes:
+        next: row that the next step is stored in.
+        full: whether every row is in use; else those before `next` are.
+        newest: for each member the row of its last step, None without one.
+    """
+
+    next: int
+    full: bool
+    newest: tuple[int | None, ...]
+
+
 class ValidReplayBuffer(ReplayBuffer):
     """A replay buffer of valid rows, one after the other, whatever member they came from.
 
     Storage is flat (one column), so that a step of n members may append fewer
-    than n rows.
+    than n rows. Rows are kept on disk in chunks, of which only those that
+    changed are written again.
+
+    Attributes:
+        chunk_rows: rows of one chunk; the last one may have fewer.
+        changed: numbers of the chunks that were written to; whoever keeps them elsewhere clears it.
     """
 
     def __init__(
@@ -40,6 +64,18 @@ class ValidReplayBuffer(ReplayBuffer):
     ) -> None:
         super().__init__(buffer_size, observation_space, action_space, device, 1, **options)
         self._newest: list[int | None] = [None] * n_envs
+        self.chunk_rows = max(1, CHUNK_BYTES // sum(array[:1].nbytes for array in self.rows().values()))
+        self.changed: set[int] = set()
+
+    @property
+    def positions(self) -> Positions:
+        """Where the buffer stands; set it to go back to where it stood."""
+        return Positions(self.pos, self.full, tuple(self._newest))
+
+    @positions.setter
+    def positions(self, positions: Positions) -> None:
+        self.pos, self.full, newest = positions
+        self._newest = list(newest)
 
     def add(
         self,
@@ -55,31 +91,38 @@ class ValidReplayBuffer(ReplayBuffer):
             if info.get("valid", True):
                 one = slice(row, row + 1)
                 self._newest[row] = self.pos
+                self.changed.add(self.pos // self.chunk_rows)
                 super().add(obs[one], next_obs[one], action[one], reward[one], done[one], [info])
             else:
                 self._truncate(self._newest[row])
 
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Return the rows in use, oldest first, as views or copies of shape (rows, 1, ...)."""
-        order = np.roll(np.arange(self.size()), -self.pos if self.full else 0)
-        return {name: getattr(self, name)[order] for name in _COLUMNS}
+    def rows(self, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
+        """Return the rows from `start` to `stop` by column, as they lie in memory: views, (rows, 1, ...)."""
+        return {name: getattr(self, name)[start:stop] for name in COLUMNS}
 
-    def fill(self, arrays: dict[str, np.ndarray]) -> None:
-        """Replace the contents by what `arrays` returned, the newest rows if not all fit."""
-        rows = min(len(arrays["rewards"]), self.buffer_size)
-        for name in _COLUMNS:
-            getattr(self, name)[:rows] = arrays[name][-rows:] if rows else arrays[name]
-        self.full = rows == self.buffer_size
-        self.pos = rows % self.buffer_size
+    def fill(self, start: int, rows: Mapping[str, np.ndarray]) -> None:
+        """Write rows that `rows` returned to their place; where the buffer stands is not changed.
+
+        Raises:
+            ValueError: they are of another shape.
+        """
+        for name in COLUMNS:
+            getattr(self, name)[start : start + len(rows[name])] = rows[name]
+
+    def keep(self, kept: np.ndarray) -> None:
+        """Drop every row in use but the `kept` ones, which move to the start, oldest first."""
+        order = np.roll(np.arange(self.size()), -self.pos if self.full else 0)
+        order = order[kept[order]]
+        self.fill(0, {name: column[order] for name, column in self.rows().items()})
+        self.pos, self.full = len(order) % self.buffer_size, len(order) == self.buffer_size
         self._newest = [None] * len(self._newest)
+        self.changed = set(range(-(-self.size() // self.chunk_rows)))
 
     def _truncate(self, position: int | None) -> None:
         if position is not None and not self.dones[position]:
             self.dones[position] = 1.0
             self.timeouts[position] = 1.0
-
-
-_COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+            self.changed.add(position // self.chunk_rows)
 
 
 class ValidRolloutBuffer(RolloutBuffer):

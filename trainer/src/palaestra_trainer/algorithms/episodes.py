@@ -34,18 +34,21 @@ class EpisodeRecorder:
     """Gathers up to `wanted` whole valid episodes of each of `environments` environments.
 
     Further episodes of an environment that has its number are dropped, and so
-    are episodes with an invalid row.
+    are episodes with an invalid row. An environment whose last row was invalid is
+    away, perhaps for good: the others don't wait for it.
     """
 
     def __init__(self, environments: int, wanted: int) -> None:
         self._wanted = wanted
         self._current = [_Episode() for _ in range(environments)]
         self._whole: list[list[_Episode]] = [[] for _ in range(environments)]
+        self._away = [False] * environments
 
     @property
     def complete(self) -> bool:
-        """Whether every environment has its number of episodes."""
-        return all(len(episodes) == self._wanted for episodes in self._whole)
+        """Whether every environment has its number of episodes, but for those that are away."""
+        ready = [len(episodes) == self._wanted for episodes in self._whole]
+        return any(ready) and all(done or away for done, away in zip(ready, self._away, strict=True))
 
     def add(
         self,
@@ -57,14 +60,16 @@ class EpisodeRecorder:
     ) -> None:
         """Add one vector step; every array has a row for each environment."""
         for index, (episode, whole) in enumerate(zip(self._current, self._whole, strict=True)):
-            if len(whole) == self._wanted:
+            self._away[index] = not valid[index]
+            if self._away[index]:
+                self._current[index] = _Episode()
+            if self._away[index] or len(whole) == self._wanted:
                 continue
             episode.observations.append(observations[index])
             episode.actions.append(actions[index])
             episode.rewards.append(float(rewards[index]))
             if dones[index]:
-                if valid[index]:
-                    whole.append(episode)
+                whole.append(episode)
                 self._current[index] = _Episode()
 
     def batch(self, gamma: float) -> Batch:

@@ -31,8 +31,9 @@ class REINFORCE(BaseAlgorithm):
     environment: the same number of each, because taking whatever ends first
     would prefer short episodes. What an environment plays beyond its number
     while others finish theirs is dropped, and so is an episode that a fault
-    cut. Training ends at the first episode end at or after `total_timesteps`.
-    A truncated episode counts as ended: its return is what was seen.
+    cut; an environment that is being mended is not waited for. Training ends at
+    the first episode end at or after `total_timesteps`. A truncated
+    episode counts as ended: its return is what was seen.
 
     Args:
         policy: "MlpPolicy" or a class; an actor-critic one, whose value

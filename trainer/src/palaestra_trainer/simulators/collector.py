@@ -2,28 +2,37 @@
 
 Translates gymnasium's step into the row that Stable-Baselines3 expects (reset
 in the same step, `terminal_observation`, `TimeLimit.truncated`, Monitor's
-`episode`) and a fault into an invalid row: done, truncated, `info["valid"]`
-False and `info["sim_fault"]`.
+`episode`) and a fault into invalid rows (`info["valid"]` False), so that nobody
+waits for the member that broke: the row of the fault ends the episode (done,
+truncated, `info["sim_fault"]`), those that follow say `info["recovering"]`, and
+the last of them is done again, with the first observation of the next episode.
+It is False, and no last one comes, once the member was given up.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from palaestra_trainer.errors import SimulatorFault
+from gymnasium import spaces
+from gymnasium.vector.utils import create_empty_array
+
+from palaestra_trainer.errors import Diverged, SimulatorFault
+from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.seeds import COLLECT, episode_seed
-from palaestra_trainer.simulators.member import Environment, Keeper
+from palaestra_trainer.simulators.episode_state import ActionLog, EpisodeState
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.member import Environment, Step
 
 
 class Row(NamedTuple):
     """What one member contributes to a vector step.
 
     Attributes:
-        observation: the next one; the first of the next episode where `done`.
+        observation: the next one; the first of the next episode where `done`, if it has begun.
         reward: of this step; 0 in an invalid row.
-        done: the episode ended, by its own end, by a time limit, or by a fault.
+        done: an episode ended, by its own end, by a time limit, or by a fault; or, in an invalid row,
+            another begins.
         info: what the environment reported, and the keys named in this module's docstring.
     """
 
@@ -40,82 +49,153 @@ class Collector:
         keeper: looks after the member.
         run_seed: the replica's seed.
         index: the member's position among the collecting ones.
-        episode: number of the next episode; continue a run by setting it.
+        episode: number of the next episode.
         reset_info: what the environment reported at the last reset.
     """
 
-    def __init__(self, keeper: Keeper, run_seed: int, index: int, episode: int = 0) -> None:
+    def __init__(self, keeper: Keeper, run_seed: int, index: int, check: Check = go_on) -> None:
         self.keeper = keeper
         self.run_seed = run_seed
         self.index = index
-        self.episode = episode
+        self.episode = 0
         self.reset_info: dict[str, Any] = {}
-        self._seeds = self._following_seeds()
+        self._check = check
         self._started = time.monotonic()
-        self._observation: Any = None
-        self._return = 0.0
-        self._length = 0
+        # Shown before anything has been seen, if the member has yet to come up.
+        self._observation: Any = blank(self.env.observation_space)
+        self._return, self._length = 0.0, 0
+        self._actions: ActionLog | None = None
+        self._news: dict[str, Any] = {}
 
     @property
     def env(self) -> Environment:
         """The member's environment."""
         return self.keeper.member.env
 
+    @property
+    def state(self) -> EpisodeState:
+        """How far the member is now."""
+        if self._actions is None:
+            return EpisodeState(self.episode, None)
+        return EpisodeState(self.episode - 1, self._actions.taken())
+
     def next_seed(self) -> int:
         """Return the seed that the next episode will have."""
         return episode_seed(self.run_seed, COLLECT, self.index, self.episode)
 
     def begin(self, options: dict[str, Any] | None = None) -> Any:
-        """Return the first observation of the next episode."""
-        self._observation, self.reset_info = self.keeper.reset(self._seeds, options)
-        self._started = time.monotonic()
-        self._return = 0.0
-        self._length = 0
-        return self._observation
-
-    def step(self, action: Any) -> Row:
-        """Return the row of one step; a fault ends the episode and is mended here.
+        """Return the first observation of the next episode; the last one seen while the member is mended.
 
         Raises:
             FaultBudgetSpent: the member's budget of restarts is used up.
         """
+        self._actions = None
+        self._return, self._length = 0.0, 0
+        if self.keeper.up():
+            try:
+                self._reset(options)
+            except SimulatorFault as fault:
+                self._break(fault)
+        return self._observation
+
+    def resume(self, state: EpisodeState) -> Any:
+        """Return the observation after the actions of `state`, taken again; nothing of it is counted.
+
+        A member that breaks meanwhile begins the next episode instead, and so does one whose episode ends
+        earlier than it did: its environment does not repeat.
+
+        Raises:
+            FaultBudgetSpent: the member's budget of restarts is used up.
+        """
+        self.episode = state.episode
+        self.begin()
+        for action in () if state.actions is None or self._actions is None else state.actions:
+            self._check()
+            try:
+                _, _, terminated, truncated, _ = self._advance(action)
+            except SimulatorFault as fault:
+                self._break(fault)
+                break
+            if terminated or truncated:
+                return self.begin()
+        return self._observation
+
+    def step(self, action: Any) -> Row:
+        """Return the row of one step.
+
+        A fault ends the episode; the member is mended in the background, and until it is up again every
+        step has an invalid row.
+
+        Raises:
+            FaultBudgetSpent: the member's budget of restarts is used up.
+        """
+        if self._actions is None:
+            return self._recover()
         try:
-            observation, reward, terminated, truncated, info = self.env.step(action)
+            observation, reward, terminated, truncated, info = self._advance(action)
         except SimulatorFault as fault:
-            return self._broken(fault)
-        self._observation = observation
-        self._return += float(reward)
-        self._length += 1
+            self._break(fault)
+            return self._invalid(seen=self._observation, done=True)
         info["valid"] = True
         info["TimeLimit.truncated"] = truncated and not terminated
         if terminated or truncated:
             info["terminal_observation"] = observation
-            info["episode"] = self._episode()
+            info["episode"] = self._summary()
             return Row(self.begin(), float(reward), True, info)
         return Row(observation, float(reward), False, info)
 
-    def _broken(self, fault: SimulatorFault) -> Row:
-        info = {
-            "valid": False,
+    def _reset(self, options: dict[str, Any] | None) -> None:
+        seed = self.next_seed()
+        self.episode += 1
+        self._observation, self.reset_info = self.keeper.reset(seed, options, self._check)
+        self._started = time.monotonic()
+        self._actions = ActionLog()
+
+    def _advance(self, action: Any) -> Step:
+        try:
+            step = self.keeper.step(action)
+        except Diverged as error:
+            raise Diverged(f"episode {self.episode - 1}, step {self._length + 1}: {error}") from error
+        self._observation = step[0]
+        self._return += float(step[1])
+        self._length += 1
+        if self._actions is not None:
+            self._actions.append(action)
+        return step
+
+    def _break(self, fault: SimulatorFault) -> None:
+        self._news = {
             "sim_fault": {
                 "kind": fault.kind,
                 "simulator": self.keeper.name,
                 "fact": str(fault),
                 "episode": self.episode - 1,
                 "step": self._length,
-            },
-            "TimeLimit.truncated": True,
-            "terminal_observation": self._observation,
+            }
         }
-        self.keeper.mend(fault)
-        return Row(self.begin(), 0.0, True, info)
+        self._actions = None
+        self.keeper.begin_mending(fault)
 
-    def _episode(self) -> dict[str, float]:
+    def _recover(self) -> Row:
+        """Return the row of a step that no episode is under way for."""
+        seen = self._observation
+        self.begin()
+        row = self._invalid(seen, done=self._actions is not None)
+        row.info["recovering"] = not self.keeper.lost
+        return row
+
+    def _invalid(self, seen: Any, *, done: bool) -> Row:
+        """Return a row that nothing is learnt from; the first one after a fault tells of it."""
+        info = {"valid": False, "TimeLimit.truncated": done, "terminal_observation": seen} | self._news
+        self._news = {}
+        return Row(self._observation, 0.0, done, info)
+
+    def _summary(self) -> dict[str, float]:
         seconds = time.monotonic() - self._started
         return {"r": round(self._return, 6), "l": self._length, "t": round(seconds, 6)}
 
-    def _following_seeds(self) -> Iterator[int]:
-        while True:
-            seed = self.next_seed()
-            self.episode += 1
-            yield seed
+
+def blank(space: spaces.Space[Any]) -> Any:
+    """Return an observation of nothing but zeros."""
+    one: Any = create_empty_array(space, n=1)
+    return {name: part[0] for name, part in one.items()} if isinstance(space, spaces.Dict) else one[0]

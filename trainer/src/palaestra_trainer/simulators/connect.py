@@ -1,6 +1,7 @@
 """From a configuration to simulators with environments, not started yet.
 
-`connect` finds them behind the sidecars of a pod, `connect_here` starts sidecars of this program's own.
+`connect` finds them behind the sidecars of a pod, `connect_members` those that stand by too, and
+`connect_here` starts sidecars of this program's own.
 """
 
 from __future__ import annotations
@@ -15,13 +16,17 @@ from palaestra_trainer.configuration import Configuration, SimulatorConfiguratio
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.ros import ensure_node
+from palaestra_trainer.simulators.member import Member
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
+from palaestra_trainer.simulators.standby import Standby
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
     """Return the simulators of a configuration, by default of the one PALAESTRA_CONFIG names, not started.
+
+    Those that stand by are left out: who asks for simulators here keeps to the ones that he got.
 
     Raises:
         ConfigurationError: the configuration cannot be read, or names no known environment.
@@ -31,6 +36,21 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
     chosen = configuration or load()
     ensure_node(f"trainer_r{chosen.replica}")
     return [_simulator(chosen, entry, Sidecar(entry.control, entry.name)) for entry in chosen.simulators]
+
+
+def connect_members(configuration: Configuration) -> list[Member]:
+    """Return the simulators of a configuration for somebody who restarts them, not started.
+
+    Raises:
+        As `connect`.
+    """
+    simulators = connect(configuration)
+    return [
+        Standby(simulator, _simulator(configuration, entry, simulator.sidecar.standby()))
+        if entry.standby
+        else simulator
+        for entry, simulator in zip(configuration.simulators, simulators, strict=True)
+    ]
 
 
 def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
@@ -85,4 +105,4 @@ def _simulator(configuration: Configuration, entry: SimulatorConfiguration, side
                 "or module:name of one that its module registers"
             ) from error
 
-    return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds)
+    return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle)

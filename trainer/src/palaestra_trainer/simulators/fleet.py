@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, wait
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import wait
 from contextlib import contextmanager
 
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.interruption import Check, go_on
-from palaestra_trainer.simulators.member import Care, Keeper, Member, Watcher
-
-LOOK_EVERY_S = 0.1
+from palaestra_trainer.simulators.background import in_background
+from palaestra_trainer.simulators.budget import Care, Group
+from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
+from palaestra_trainer.simulators.member import Member, Watcher
 
 
 class Fleet:
@@ -33,8 +34,9 @@ class Fleet:
         missing = [wanted.name for wanted in configuration.simulators if wanted.name not in by_name]
         if missing:
             raise ConfigurationError(f"simulators: {', '.join(missing)} cannot be made; list it")
+        groups = groups_of(configuration)
         keepers = {
-            wanted.name: Keeper(by_name[wanted.name], care_of(wanted), watcher)
+            wanted.name: Keeper(by_name[wanted.name], care_of(wanted), watcher, group=groups[wanted.group])
             for wanted in configuration.simulators
         }
         self.collecting = [keepers[wanted.name] for wanted in configuration.with_role("Collect")]
@@ -42,49 +44,39 @@ class Fleet:
         self._all = [*self.collecting, *self.evaluating]
 
     def start(self, check: Check = go_on) -> None:
-        """Start all members at once.
+        """Start all members at once; return when all have been tried, and enough of each group are up.
+
+        Those that are not up yet go on being mended in the background.
 
         Args:
             check: called every tenth of a second; what it raises, such as `Interrupted`, waits for
                 no member: a try that is under way may go on in its thread, and no other is begun.
 
         Raises:
-            FaultBudgetSpent: one of them does not come up, however often it is tried.
+            FaultBudgetSpent: too many of a group do not come up, however often it is tried.
         """
         check()
-        starts = [in_background(Keeper.start, keeper) for keeper in self._all]
+        for keeper in self._all:
+            keeper.begin_start()
         try:
-            while wait(starts, LOOK_EVERY_S).not_done:
+            while not self._enough():
+                wait([work for keeper in self._all if (work := keeper.under_way)], LOOK_EVERY_S)
                 check()
-            for start in starts:
-                start.result()
         except BaseException:
             for keeper in self._all:
-                keeper.give_up()
+                keeper.abandon()
             raise
 
     def stop(self) -> None:
-        """Stop all members at once, however they are."""
-        stops = [in_background(Keeper.stop, keeper) for keeper in self._all]
+        """Stop all members at once, however they are, also those that are being mended."""
+        stops = [in_background(keeper.stop, f"stop-{keeper.name}") for keeper in self._all]
         wait(stops)
         for stop in stops:
             stop.result()
 
-
-def in_background(work: Callable[[Keeper], None], keeper: Keeper) -> Future[None]:
-    """Begin to work on one keeper in a thread that does not keep the process from ending."""
-    future: Future[None] = Future()
-
-    def run() -> None:
-        try:
-            work(keeper)
-        except BaseException as error:  # noqa: BLE001 - whoever asks for the result gets it
-            future.set_exception(error)
-        else:
-            future.set_result(None)
-
-    threading.Thread(target=run, name=f"fleet-{keeper.name}", daemon=True).start()
-    return future
+    def _enough(self) -> bool:
+        up = Counter(keeper.group for keeper in self._all if keeper.up())
+        return all(keeper.tried and up[keeper.group] >= keeper.group.least for keeper in self._all)
 
 
 @contextmanager
@@ -115,10 +107,15 @@ def rest(keepers: Sequence[Keeper]) -> None:
         keeper.pause()
 
 
+def groups_of(configuration: Configuration) -> dict[str, Group]:
+    """Return the groups of a configuration's simulators by name."""
+    sizes = Counter(simulator.group for simulator in configuration.simulators)
+    return {it.group: Group(sizes[it.group], it.min_simulators) for it in configuration.simulators}
+
+
 def care_of(simulator: SimulatorConfiguration) -> Care:
     """Return how the configuration wants one member to be looked after."""
     return Care(
-        recycle_after_resets=simulator.recycle.after_resets if simulator.recycle else None,
         restart_limit=simulator.restart.limit,
         restart_within_s=simulator.restart.within_seconds,
     )

@@ -8,7 +8,14 @@ import time
 from typing import Any
 from urllib.parse import urlsplit
 
-from palaestra_sim.protocol.control import ProtocolError, SidecarState, SimulatorState, StopRequest, decoded
+from palaestra_sim.protocol.control import (
+    STANDBY,
+    ProtocolError,
+    SidecarState,
+    SimulatorState,
+    StopRequest,
+    decoded,
+)
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 
 _TIMEOUT_S = 5.0
@@ -18,19 +25,26 @@ _CONFLICT = 409
 
 
 class Sidecar:
-    """The control port of one sidecar.
+    """One simulator at the control port of its sidecar.
 
     Every method raises SimulatorDead when the sidecar is gone and SimulatorHung when it does not answer.
 
     Args:
         address: e.g. http://127.0.0.1:7100
         name: the simulator's name, for messages.
+        above: what stands before the paths of this simulator.
     """
 
-    def __init__(self, address: str, name: str) -> None:
+    def __init__(self, address: str, name: str, above: str = "") -> None:
         parts = urlsplit(address)
         self._host, self._port = str(parts.hostname), parts.port
+        self._address = address
         self._name = name
+        self._above = above
+
+    def standby(self) -> Sidecar:
+        """Return the second simulator of the same sidecar, which has one if it was started with --standby."""
+        return Sidecar(self._address, self._name, STANDBY)
 
     def state(self) -> SimulatorState:
         """Return what the sidecar says of its simulator."""
@@ -85,7 +99,7 @@ class Sidecar:
     def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> SimulatorState:
         connection = http.client.HTTPConnection(self._host, self._port, timeout=_TIMEOUT_S)
         try:
-            connection.request(method, path, None if body is None else json.dumps(body))
+            connection.request(method, f"{self._above}{path}", None if body is None else json.dumps(body))
             answer = connection.getresponse()
             text = answer.read(_MOST_BYTES)
         except TimeoutError as error:
@@ -95,8 +109,8 @@ class Sidecar:
         finally:
             connection.close()
         if answer.status not in {http.client.OK, _CONFLICT}:
-            raise WrongData(self._name, f"its sidecar answered {path} with {answer.status}")
+            raise WrongData(self._name, f"its sidecar answered {self._above}{path} with {answer.status}")
         try:
             return SimulatorState.from_json(decoded(text))
         except ProtocolError as error:
-            raise WrongData(self._name, f"its sidecar answered {path} with {error}") from error
+            raise WrongData(self._name, f"its sidecar answered {self._above}{path} with {error}") from error

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 import gymnasium
 
-from palaestra_trainer.errors import WrongData
+from palaestra_trainer.configuration import Recycle
+from palaestra_trainer.errors import SimulatorFault, WrongData
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.simulators.recycling import Wear
 from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.webots import Mode, Webots
+
+_POLL_S = 0.1
 
 MakeEnvironment = Callable[[RobotinoAbc, Scene], gymnasium.Env[Any, Any]]
 
@@ -24,6 +31,7 @@ class Simulator:
         sidecar: where the simulator is started and stopped.
         make_environment: makes the environment from robot and scene.
         start_deadline_s: the longest time until the sidecar, and after a start the simulator, answers.
+        recycle: when it is due to be restarted between two episodes; by default never.
 
     Raises:
         SimulatorDead, SimulatorHung: the sidecar cannot be asked for the robots' names.
@@ -31,9 +39,18 @@ class Simulator:
     """
 
     def __init__(
-        self, name: str, sidecar: Sidecar, make_environment: MakeEnvironment, start_deadline_s: float
+        self,
+        name: str,
+        sidecar: Sidecar,
+        make_environment: MakeEnvironment,
+        start_deadline_s: float,
+        recycle: Recycle | None = None,
     ) -> None:
         self.name = name
+        self.sidecar = sidecar
+        self.start_deadline_s = start_deadline_s
+        self.wear = Wear(recycle, self._memory)
+        self._abandoned = threading.Event()
         state = sidecar.first_state(start_deadline_s)
         supervisor = next((robot for robot in state.robots if robot.supervisor), None)
         if supervisor is None:
@@ -51,6 +68,10 @@ class Simulator:
         """Resets since the simulator was last started."""
         return self.scene.resets
 
+    def due(self) -> str | None:
+        """Return why it ought to be recycled before the next episode, in words; None: no reason."""
+        return self.wear.due(self.resets)
+
     def start(self) -> None:
         """Start the simulator and connect to it, ready to step.
 
@@ -61,20 +82,45 @@ class Simulator:
         self.run()
         self.robot.connect()
         self.scene.resets = 0
+        self.wear.begin()
 
     def restart(self) -> None:
-        """Stop the simulator, however it is, and start it.
+        """Stop the simulator, however it is, and start it, once its sidecar answers.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it does not come up in time.
+            SimulatorDead, SimulatorHung, WrongData: it, or its sidecar, does not come up in time.
         """
+        self.await_sidecar()
         self.stop()
         self.start()
+
+    def await_sidecar(self) -> None:
+        """Return when the sidecar answers: a kubelet takes its time to start a container again.
+
+        Raises:
+            SimulatorDead, SimulatorHung: it has not within `start_deadline_s` seconds.
+        """
+        self._abandoned.clear()
+        give_up = time.monotonic() + self.start_deadline_s
+        while True:
+            try:
+                self.sidecar.state()
+            except SimulatorFault:
+                if time.monotonic() > give_up or self._abandoned.wait(_POLL_S):
+                    raise
+            else:
+                return
 
     def stop(self) -> None:
         """Stop the simulator, however it is."""
         self.robot.close()
         self.webots.stop()
+
+    def abandon(self) -> None:
+        """Let a start or restart that is under way in another thread fail soon, by killing the simulator."""
+        self._abandoned.set()
+        with contextlib.suppress(SimulatorFault):
+            self.sidecar.expect_stop(0.0)
 
     def pause(self) -> None:
         """Let the simulator rest: it uses no processor until `run`."""
@@ -83,3 +129,9 @@ class Simulator:
     def run(self) -> None:
         """End the rest that `pause` began."""
         self.webots.supervisor.set_mode(Mode.FAST)
+
+    def _memory(self) -> int | None:
+        # A sidecar that does not answer is no reason to restart what it started.
+        with contextlib.suppress(SimulatorFault):
+            return self.sidecar.state().rss_bytes
+        return None

@@ -2,8 +2,9 @@
 
 All members step at the same time, in turns of the caller's thread: each asks
 its simulator for the step before the first answer is awaited. A member that
-breaks is restarted alone and its row is marked invalid, see
-`palaestra_trainer.simulators.collector`.
+breaks is mended in the background, and its rows are invalid until it is up
+again, see `palaestra_trainer.simulators.collector`: the others go on. Only when
+none is left that could step is one of them waited for.
 """
 
 from __future__ import annotations
@@ -19,8 +20,12 @@ from stable_baselines3.common.env_util import is_wrapped
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from palaestra_sim.protocol.status import Cause
+from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.collector import Collector, Row
-from palaestra_trainer.simulators.member import Environment, Keeper
+from palaestra_trainer.simulators.episode_state import EpisodeState
+from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
+from palaestra_trainer.simulators.member import Environment
 from palaestra_trainer.turns import take_turns
 
 
@@ -30,38 +35,28 @@ class SimulatorsVecEnv(VecEnv):
     Args:
         keepers: one for each member; rows are in their order.
         run_seed: the replica's seed; each episode's own follows from it.
-        episodes: for each member the number of its next episode, to continue a run.
+        check: called every tenth of a second while members are waited for; raises to wait no longer.
     """
 
-    def __init__(
-        self, keepers: Sequence[Keeper], run_seed: int, *, episodes: Sequence[int] | None = None
-    ) -> None:
-        numbers = list(episodes or [])
-        numbers += [0] * (len(keepers) - len(numbers))
-        self._collectors = [
-            Collector(keeper, run_seed, index, number)
-            for index, (keeper, number) in enumerate(zip(keepers, numbers, strict=True))
-        ]
+    def __init__(self, keepers: Sequence[Keeper], run_seed: int, *, check: Check = go_on) -> None:
+        self._keepers = list(keepers)
+        self._check = check
+        self._collectors = [Collector(keeper, run_seed, index, check) for index, keeper in enumerate(keepers)]
         self._watcher = keepers[0].watcher
         env = keepers[0].member.env
         super().__init__(len(keepers), env.observation_space, env.action_space)
         self._seeds = [None] * self.num_envs
         self._actions = np.empty(0)
 
-    @property
-    def episodes(self) -> list[int]:
-        """For each member the number of the next episode it will begin."""
-        return [collector.episode for collector in self._collectors]
-
     def pause(self) -> None:
         """Let all members rest until `run`."""
-        for collector in self._collectors:
-            collector.keeper.pause()
+        for keeper in self._keepers:
+            keeper.pause()
 
     def run(self) -> None:
         """End the rest of all members."""
-        for collector in self._collectors:
-            collector.keeper.run()
+        for keeper in self._keepers:
+            keeper.run()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Make `seed` the run's seed, if one is given; return the seeds of the next episodes."""
@@ -71,11 +66,28 @@ class SimulatorsVecEnv(VecEnv):
 
     def reset(self) -> VecEnvObs:
         """Return the first observations of new episodes, begun in all members at once."""
-        observations = take_turns(
-            partial(collector.begin, options or None)
-            for collector, options in zip(self._collectors, self._options, strict=True)
-        )
+        with self._watcher.spending(Cause.TRANSPORT):
+            observations = take_turns(
+                partial(collector.begin, options or None)
+                for collector, options in zip(self._collectors, self._options, strict=True)
+            )
         self._reset_options()
+        self._keep_reset_infos()
+        return self._stack(observations)
+
+    def snapshot(self) -> list[EpisodeState]:
+        """Return how far each member is; cheap, and not changed by later steps."""
+        return [collector.state for collector in self._collectors]
+
+    def resume(self, states: Sequence[EpisodeState]) -> VecEnvObs:
+        """Return the observations after bringing each member to its state, all of them at once.
+
+        The steps that it takes are not counted; returns and lengths of the episodes go on as they were.
+        """
+        observations = take_turns(
+            partial(collector.resume, state)
+            for collector, state in zip(self._collectors, states, strict=True)
+        )
         self._keep_reset_infos()
         return self._stack(observations)
 
@@ -88,12 +100,16 @@ class SimulatorsVecEnv(VecEnv):
 
         Raises:
             FaultBudgetSpent: a member broke more often than its budget allows.
+            Diverged: an environment's reward is not finite.
         """
-        rows: list[Row] = take_turns(
-            partial(collector.step, action)
-            for collector, action in zip(self._collectors, self._actions, strict=True)
-        )
-        self._watcher.stepped(len(rows))
+        self._await_somebody()
+        with self._watcher.spending(Cause.TRANSPORT):
+            rows: list[Row] = take_turns(
+                partial(collector.step, action)
+                for collector, action in zip(self._collectors, self._actions, strict=True)
+            )
+        if valid := sum(row.info["valid"] for row in rows):
+            self._watcher.stepped(valid)
         dones = np.array([row.done for row in rows])
         if dones.any():
             self._keep_reset_infos()
@@ -105,9 +121,11 @@ class SimulatorsVecEnv(VecEnv):
         )
 
     def close(self) -> None:
-        """Close the environments; the simulators are their owner's."""
-        for env in self._targets(None):
-            env.close()
+        """End what goes on in the background and close the environments; the simulators are their owner's."""
+        settle(self._keepers)
+        for keeper in self._keepers:
+            if not keeper.busy:
+                keeper.member.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return an attribute of the chosen environments, also one behind wrappers."""
@@ -138,6 +156,12 @@ class SimulatorsVecEnv(VecEnv):
 
     def _targets(self, indices: VecEnvIndices) -> list[Environment]:
         return [self._collectors[index].env for index in self._get_indices(indices)]
+
+    def _await_somebody(self) -> None:
+        """Return when a member can step or has become ready; rows that are all invalid help nobody."""
+        if all(keeper.busy or keeper.lost for keeper in self._keepers):
+            with self._watcher.spending(Cause.RECOVERING):
+                await_one(self._keepers, self._check)
 
     def _keep_reset_infos(self) -> None:
         self.reset_infos = [collector.reset_info for collector in self._collectors]

@@ -1,0 +1,178 @@
+"""A run that was interrupted is the run that was not: bit by bit, on fakes."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import random
+import signal
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.save_util import load_from_zip_file
+
+from palaestra_trainer import checkpoint, training
+from palaestra_trainer.configuration import load
+from palaestra_trainer.display import Lines
+from palaestra_trainer.errors import MasterLost
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.run_directory import RunDirectory
+
+SMALL = {"policy_kwargs": {"net_arch": [16]}}
+OFF_POLICY = SMALL | {"learning_starts": 50, "batch_size": 16, "buffer_size": 300}
+ON_POLICY = SMALL | {"learning_rate": "lin_1e-3"}
+ALGORITHMS = {
+    # The target network changes amid a rollout, and epsilon and learning rate with progress.
+    "DQN": OFF_POLICY | {"exploration_fraction": 0.7},
+    "PPO": ON_POLICY | {"n_steps": 64, "batch_size": 16, "n_epochs": 2},
+    "A2C": ON_POLICY,
+    # Its entropy coefficient is learned, by an optimiser of its own.
+    "SAC": OFF_POLICY,
+    "REINFORCE": ON_POLICY | {"episodes_per_update": 2},
+}
+
+
+def terminate():
+    """Ask the run to end, at whatever it does."""
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def lose_the_master():
+    """End the run amid a rollout; it saves where it last was whole."""
+    raise MasterLost("gone")
+
+
+def kill():
+    """End the run without a word."""
+    raise ZeroDivisionError("as good as a kill")
+
+
+INTERRUPTIONS = {terminate: 75, lose_the_master: 75, kill: 1}
+
+
+class Listening(Progress):
+    """Keeps step, return and length of each episode."""
+
+    def __init__(self, configuration):
+        super().__init__(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
+        self.ended = []
+
+    def collected(self, step, infos):
+        """Keep what ended in this step."""
+        super().collected(step, infos)
+        self.ended += [(step, *(info["episode"][key] for key in "rl")) for info in infos if "episode" in info]
+
+
+@pytest.fixture
+def attempt(fakes):
+    """Play one attempt; return its exit code. `interrupt` is called at one step of the first robot.
+
+    `episodes` becomes those up to the checkpoint that it began from, and its own.
+    """
+
+    def play(job, directory, episodes, at=0, interrupt=None):
+        configuration = load(job)
+        progress = Listening(configuration)
+        saved = checkpoint.newest(directory.checkpoints)
+        episodes[:] = [it for it in episodes if saved and it[0] <= saved.manifest.step]
+
+        def make_members(given):
+            members = fakes.make_members(given)
+            robot = members[0].robot
+            steps, advance = itertools.count(1), robot.advance
+            robot.advance = lambda: (next(steps) == at and interrupt(), advance())[1]
+            return members
+
+        around = training.Surroundings(make_members=make_members, display=Lines(), environment={})
+        end = training.Attempt(configuration, directory, progress, around).play()
+        episodes += progress.ended
+        return end.code
+
+    return play
+
+
+def tensors(path):
+    """Return every tensor of a model and its optimisers by name, to the last bit."""
+    _, parameters, variables = load_from_zip_file(path, device="cpu", load_data=False)
+
+    def walk(name, value):
+        if isinstance(value, dict):
+            for key in value:
+                yield from walk(f"{name}.{key}", value[key])
+        elif isinstance(value, torch.Tensor):
+            yield name, value.tolist()
+
+    return dict(walk("", parameters | (variables or {})))
+
+
+def outcome(directory):
+    """Return what a run came to, by name: all that its next step would depend on, and its evaluations."""
+    found = checkpoint.newest(directory.checkpoints)
+    state = json.loads((found.path / "state.json").read_text())
+    for episode in state["episodes"]:
+        del episode["t"]  # seconds
+    with np.load(found.path / "state.npz") as arrays:
+        state |= {name: array.tolist() for name, array in arrays.items()}
+    experience = {name: digest for name, digest in found.manifest.files.items() if "experience" in name}
+    lines = {"evaluations": directory.evaluations.read_text()}
+    return tensors(found.path / "model.zip") | state | experience | lines
+
+
+def differences(one, other):
+    """Return the names of what is not equal in two runs."""
+    this, that = outcome(one), outcome(other)
+    return [name for name in this.keys() | that.keys() if this.get(name) != that.get(name)]
+
+
+@pytest.fixture
+def job(write_job):
+    """Write the job of a short run of an algorithm."""
+
+    def write(name, collectors=1, actions="discrete", **hyperparameters):
+        options = {"max_steps": 30, "actions": "continuous" if name == "SAC" else actions}
+        return write_job(
+            collectors=collectors,
+            algorithm={"name": name, "hyperparameters": ALGORITHMS[name] | hyperparameters},
+            environment={"id": "MoveToTargetEnv-v0", "options": options},
+            steps=500,
+            evaluation={"everySteps": 150, "episodes": 2},
+            checkpoint={"everySteps": 100, "keep": 2},
+        )
+
+    return write
+
+
+@pytest.mark.parametrize("collectors", [1, 2])
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name, collectors):
+    """By a signal, amid a rollout and by a kill, at random points; equal to the last bit.
+
+    Compared are returns, evaluations, parameters, optimisers, experience and random generators.
+    """
+    whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
+    points = random.Random(f"{name} {collectors}")
+    ended, played = [], []
+
+    assert attempt(job(name, collectors), whole, ended) == 0
+    for interrupt, expected in INTERRUPTIONS.items():
+        point = points.randint(30, 150 // collectors)
+        assert attempt(job(name, collectors), parts, played, point, interrupt) == expected
+    assert attempt(job(name, collectors), parts, played) == 0
+
+    assert played == ended
+    assert differences(whole, parts) == []
+
+
+@pytest.mark.parametrize("name", ["PPO", "SAC"])
+def test_state_dependent_exploration_goes_on_with_its_noise(attempt, job, tmp_path, name):
+    """It is drawn once a rollout, before the boundary."""
+    whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
+    noisy = job(name, actions="continuous", use_sde=True, sde_sample_freq=7)
+
+    assert attempt(noisy, whole, []) == 0
+    assert attempt(noisy, parts, [], 77, lose_the_master) == 75
+    assert attempt(noisy, parts, []) == 0
+
+    assert differences(whole, parts) == []

@@ -1,0 +1,239 @@
+"""Keeping a real simulator going: killed, stopped, without its sidecar, and ended amid a start."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
+from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.simulators.sidecar import Sidecar
+from palaestra_trainer.simulators.simulator import Simulator
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+
+STAND = np.zeros(1, dtype=np.int64)
+DEADLINE_S = 5.0  # of a service call
+PATIENCE_S = 60.0
+
+
+class Restarts(Nobody):
+    """A watcher that counts them."""
+
+    def __init__(self):
+        self.count = 0
+
+    def restarted(self, simulator, *, recycled):
+        """Count it."""
+        del simulator, recycled
+        self.count += 1
+
+
+class Trained:
+    """One simulator in a vector environment, started.
+
+    Attributes:
+        keeper: of the simulator.
+        restarts: how many there were.
+    """
+
+    def __init__(self, sidecar):
+        self._sidecar = sidecar
+        self.restarts = Restarts()
+        simulator = Simulator("collect-0", sidecar, make, 20.0)
+        self.keeper = Keeper(simulator, Care(restart_limit=20), self.restarts)
+        self.keeper.begin_start()
+        await_one([self.keeper])
+        assert self.keeper.up()
+        self.env = SimulatorsVecEnv([self.keeper], 0)
+        self.env.reset()
+        self.step()
+
+    @property
+    def pid(self):
+        """The simulator's process."""
+        return self._sidecar.state().pid
+
+    def step(self):
+        """Take a step; return whether its row is valid, and its info."""
+        _, _, _, (info,) = self.env.step(STAND)
+        return info["valid"], info
+
+    def break_by(self, number):
+        """Send a signal to the simulator; return the fault that this was."""
+        os.kill(self.pid, number)
+        return self.fault()
+
+    def fault(self):
+        """Step until the simulator is found broken; return the fault."""
+        while (info := self.step()[1])["valid"]:
+            pass
+        return info["sim_fault"]
+
+    def go_on(self):
+        """Step until a row is valid again; return the seconds that it took."""
+        began = time.monotonic()
+        while not self.step()[0]:
+            assert time.monotonic() - began < PATIENCE_S
+        return time.monotonic() - began
+
+    def close(self):
+        """End everything."""
+        self.env.close()
+        self.keeper.stop()
+
+
+@pytest.fixture
+def train(master):
+    """Return a started simulator; what it is started by may be given."""
+    del master
+    made = []
+
+    def begin(sidecar=None, options=()):
+        launcher = None if sidecar else ProcessLauncher("arena", options=options)
+        made.append((Trained(sidecar or launcher), launcher))
+        return made[-1][0]
+
+    yield begin
+    for trained, launcher in made:
+        trained.close()
+        if launcher is not None:
+            launcher.close()
+
+
+def test_a_killed_simulator_is_played_in_again_within_ten_seconds(train):
+    """As after a bus error, or when the kernel takes its memory."""
+    trained = train()
+
+    fault = trained.break_by(signal.SIGKILL)
+
+    assert fault["kind"] == "dead"
+    assert trained.go_on() < 10.0
+    assert trained.restarts.count == 1
+
+
+def test_a_stopped_simulator_is_noticed_within_its_deadline_and_a_second(train):
+    """Its socket stays open: nothing but a deadline tells."""
+    trained = train()
+    began = time.monotonic()
+
+    fault = trained.break_by(signal.SIGSTOP)
+
+    assert fault["kind"] == "hung"
+    assert time.monotonic() - began < DEADLINE_S + 1.0
+    assert trained.go_on() < 10.0
+
+
+def test_faults_leave_no_thread_no_descriptor_and_no_process(train):
+    """A week of training has thousands of them."""
+    trained = train()
+    trained.break_by(signal.SIGKILL)
+    trained.go_on()
+    before = left()
+
+    for _ in range(10):
+        trained.break_by(signal.SIGKILL)
+        trained.go_on()
+
+    assert trained.restarts.count == 11
+    assert left() == before
+
+
+def left():
+    """Return the threads of this process, and the numbers of its descriptors and child processes."""
+    for thread in threading.enumerate():
+        if thread.name.startswith("keeper-"):
+            thread.join(PATIENCE_S)
+    descriptors = list(Path("/proc/self/fd").iterdir())
+    tasks = Path("/proc/self/task").iterdir()
+    children = [pid for task in tasks for pid in (task / "children").read_text().split()]
+    return sorted(thread.name for thread in threading.enumerate()), len(descriptors), len(children)
+
+
+def test_ending_amid_a_start_waits_for_nobody(train):
+    """A simulator may take a minute to come up; the pod's time to end is shorter."""
+    trained = train(options=["--fault=slow_start:start=2,latency_ms=15000"])
+    trained.break_by(signal.SIGKILL)
+    began = time.monotonic()
+
+    settle([trained.keeper])
+
+    assert not trained.keeper.busy
+    assert time.monotonic() - began < 5.0
+
+
+class OwnSidecar:
+    """A sidecar at an address that stays, as that of a container does, whatever becomes of it."""
+
+    def __init__(self):
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.address = f"127.0.0.1:{free.getsockname()[1]}"
+        self.process = None
+
+    def start(self):
+        """Start it, as a kubelet would."""
+        self.process = subprocess.Popen(
+            [
+                Path(sys.executable).with_name("palaestra-sidecar"),
+                "--driver=stub",
+                "--world=arena",
+                f"--control={self.address}",
+                "--health=127.0.0.1:0",
+            ],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def kill(self):
+        """Let it be gone, and the simulator with it."""
+        self.process.kill()
+        self.process.wait(PATIENCE_S)
+
+
+@pytest.fixture
+def own_sidecar():
+    """A sidecar that is started and killed by the test."""
+    own = OwnSidecar()
+    own.start()
+    yield own
+    own.kill()
+
+
+def test_a_sidecar_that_is_gone_is_waited_for(train, own_sidecar):
+    """Its container is started again within a minute; ten tries would be over within a second."""
+    trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
+    own_sidecar.kill()
+    assert trained.fault()["kind"] == "dead"
+    assert trained.keeper.busy
+    with pytest.raises(SimulatorDead):
+        trained.keeper.member.sidecar.state()
+
+    own_sidecar.start()
+
+    assert trained.go_on() < 20.0
+    assert trained.restarts.count == 1
+
+
+def test_ending_does_not_wait_for_a_sidecar_that_is_gone(train, own_sidecar):
+    """It may be gone because the pod is ending."""
+    trained = train(Sidecar(f"http://{own_sidecar.address}", "collect-0"))
+    own_sidecar.kill()
+    trained.fault()
+    began = time.monotonic()
+
+    trained.close()
+
+    assert not trained.keeper.busy
+    assert time.monotonic() - began < 5.0

@@ -1,0 +1,112 @@
+"""How many faults are borne, and what a step may take."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
+from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.pace import Pace
+from palaestra_trainer.turns import let_others, take_turns
+
+DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("robotino", "does not answer")
+
+
+def test_the_message_tells_flapping_from_an_accident():
+    """Kinds, window and remedy: a person reads it hours later, and nothing else."""
+    budget = RestartBudget("collect-0", Care(restart_limit=10), clock=lambda: 0.0)
+    for fault in [DEAD] * 9 + [HUNG]:
+        budget.spend(fault)
+
+    with pytest.raises(FaultBudgetSpent) as told:
+        budget.spend(DEAD)
+
+    assert str(told.value) == (
+        "collect-0: flapping: 10 restarts within 600 s did not mend it "
+        "(dead 9, hung 1; last: robotino: closed the connection); "
+        "read the simulator's log, or raise restart.limit"
+    )
+
+
+def test_a_budget_of_nothing_bears_nothing():
+    """Whoever sets restart.limit to 0 wants to see the first fault."""
+    budget = RestartBudget("collect-0", Care(restart_limit=0))
+
+    with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 0 restarts within 600 s .* \(last: robotino: "):
+        budget.spend(DEAD)
+
+
+def test_three_restarts_in_a_short_time_are_flapping():
+    """Two may be chance; what is long ago does not count."""
+    times = iter([0.0, 50.0, 99.0, 100.0, 199.0])
+    budget = RestartBudget("collect-0", Care(restart_within_s=100.0), clock=lambda: next(times))
+    flapping = []
+    for _ in range(5):
+        budget.spend(DEAD)
+        flapping.append(budget.flapping)
+
+    assert flapping == [False, False, True, True, False]
+
+
+@pytest.mark.parametrize(("left", "least", "losses"), [(4, 2, 2), (4, None, 0), (1, 1, 0), (2, 5, 0)])
+def test_a_group_loses_as_many_as_it_can_do_without(left, least, losses):
+    """By default it can do without none."""
+    group = Group(left, least)
+
+    assert [group.lose_one() for _ in range(left)] == [True] * losses + [False] * (left - losses)
+
+
+@pytest.mark.parametrize(
+    ("usual", "seconds", "slow"),
+    [(0.004, 0.051, True), (0.004, 0.049, False), (0.010, 0.099, False), (0.010, 0.101, True)],
+)
+def test_slow_is_a_step_of_ten_times_the_median_and_fifty_milliseconds(usual, seconds, slow):
+    """The one leaves out ordinary jitter, the other what nobody would notice."""
+    pace = Pace()
+    assert not any(pace.slow(usual) for _ in range(10))
+
+    assert pace.slow(seconds) is slow
+
+
+def test_the_first_steps_are_never_slow():
+    """There is nothing to compare them with, and connecting takes its time."""
+    pace = Pace()
+
+    assert not any(pace.slow(1.0 + number) for number in range(10))
+
+
+def test_a_simulator_that_has_become_slower_is_not_told_for_ever():
+    """After fifty steps that is what it is."""
+    pace = Pace()
+    for _ in range(200):
+        pace.slow(0.004)
+
+    assert sum(pace.slow(0.1) for _ in range(200)) == 50
+
+
+def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
+    """Steps are taken in turns of one thread; each is measured by its own part of the time."""
+    told = []
+    watcher = Nobody()
+    watcher.slow = lambda name, seconds: told.append((name, seconds > 0.05))
+    members = [make_member("collect-0"), make_member("collect-1")]
+    keepers = [Keeper(member, watcher=watcher) for member in members]
+    for keeper in keepers:
+        keeper.reset(1)
+
+    for work in [let_others] * 11 + [compute_for_a_while]:
+        members[0].take_step, members[1].take_step = let_others, work
+        take_turns([lambda: keepers[0].step(0), lambda: keepers[1].step(0)])
+
+    assert told == [("collect-1", True)]
+
+
+def compute_for_a_while():
+    """Take a tenth of a second."""
+    until = time.perf_counter() + 0.1
+    while time.perf_counter() < until:
+        pass

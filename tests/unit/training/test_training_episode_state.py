@@ -1,0 +1,142 @@
+"""How far each member is, kept cheaply and brought back through the environment's interface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from palaestra_trainer.simulators.episode_state import ActionLog, EpisodeState
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+
+RIGHT, LEFT = 1, 0
+
+
+@pytest.fixture
+def make_env(make_member):
+    """Make a VecEnv of corridors; each argument says when a member breaks."""
+
+    def make(*faults, run_seed=1):
+        members = [make_member(f"collect-{index}", **given) for index, given in enumerate(faults)]
+        return SimulatorsVecEnv([Keeper(member) for member in members], run_seed), members
+
+    return make
+
+
+def play(env, actions):
+    """Return what vector steps with these actions told."""
+    return [env.step(np.full(env.num_envs, action)) for action in actions]
+
+
+def told(rows):
+    """Return what of some rows must be the same when they are played again."""
+    return [
+        (observations.tolist(), rewards.tolist(), dones.tolist(), [told_of(info) for info in infos])
+        for observations, rewards, dones, infos in rows
+    ]
+
+
+def told_of(info):
+    """Return an info without its wall time."""
+    episode = info.get("episode")
+    return episode and (episode["r"], episode["l"])
+
+
+def test_before_the_first_reset_no_episode_is_under_way(make_env):
+    """A run may be interrupted while its simulators start."""
+    env, _ = make_env({}, {})
+
+    assert [(state.episode, state.actions) for state in env.snapshot()] == [(0, None)] * 2
+
+
+def test_a_snapshot_has_the_episode_s_number_and_its_actions(make_env):
+    """That is all that brings it back."""
+    env, _ = make_env({})
+    env.reset()
+    play(env, [RIGHT, RIGHT, RIGHT, LEFT, RIGHT])
+
+    (state,) = env.snapshot()
+
+    assert state.episode == 1
+    assert state.actions.tolist() == [LEFT, RIGHT]
+
+
+def test_a_snapshot_stays_as_it_was(make_env):
+    """It is taken every few steps and saved, if ever, when others have followed."""
+    env, _ = make_env({})
+    env.reset()
+    play(env, [LEFT] * 2)
+    (state,) = env.snapshot()
+
+    play(env, [LEFT] * 5)
+    env.reset()
+    play(env, [RIGHT] * 2)
+
+    assert (state.episode, state.actions.tolist()) == (0, [LEFT] * 2)
+
+
+@pytest.mark.parametrize("steps", range(12))
+def test_what_follows_a_resume_is_what_would_have_been(make_env, steps):
+    """Observations, rewards, ends, returns and lengths, from anywhere in an episode."""
+    actions = [RIGHT, LEFT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT, LEFT, RIGHT, RIGHT, RIGHT] * 2
+    env, _ = make_env({}, {})
+    env.reset()
+    last = play(env, actions[:steps])[-1][0] if steps else env.reset()
+    states = env.snapshot()
+
+    again, members = make_env({}, {})
+    observations = again.resume(states)
+
+    assert observations.tolist() == last.tolist()
+    assert told(play(again, actions[steps:])) == told(play(env, actions[steps:]))
+    assert [it.episode for it in again.snapshot()] == [it.episode for it in env.snapshot()]
+    assert len(members[0].env.seeds) <= len(actions)
+
+
+def test_members_are_resumed_where_each_one_was(make_env):
+    """One is ahead of the other, and one has nothing under way."""
+    env, members = make_env({}, {}, {})
+
+    observations = env.resume(
+        [EpisodeState(4, np.array([RIGHT])), EpisodeState(2, np.array([], np.int64)), EpisodeState(9, None)]
+    )
+
+    assert observations[:, 0].tolist() == [np.float32(0.1), 0.0, 0.0]
+    assert [state.episode for state in env.snapshot()] == [4, 2, 9]
+    assert [info["seed"] for info in env.reset_infos] == [member.env.seeds[-1] for member in members]
+
+
+def test_an_episode_that_ends_early_when_it_is_played_again_is_left(make_env):
+    """An environment that does not repeat is still one to learn in."""
+    env, _ = make_env({})
+
+    observations = env.resume([EpisodeState(4, np.array([RIGHT] * 5))])
+
+    assert observations[0][0] == 0.0
+    assert env.snapshot()[0].episode == 5
+
+
+@pytest.mark.parametrize("action", [1, np.int64(1), np.float32(0.5), np.zeros((2, 3), np.float32)])
+def test_a_log_keeps_actions_as_they_are(action):
+    """Bit for bit, also beyond the room it began with."""
+    log = ActionLog()
+    early = log.taken()
+    for _ in range(40):
+        log.append(action)
+
+    assert len(early) == 0
+    assert log.taken().shape == (40, *np.shape(action))
+    assert log.taken().dtype == np.asarray(action).dtype
+    assert (log.taken() == action).all()
+
+
+def test_continuous_actions_are_kept_by_row():
+    """Whoever drives with velocities has several numbers an action."""
+    log = ActionLog()
+    space = spaces.Box(-1.0, 1.0, (3,), np.float32, seed=1)
+    wanted = [space.sample() for _ in range(20)]
+    for action in wanted:
+        log.append(action)
+
+    assert log.taken().tobytes() == np.array(wanted).tobytes()

@@ -1,0 +1,77 @@
+"""Whole runs in which simulators break, come back late, or never."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+DISCRETE = ["DQN", "PPO", "A2C", "REINFORCE"]
+
+
+@pytest.fixture
+def pool(job, make_configuration):
+    """Make a configuration of a run with several collectors, of which `least` are enough."""
+
+    def make(name, *, least, collectors=2, evaluators=1, **changes):
+        content = job(name, collectors=collectors, evaluators=evaluators, **changes).model_dump(by_alias=True)
+        for simulator in content["simulators"]:
+            simulator["minSimulators"] = least
+            simulator["restart"] = {"limit": 2}
+        return make_configuration(**content)
+
+    return make
+
+
+def summary(directory):
+    """Return how a run ended."""
+    return json.loads(directory.summary.read_text())
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_run_goes_on_without_a_simulator_that_was_given_up(play, pool, directory, name):
+    """It takes longer, and learns as much."""
+    code, members = play(pool(name, least=1), {"collect-0": {"steps": range(10, 1000)}})
+
+    assert code == 0
+    assert summary(directory)["steps"] >= 100
+    assert members["collect-0"].log.count("restart") == 2
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_training_begins_without_a_simulator_that_does_not_come_up(play, pool, directory, name):
+    """Its rows have no observation yet, and nothing is learnt from them."""
+    code, members = play(pool(name, least=1), {"collect-0": {"starts": range(1, 1000)}})
+
+    assert code == 0
+    assert summary(directory)["steps"] >= 100
+    assert members["collect-0"].env.seeds == []
+
+
+def test_an_evaluation_has_all_its_episodes_whoever_is_left(play, pool, directory):
+    """The simulator that measures may be the one that breaks."""
+    faults = {"evaluate-0": {"steps": range(3, 1000)}}
+
+    code, members = play(pool("DQN", least=1, collectors=1, evaluators=2), faults)
+
+    assert code == 0
+    assert summary(directory)["success_rate"] is not None
+    assert len(set(members["evaluate-1"].env.seeds)) == 4
+
+
+def test_too_few_simulators_end_the_run(play, pool, last_word):
+    """The message names the simulator, what broke it, and what can be done."""
+    code, _ = play(pool("DQN", least=2), {"collect-1": {"steps": range(10, 1000)}})
+
+    assert code == 80
+    assert "collect-1: 2 restarts within 600 s did not mend it (dead 2; last: " in last_word().reason
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_simulator_that_is_mended_for_long_holds_up_nobody(play, pool, directory, name):
+    """The run is over before it comes back, and ends it."""
+    code, members = play(pool(name, least=2), {"collect-0": {"steps": [10], "held": True}})
+
+    assert code == 0
+    assert summary(directory)["steps"] >= 100
+    assert members["collect-0"].log[-2:] == ["restart", "stop"]

@@ -1,0 +1,26 @@
+"""Saving and finding the state from which a run goes on, as if it had never ended.
+
+A checkpoint is a folder `<step>/` with the model's tensors, its experience, everything else that its next
+step depends on and, written last, a manifest with the digest of each file. It is made under a temporary
+name and renamed, so it is there as a whole or not at all; one that was damaged later is skipped. Loading
+unpickles nothing: the model is rebuilt from the configuration, tensors are read with `weights_only`, the
+rest is JSON and plain arrays. How a resumed run comes to be the same: docs/decisions/0008-exact-resume.md.
+"""
+
+from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, describe, refuse_another_run
+from palaestra_trainer.checkpoint.state import State
+from palaestra_trainer.checkpoint.store import Saver, newest, restore
+from palaestra_trainer.checkpoint.tensors import finite, load_tensors
+
+__all__ = [
+    "Checkpoint",
+    "Manifest",
+    "Saver",
+    "State",
+    "describe",
+    "finite",
+    "load_tensors",
+    "newest",
+    "refuse_another_run",
+    "restore",
+]

@@ -1,0 +1,140 @@
+"""What a checkpoint says of itself, and whether it is what it says."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.errors import ConfigurationError
+
+MANIFEST = "manifest.json"
+EXPERIENCE = "experience"
+# 1 lacked random generators and the episodes under way, so a run could go on from it, but not exactly.
+FORMAT = 2
+_OLD_FORMATS = (1,)  # without a digest of the manifest itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Manifest:
+    """What a checkpoint says of itself.
+
+    Attributes:
+        step: valid environment steps learned from.
+        seed: the replica's seed.
+        algorithm: name and hyperparameters it was made with.
+        environment: id, reward and options it was made with.
+        counters: counters of the run, see `progress.Counters`.
+        files: sha256 of each file beside the manifest.
+        format: version of this layout.
+    """
+
+    step: int
+    seed: int
+    algorithm: dict[str, Any]
+    environment: dict[str, Any]
+    counters: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+    format: int = FORMAT
+
+    def write(self, folder: Path) -> None:
+        """Write it into a checkpoint's folder, with a digest of its own."""
+        content = asdict(self)
+        text = json.dumps(content | {"digest": _digest_of(content)}, indent=2)
+        (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Checkpoint:
+    """A checkpoint whose files are what its manifest says.
+
+    Attributes:
+        path: its folder.
+        manifest: what it says of itself.
+        lost: files of experience that are damaged; the rest is whole.
+    """
+
+    path: Path
+    manifest: Manifest
+    lost: frozenset[str] = frozenset()
+
+
+def describe(configuration: Configuration, step: int, counters: Mapping[str, Any]) -> Manifest:
+    """Return the manifest of a checkpoint of this run, its files not named yet."""
+    return Manifest(
+        step=step,
+        seed=configuration.seed,
+        algorithm=configuration.algorithm.model_dump(mode="json"),
+        environment=configuration.environment.model_dump(mode="json"),
+        counters=dict(counters),
+    )
+
+
+def read(folder: Path) -> Checkpoint:
+    """Return the checkpoint in a folder, its files compared with their digests.
+
+    Raises:
+        OSError, ValueError, TypeError: it is damaged, not only in its experience.
+        ConfigurationError: it is whole and of a format that this release does not read.
+    """
+    manifest = _read_manifest(folder)
+    damaged = [name for name, digest in manifest.files.items() if not _is(folder / name, digest)]
+    for name in damaged:
+        if not name.startswith(EXPERIENCE):
+            raise ValueError(f"{name} is not what the manifest says")
+    return Checkpoint(path=folder, manifest=manifest, lost=frozenset(damaged))
+
+
+def digest_of(path: Path) -> str:
+    """Return the sha256 of a file's contents."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def refuse_another_run(checkpoint: Checkpoint, configuration: Configuration) -> None:
+    """Return if the checkpoint is of a run of this configuration.
+
+    Raises:
+        ConfigurationError: it is of another algorithm or environment.
+    """
+    wanted_run = describe(configuration, 0, {})
+    for part in ("algorithm", "environment"):
+        saved, wanted = getattr(checkpoint.manifest, part), getattr(wanted_run, part)
+        for key in wanted:
+            if saved.get(key) != wanted[key]:
+                raise ConfigurationError(
+                    f"{part}.{key}: the run in {checkpoint.path.parent.parent} has "
+                    f"{saved.get(key)!r}, not {wanted[key]!r}; use another run directory"
+                )
+
+
+def _read_manifest(folder: Path) -> Manifest:
+    content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    if not isinstance(content, dict):
+        raise TypeError(f"{MANIFEST} is not an object")
+    digest = content.pop("digest", None)
+    whole = digest == _digest_of(content)
+    number = content.get("format")
+    if number in _OLD_FORMATS or (whole and number != FORMAT):
+        raise ConfigurationError(
+            f"{folder}: is of format {number}, of another release than this one, which reads {FORMAT}; "
+            "go on with the release that wrote it, or use another run directory"
+        )
+    if not whole:
+        raise ValueError(f"{MANIFEST} is not what its digest says")
+    return Manifest(**content)
+
+
+def _digest_of(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _is(path: Path, digest: str) -> bool:
+    try:
+        return digest_of(path) == digest
+    except OSError:
+        return False

@@ -1,0 +1,171 @@
+"""Everything that the next step of a run depends on and that is neither a saved tensor nor experience.
+
+It is taken at each rollout boundary, which off policy is every few steps, so taking it costs some ten
+microseconds: references to what nobody writes to any more, and copies of what is small.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
+from palaestra_trainer.checkpoint.generators import Generators
+from palaestra_trainer.simulators.episode_state import EpisodeState
+
+STATE = "state.json"
+ARRAYS = "state.npz"
+# What the algorithms count and set while they train; each is kept if the model has it.
+_NUMBERS = (
+    "num_timesteps",
+    "_n_updates",
+    "_n_calls",
+    "_episode_num",
+    "_current_progress_remaining",
+    "exploration_rate",
+)
+_NOISE = ("exploration_mat", "exploration_matrices")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """A run at a rollout boundary.
+
+    Attributes:
+        numbers: what the algorithm counts, by attribute.
+        generators: where the random generators stand.
+        observation: the last one, a row for each member.
+        episode_starts: which rows of it are the first of an episode.
+        episodes: statistics of the last episodes, as Stable-Baselines3 keeps them.
+        successes: whether the last episodes succeeded.
+        positions: where the replay buffer stands; None without one.
+        members: how far each collecting simulator is.
+        rollout: what else is counted amid an episode, as JSON data; the conductor's own.
+        noise: matrices of state-dependent exploration, which are drawn before a boundary; none without it.
+        targets: what a rollout changes of the networks, copied; never written, since it is part of the model.
+    """
+
+    numbers: dict[str, float]
+    generators: Generators
+    observation: np.ndarray
+    episode_starts: np.ndarray
+    episodes: Sequence[dict[str, Any]]
+    successes: Sequence[Any]
+    positions: Positions | None
+    members: Sequence[EpisodeState]
+    rollout: Mapping[str, Any]
+    noise: Mapping[str, torch.Tensor]
+    targets: Sequence[torch.Tensor] = ()
+
+    @classmethod
+    def of(cls, model: BaseAlgorithm, members: Sequence[EpisodeState], rollout: Mapping[str, Any]) -> State:
+        """Return the state of a model that has begun to learn and is at a rollout boundary."""
+        buffer = replay_buffer(model)
+        return cls(
+            numbers={name: getattr(model, name) for name in _NUMBERS if hasattr(model, name)},
+            generators=Generators.now(model.action_space),
+            observation=np.asarray(model._last_obs),  # noqa: SLF001 - Stable-Baselines3 keeps it there
+            episode_starts=np.asarray(model._last_episode_starts),  # noqa: SLF001 - as above
+            episodes=tuple(model.ep_info_buffer or ()),
+            successes=tuple(model.ep_success_buffer or ()),
+            positions=buffer.positions if buffer else None,
+            members=members,
+            rollout=rollout,
+            noise={name: getattr(_noise_of(model), name) for name in _NOISE if model.use_sde},
+            targets=[parameter.detach().clone() for parameter in _targets(model)],
+        )
+
+    def put_back(self, model: BaseAlgorithm) -> None:
+        """Let the model go on from here; its other tensors and its experience are as they were here."""
+        for name, value in self.numbers.items():
+            setattr(model, name, value)
+        self.generators.put_back(model.action_space)
+        model._last_obs = self.observation  # noqa: SLF001 - see of()
+        model._last_episode_starts = self.episode_starts  # noqa: SLF001 - see of()
+        model.ep_info_buffer = deque(self.episodes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
+        model.ep_success_buffer = deque(self.successes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
+        buffer = replay_buffer(model)
+        if buffer and self.positions:
+            buffer.positions = self.positions
+        for name, matrix in self.noise.items():
+            setattr(_noise_of(model), name, matrix)
+        with torch.no_grad():
+            for parameter, copy in zip(_targets(model), self.targets, strict=False):
+                parameter.copy_(copy)
+
+    def write(self, folder: Path) -> None:
+        """Write it into a folder, but for `targets`."""
+        arrays = {"observation": self.observation, "episode_starts": self.episode_starts}
+        for index, member in enumerate(self.members):
+            if member.actions is not None:
+                arrays[f"actions-{index}"] = member.actions
+        arrays |= {name: matrix.detach().numpy() for name, matrix in self.noise.items()}
+        np.savez(folder / ARRAYS, allow_pickle=False, **arrays)
+        content = {
+            "numbers": self.numbers,
+            "generators": self.generators.to_json(),
+            "episodes": self.episodes,
+            "successes": self.successes,
+            "positions": self.positions,
+            "members": [member.episode for member in self.members],
+            "rollout": self.rollout,
+        }
+        text = json.dumps(content, default=_plain)
+        (folder / STATE).write_text(text + "\n", encoding="utf-8")
+
+    @classmethod
+    def read(cls, folder: Path) -> State:
+        """Return what `write` wrote there.
+
+        Raises:
+            OSError, ValueError, TypeError, KeyError: it is damaged.
+        """
+        content = json.loads((folder / STATE).read_text(encoding="utf-8"))
+        with np.load(folder / ARRAYS, allow_pickle=False) as file:
+            arrays = dict(file)
+        positions = content["positions"]
+        return cls(
+            numbers=content["numbers"],
+            generators=Generators.from_json(content["generators"]),
+            observation=arrays["observation"],
+            episode_starts=arrays["episode_starts"],
+            episodes=content["episodes"],
+            successes=content["successes"],
+            positions=positions and Positions(positions[0], positions[1], tuple(positions[2])),
+            members=[
+                EpisodeState(episode, arrays.get(f"actions-{index}"))
+                for index, episode in enumerate(content["members"])
+            ],
+            rollout=content["rollout"],
+            noise={name: torch.from_numpy(arrays[name]) for name in _NOISE if name in arrays},
+        )
+
+
+def replay_buffer(model: BaseAlgorithm) -> ValidReplayBuffer | None:
+    """Return the model's replay buffer; None on policy."""
+    buffer = getattr(model, "replay_buffer", None)
+    return buffer if isinstance(buffer, ValidReplayBuffer) else None
+
+
+def _noise_of(model: BaseAlgorithm) -> Any:
+    """Return the distribution that holds the noise of state-dependent exploration."""
+    return getattr(model, "actor", model.policy).action_dist
+
+
+def _targets(model: BaseAlgorithm) -> list[torch.Tensor]:
+    """Return the tensors that DQN changes amid a rollout; no other algorithm changes any."""
+    target = getattr(model, "q_net_target", None)
+    return [] if target is None else list(target.state_dict(keep_vars=True).values())
+
+
+def _plain(value: Any) -> Any:
+    """Return a number of NumPy's as one of Python's."""
+    return value.item()

@@ -1,0 +1,172 @@
+"""The folder of a run's checkpoints: which is the newest, and how another one comes to it."""
+
+from __future__ import annotations
+
+import dataclasses
+import errno
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import structlog
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from palaestra_trainer.checkpoint import experience, manifest
+from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, digest_of
+from palaestra_trainer.checkpoint.state import State, replay_buffer
+from palaestra_trainer.checkpoint.tensors import load_tensors
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import sync
+
+log = structlog.get_logger(__name__)
+
+MODEL = "model.zip"
+
+
+class Saver:
+    """Writes the checkpoints of one attempt.
+
+    Args:
+        folder: where they are; it need not be there yet.
+        keep: how many of the newest stay.
+        resumed: the checkpoint that the attempt went on from.
+    """
+
+    def __init__(self, folder: Path, keep: int, resumed: Checkpoint | None = None) -> None:
+        self._folder = folder
+        self._keep = keep
+        self._before = resumed
+
+    def save(self, model: BaseAlgorithm, state: State, described: Manifest) -> bool:
+        """Write a checkpoint of the model, which is put back to `state`; remove all but the newest.
+
+        Returns whether it was written: a full disk is logged, and leaves those that
+        were there as they were.
+
+        Raises:
+            OSError: it cannot be written for another reason than a full disk.
+        """
+        state.put_back(model)
+        draft = self._folder / f".{described.step}.draft"
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            _tidy(self._folder)
+            draft.mkdir()
+            complete = self._write(draft, model, state, described)
+            target = _put_in_place(draft)
+        except OSError as error:
+            shutil.rmtree(draft, ignore_errors=True)
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            log.error(  # noqa: TRY400 - one clear line
+                "checkpoint not written: disk full", step=described.step, folder=str(self._folder)
+            )
+            return False
+        self._before = Checkpoint(path=target, manifest=complete)
+        if buffer := replay_buffer(model):
+            buffer.changed.clear()
+        self._prune(described.step)
+        return True
+
+    def _write(self, draft: Path, model: BaseAlgorithm, state: State, described: Manifest) -> Manifest:
+        model.save(draft / MODEL)
+        state.write(draft)
+        files = {}
+        for file in sorted(draft.iterdir()):
+            sync(file)
+            files[file.name] = digest_of(file)
+        if buffer := replay_buffer(model):
+            files |= experience.write(buffer, draft, self._before)
+        complete = dataclasses.replace(described, files=files)
+        complete.write(draft)
+        sync(draft / manifest.MANIFEST)
+        sync(draft)
+        return complete
+
+    def _prune(self, step: int) -> None:
+        """Remove all but the newest; those beyond `step` are damaged, or of a way that was not gone on."""
+        reached = sorted((path for path in _steps(self._folder) if _step(path) <= step), key=_step)
+        for path in set(_steps(self._folder)).difference(reached[-self._keep :]):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def newest(folder: Path) -> Checkpoint | None:
+    """Return the newest checkpoint that is undamaged; None if there is none.
+
+    Where chunks of experience are shared, damage to one may be damage to all: then the
+    newest is returned whose other files are whole.
+
+    Raises:
+        ConfigurationError: it is of a format that this release does not read.
+    """
+    if folder.is_dir():
+        _tidy(folder)
+    rest = None
+    for path in sorted(_steps(folder), key=_step, reverse=True):
+        try:
+            found = manifest.read(path)
+        except ConfigurationError:
+            raise
+        except (OSError, ValueError, TypeError) as error:
+            log.warning("damaged checkpoint skipped", path=str(path), fact=str(error))
+            continue
+        if not found.lost:
+            return found
+        log.warning(
+            "damaged checkpoint skipped", path=str(path), fact=f"{len(found.lost)} files of experience"
+        )
+        rest = rest or found
+    if rest:
+        log.warning("no checkpoint is whole: going on without the lost experience", path=str(rest.path))
+    return rest
+
+
+def restore(checkpoint: Checkpoint, model: BaseAlgorithm) -> State:
+    """Put tensors and experience of a checkpoint into a new model of the same configuration.
+
+    Returns the rest, which is to be put back last, when nothing is left to do before learning.
+
+    Raises:
+        ConfigurationError: the tensors are of another kind of model.
+    """
+    load_tensors(checkpoint.path / MODEL, model)
+    state = State.read(checkpoint.path)
+    buffer = replay_buffer(model)
+    if buffer and state.positions:
+        buffer.positions = state.positions
+        experience.read(buffer, checkpoint)
+        state = dataclasses.replace(state, positions=buffer.positions)
+    return state
+
+
+def _put_in_place(draft: Path) -> Path:
+    """Give a finished draft its name; an older one of the same step is there until then."""
+    name = draft.name.removeprefix(".").removesuffix(".draft")
+    target, replaced = draft.with_name(name), draft.with_name(f".{name}.replaced")
+    if target.exists():
+        target.rename(replaced)
+    draft.rename(target)
+    sync(draft.parent)
+    shutil.rmtree(replaced, ignore_errors=True)
+    return target
+
+
+def _tidy(folder: Path) -> None:
+    """Finish or take back what a kill interrupted."""
+    for draft in folder.glob(".*.draft"):
+        shutil.rmtree(draft, ignore_errors=True)
+    for replaced in folder.glob(".*.replaced"):
+        target = folder / replaced.name.removeprefix(".").removesuffix(".replaced")
+        if target.exists():
+            shutil.rmtree(replaced, ignore_errors=True)
+        else:
+            replaced.rename(target)
+
+
+def _steps(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        yield from (path for path in folder.iterdir() if path.is_dir() and path.name.isdigit())
+
+
+def _step(path: Path) -> int:
+    return int(path.name)

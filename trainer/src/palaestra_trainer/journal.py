@@ -1,0 +1,68 @@
+"""What a run has come to since its last checkpoint, for the attempt after one that was killed.
+
+Whoever is killed saves nothing. Its steps are played again, but its time and its faults are over for good;
+so these are written down every few seconds. Nobody waits for the disk: a killed process loses nothing by
+that, and what a dead machine loses was not needed to go on.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import structlog
+
+from palaestra_trainer.progress import Counters, Progress
+
+log = structlog.get_logger(__name__)
+
+EVERY_S = 5.0
+
+
+class Journal:
+    """One file in a run directory.
+
+    Args:
+        path: the file; it need not be there.
+        clock: seconds, of any origin.
+    """
+
+    def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
+        self._path = path
+        self._clock = clock
+        self._next = clock() + EVERY_S
+
+    def keep(self, progress: Progress) -> None:
+        """Write down where the run stands, if that was not done in the last seconds."""
+        if self._clock() < self._next:
+            return
+        content = {"step": progress.step, "counters": progress.counted().to_json()}
+        draft = self._path.with_name(f".{self._path.name}")
+        try:
+            draft.write_text(json.dumps(content), encoding="utf-8")
+            draft.rename(self._path)
+        except OSError as error:
+            log.warning("journal not written", path=str(self._path), fact=error.strerror)
+        self._next = self._clock() + EVERY_S
+
+    def regained(self, step: int, saved: Counters) -> Counters:
+        """Return the counters of a run that goes on from `step`.
+
+        Those that were `saved` with that step, unless the run went on after it without saving again.
+        """
+        try:
+            content = json.loads(self._path.read_text(encoding="utf-8"))
+            reached, later = int(content["step"]), Counters.from_json(content["counters"])
+        except (OSError, ValueError, TypeError, KeyError):
+            return saved
+        if later.seconds <= saved.seconds:
+            return saved
+        return replace(
+            later,
+            episodes=saved.episodes,
+            extra_steps=saved.extra_steps,
+            steps_lost=later.steps_lost + max(reached - step, 0),
+        )

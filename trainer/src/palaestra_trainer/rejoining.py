@@ -1,0 +1,66 @@
+"""Bringing simulators back to where a checkpoint was made.
+
+A simulator cannot be saved. Its episode is played again: reset with the same seed, then the same actions.
+Whether that came to the same is seen by the last observation; what did not is told, and is gone on from.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import structlog
+
+from palaestra_trainer.checkpoint import State
+from palaestra_trainer.simulators.episode_state import EpisodeState
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+
+log = structlog.get_logger(__name__)
+
+
+def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
+    """Return the state after each simulator was brought to where it was, or as near to it as it comes.
+
+    One that was broken then, breaks now, or is new in the run begins its next episode.
+    """
+    before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
+    observation = np.asarray(env.resume(before))
+    after = env.snapshot()
+    begun = np.array(
+        [was.actions is None or now.episode != was.episode for was, now in zip(before, after, strict=True)]
+    )
+    if not begun.any() and np.array_equal(observation, saved.observation):
+        return saved
+    _tell(begun, observation, saved)
+    return dataclasses.replace(
+        saved,
+        observation=observation,
+        episode_starts=begun | _resized(saved.episode_starts, env.num_envs),
+        positions=saved.positions and saved.positions._replace(newest=(None,) * env.num_envs),
+        members=after,
+        rollout={**saved.rollout, "terms": _terms_left(saved, begun)},
+    )
+
+
+def _tell(begun: np.ndarray, observation: np.ndarray, saved: State) -> None:
+    """Warn of simulators that went on with their episode and came to something else."""
+    rows = zip(begun, observation, saved.observation, strict=False)
+    different = sum(not new and not np.array_equal(now, was) for new, now, was in rows)
+    if different:
+        log.warning(
+            "simulators do not repeat what they did: the run goes on, but not exactly as it would have",
+            simulators=different,
+        )
+    if begun.any():
+        log.info("simulators begin an episode anew", simulators=int(begun.sum()))
+
+
+def _resized(flags: np.ndarray, length: int) -> np.ndarray:
+    """Return as many flags, those that are missing False."""
+    return np.concatenate([flags, np.zeros(length, dtype=bool)])[:length]
+
+
+def _terms_left(saved: State, begun: np.ndarray) -> list[dict[str, float]]:
+    """Return the sums of reward terms of the episodes that go on."""
+    known = [*saved.rollout["terms"], *[{}] * len(begun)]
+    return [{} if new else terms for new, terms in zip(begun, known, strict=False)]

@@ -1,0 +1,260 @@
+"""Keeping one simulator going.
+
+A `Keeper` looks after one member: it starts it, mends it after a fault within
+its budget, recycles it between episodes and lets it rest. Starting and mending
+take seconds, so they happen in a thread of the keeper's own: while that works,
+the keeper is `busy` and nobody else touches the member. Which seed an episode
+gets, and what a fault means for learning, is decided elsewhere.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from functools import partial
+from typing import Any
+
+import structlog
+
+from palaestra_sim.protocol.status import Cause
+from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
+from palaestra_trainer.interruption import Check, go_on
+from palaestra_trainer.simulators.background import in_background
+from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
+from palaestra_trainer.simulators.member import Member, Nobody, Step, Watcher
+from palaestra_trainer.simulators.numbers import check_observation, check_reward
+from palaestra_trainer.simulators.pace import Pace
+from palaestra_trainer.turns import away_s, let_others
+
+log = structlog.get_logger(__name__)
+
+LOOK_EVERY_S = 0.1
+# A try that is told to fail ends at once, unless it waits for somebody who does not answer.
+SETTLE_S = 10.0
+
+
+class Keeper:
+    """Keeps one member playing: starts, steps, mending, recycling and rests.
+
+    Attributes:
+        member: the member it looks after; hands off while the keeper is `busy`.
+        watcher: is told of every fault and restart.
+        group: the simulators that the member is one of.
+        tried: whether it has been tried to start the member.
+        lost: whether the member was given up, since the others of its group are enough.
+    """
+
+    def __init__(
+        self,
+        member: Member,
+        care: Care | None = None,
+        watcher: Watcher | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        group: Group | None = None,
+    ) -> None:
+        self.member = member
+        self.watcher: Watcher = watcher or Nobody()
+        self.group = group or Group()
+        self.tried = self.lost = False
+        self._care = care or Care()
+        self._budget = RestartBudget(member.name, self._care, clock)
+        self._pace = Pace()
+        self._work: Future[None] | None = None
+        self._abandoned = False
+
+    @property
+    def name(self) -> str:
+        """The member's name."""
+        return self.member.name
+
+    @property
+    def under_way(self) -> Future[None] | None:
+        """The work on the member in the keeper's own thread; None: there is none."""
+        return None if self._work is None or self._work.done() else self._work
+
+    @property
+    def busy(self) -> bool:
+        """Whether the member is being started, mended or recycled, in a thread that nobody may disturb."""
+        return self.under_way is not None
+
+    def up(self) -> bool:
+        """Return whether the member is up, as far as is known: neither being mended nor lost.
+
+        Raises:
+            FaultBudgetSpent: it broke more often than its budget allows.
+            MasterLost: it could not be mended without a ROS master.
+            SimulatorFault: it could not be recycled; begin to mend it.
+        """
+        if self.busy:
+            return False
+        if self._work is not None:
+            self._work.result()
+            self._work = None
+        return not self.lost
+
+    def begin_start(self) -> None:
+        """Begin to start the member, again after each fault; then it is up, or lost."""
+        self._begin(self._start)
+
+    def begin_mending(self, fault: SimulatorFault) -> None:
+        """Begin to restart the broken member until it is up, or lost."""
+        self._tell(fault)
+        self._begin(partial(self._mend, fault))
+
+    def abandon(self) -> None:
+        """Begin no further try of the work that is under way; may be called from any thread."""
+        self._abandoned = True
+
+    def stop(self) -> None:
+        """Stop the member, however it is; a mending that is under way is ended before."""
+        settle([self])
+        if self.busy:
+            log.warning("simulator not stopped: it is still being mended", simulator=self.name)
+        else:
+            self._switch(self.member.stop)
+
+    def reset(
+        self, seed: int, options: dict[str, Any] | None = None, check: Check = go_on
+    ) -> tuple[Any, dict[str, Any]]:
+        """Return first observation and info of a new episode, in a recycled member if that is due.
+
+        `check` is called every tenth of a second while the member is recycled; raises to wait no longer.
+
+        Raises:
+            SimulatorFault: it broke; begin to mend it.
+        """
+        self._recycle_when_due(check)
+        observation, info = self.member.env.reset(seed=seed, options=options)
+        check_observation(self.name, observation)
+        return observation, info
+
+    def step(self, action: Any) -> Step:
+        """Return what the environment's step returns, all of it numbers that can be learnt from.
+
+        Raises:
+            SimulatorFault: it broke, also by an observation that is not finite; begin to mend it.
+            Diverged: the reward is not finite.
+        """
+        began = time.perf_counter() - away_s()
+        step: Step = self.member.env.step(action)
+        seconds = time.perf_counter() - away_s() - began
+        if self._pace.slow(seconds):
+            self.watcher.slow(self.name, seconds)
+        check_observation(self.name, step[0])
+        check_reward(self.name, step[1], step[4])
+        return step
+
+    def pause(self) -> None:
+        """Let the member rest; a broken one is found by the next step that needs it."""
+        self._switch(self.member.pause)
+
+    def run(self) -> None:
+        """End the rest; a broken member is found by the next step that needs it."""
+        self._switch(self.member.run)
+
+    def _begin(self, work: Callable[[], None]) -> None:
+        self._abandoned = False
+        self._work = in_background(work, f"keeper-{self.name}")
+
+    def _start(self) -> None:
+        try:
+            self.member.start()
+        except SimulatorFault as fault:
+            self._tell(fault)
+            self.tried = True
+            self._mend(fault)
+        else:
+            self.tried = True
+            self.watcher.started(self.name)
+
+    def _mend(self, fault: SimulatorFault) -> None:
+        while self._may_restart(fault):
+            try:
+                self.member.restart()
+            except SimulatorFault as again:
+                fault = again
+                self._tell(fault)
+            else:
+                self.watcher.restarted(self.name, recycled=False)
+                return
+
+    def _may_restart(self, fault: SimulatorFault) -> bool:
+        if self._abandoned:
+            raise FaultBudgetSpent(f"{self.name}: was abandoned ({fault}); start the run again") from fault
+        try:
+            self._budget.spend(fault)
+        except FaultBudgetSpent as spent:
+            if not self.group.lose_one():
+                raise
+            self._lose(spent)
+            return False
+        if self._budget.flapping:
+            self.watcher.flapping(self.name)
+        return True
+
+    def _lose(self, spent: FaultBudgetSpent) -> None:
+        log.error("simulator given up: the others go on", simulator=self.name, fact=str(spent))
+        self.lost = True
+        self.watcher.given_up(self.name)
+        with contextlib.suppress(SimulatorFault):
+            self.member.stop()
+
+    def _tell(self, fault: SimulatorFault) -> None:
+        self.watcher.fault(self.name, fault)
+        log.warning("simulator fault", simulator=self.name, kind=fault.kind, fact=str(fault))
+
+    def _switch(self, switch: Callable[[], None]) -> None:
+        if self.busy or self.lost:
+            return
+        try:
+            switch()
+        except SimulatorFault as fault:
+            log.warning("simulator does not answer", simulator=self.name, fact=str(fault))
+
+    def _recycle_when_due(self, check: Check) -> None:
+        reason = self.member.due()
+        if reason is None:
+            return
+        log.info("simulator recycled", simulator=self.name, reason=reason)
+        self._begin(self._recycle)
+        while not self.up():
+            let_others()
+            with self.watcher.spending(Cause.RECOVERING):
+                await_one([self], check)
+
+    def _recycle(self) -> None:
+        self.member.restart()
+        self.watcher.restarted(self.name, recycled=True)
+
+
+def await_one(keepers: Sequence[Keeper], check: Check = go_on) -> None:
+    """Return when one of the busy keepers is busy no more; at once if none is busy.
+
+    Args:
+        keepers: some of them may be ready or lost.
+        check: called every tenth of a second; raises to wait no longer.
+    """
+    works = _under_way(keepers)
+    while works and not wait(works, LOOK_EVERY_S, FIRST_COMPLETED).done:
+        check()
+
+
+def settle(keepers: Sequence[Keeper]) -> None:
+    """End what goes on in the keepers' threads: no further tries, and those under way fail.
+
+    Waits `SETTLE_S` seconds at most, and as long as one that does not answer takes to be told.
+    """
+    for keeper in keepers:
+        keeper.abandon()
+    give_up = time.monotonic() + SETTLE_S
+    while (busy := [keeper for keeper in keepers if keeper.busy]) and time.monotonic() < give_up:
+        for keeper in busy:
+            if time.monotonic() < give_up:
+                keeper.member.abandon()
+        wait(_under_way(busy), LOOK_EVERY_S)
+
+
+def _under_way(keepers: Sequence[Keeper]) -> list[Future[None]]:
+    return [work for keeper in keepers if (work := keeper.under_way) is not None]

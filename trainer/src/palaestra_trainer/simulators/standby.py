@@ -1,0 +1,175 @@
+"""A member with a spare: while one simulator is played in, a second one stands by to take its place.
+
+Both belong to one sidecar and differ in their ROS names. A restart is a change of roles: the spare takes
+over at once if it is ready, and the other one, however it is, is restarted in a thread of its own to be
+the spare from then on. A spare that broke meanwhile is found when it is wanted, and told as the fault it
+is; the restart after that waits for the other simulator, which is on its way by then. So whatever breaks,
+nothing waits for more than one start.
+
+The environment is that of whichever simulator is played in: nobody may keep it over a restart.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from concurrent.futures import Future, wait
+
+import structlog
+
+from palaestra_sim.protocol.status import StandbyState
+from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.simulators.background import in_background
+from palaestra_trainer.simulators.member import Environment
+from palaestra_trainer.simulators.simulator import Simulator
+
+log = structlog.get_logger(__name__)
+
+_ASK_AGAIN_S = 0.05
+
+
+class Standby:
+    """Two simulators as one member.
+
+    Args:
+        first: is played in first.
+        second: stands by.
+    """
+
+    def __init__(self, first: Simulator, second: Simulator) -> None:
+        self._active = Side(first)
+        self._spare = Side(second)
+
+    @property
+    def name(self) -> str:
+        """`<group>-<index>`, as in the configuration."""
+        return self._active.simulator.name
+
+    @property
+    def env(self) -> Environment:
+        """The environment of the simulator that is played in; another one after a restart."""
+        return self._active.simulator.env
+
+    @property
+    def resets(self) -> int:
+        """Resets since the simulator that is played in was last started."""
+        return self._active.simulator.resets
+
+    def spare(self) -> StandbyState | None:
+        """Return whether the spare could take over; None: it is neither ready nor on its way."""
+        return self._spare.state
+
+    def due(self) -> str | None:
+        """Return why the simulator that is played in ought to be recycled, None: no reason."""
+        return self._active.simulator.due()
+
+    def start(self) -> None:
+        """Start the first simulator; the spare follows in the background.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: the first one does not come up in time.
+        """
+        for side in (self._active, self._spare):
+            side.wanted = True
+        self._active.simulator.start()
+        self._spare.prepare()
+
+    def restart(self) -> None:
+        """Let the spare take over, and restart the other simulator in the background.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: the spare cannot take over.
+        """
+        self._active, self._spare = self._spare, self._active
+        self._spare.prepare()
+        self._active.take_over()
+        log.info(
+            "standby took over", simulator=self.name, node=self._active.simulator.webots.supervisor_node_name
+        )
+
+    def stop(self) -> None:
+        """Stop both simulators, however they are; no thread works on them when this returns."""
+        with contextlib.ExitStack() as stack:
+            for side in (self._active, self._spare):
+                stack.callback(side.stop)
+
+    def abandon(self) -> None:
+        """Let a start or restart that is under way in another thread fail soon."""
+        self._active.simulator.abandon()
+
+    def pause(self) -> None:
+        """Let the simulator that is played in rest, as the spare does all the time."""
+        self._active.simulator.pause()
+
+    def run(self) -> None:
+        """End the rest that `pause` began."""
+        self._active.simulator.run()
+
+
+class Side:
+    """One of the two simulators, and the thread that may be making it ready.
+
+    Attributes:
+        simulator: while it is made ready, its thread's alone.
+        wanted: False: it is not started any more.
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        self.simulator = simulator
+        self.wanted = True
+        self._preparation: Future[None] | None = None
+
+    @property
+    def state(self) -> StandbyState | None:
+        """Whether it could take over; None: it is neither ready nor on its way."""
+        if self._preparation is None:
+            return None
+        if not self._preparation.done():
+            return StandbyState.STARTING
+        return None if self._preparation.exception() else StandbyState.READY
+
+    def prepare(self) -> Future[None]:
+        """Begin to restart it, however it is, unless that is under way already."""
+        if self._preparation is None or self._preparation.done():
+            self._preparation = in_background(self._restart, f"standby-{self.simulator.name}")
+        return self._preparation
+
+    def take_over(self) -> None:
+        """Return when it is up and runs, after no longer than a simulator may take to start.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: it did not come up, or broke while it stood by.
+        """
+        simulator, deadline_s = self.simulator, self.simulator.start_deadline_s
+        preparation = self._preparation or self.prepare()
+        if wait([preparation], deadline_s).not_done:
+            raise SimulatorHung(simulator.name, f"its standby was not ready within {deadline_s:g} s")
+        preparation.result()
+        if not simulator.webots.available():
+            raise SimulatorDead(simulator.name, "its standby does not answer any more")
+        simulator.run()
+        simulator.wear.begin()
+
+    def stop(self) -> None:
+        """Stop it, however it is; no thread works on it when this returns."""
+        self.wanted = False
+        preparation, self._preparation = self._preparation, None
+        while preparation is not None and not preparation.done():
+            # Killed, it fails to come up, and its thread ends. That may take a second time:
+            # what is only about to be started cannot be killed yet.
+            self.simulator.abandon()
+            wait([preparation], _ASK_AGAIN_S)
+        self.simulator.stop()
+
+    def _restart(self) -> None:
+        simulator = self.simulator
+        try:
+            simulator.await_sidecar()
+            simulator.stop()
+            if not self.wanted:
+                raise SimulatorDead(simulator.name, "its standby is not wanted any more")
+            simulator.start()
+            simulator.pause()
+        except SimulatorFault as fault:
+            if self.wanted:
+                log.warning("standby did not come up", simulator=simulator.name, fact=str(fault))
+            raise
