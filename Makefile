@@ -8,7 +8,7 @@ PACKAGES := operator trainer sim_image
 SOURCES := operator/src trainer/src sim_image/src
 JOB := manifests/examples/move-to-target.yaml
 
-.PHONY: help setup run test check e2e images cluster cluster-down format bench golden lock
+.PHONY: help setup run test check e2e images cluster cluster-down format bench soak golden lock
 
 help: ## list the verbs
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## (.*)/\1\t\2/' | expand -t 15
@@ -50,6 +50,9 @@ format: setup ## rewrite the sources in the common format
 
 bench: setup ## measure what the project promises; prints JSON
 	@$(BIN)/python -m tests.bench
+
+soak: setup ## prove that nothing ends a training run which nobody attends to; prints JSON, takes hours
+	@$(BIN)/python -m tests.soak
 
 golden: setup ## record the plans of the examples and other generated files anew
 	@$(BIN)/python -m tests.golden

@@ -13,7 +13,7 @@ INTERRUPTED_ONCE = (
 MOST_IGNORED = 10  # more pods than that without a step are not borne
 GIVEN_UP = {
     "refuses": (2, "ConfigurationRefused"),
-    "spent": (80, "FaultBudgetSpent"),
+    "spent": (80, "SimulatorBudgetSpent"),
     "diverged": (81, "Diverged"),
 }
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 
 from palaestra_sim.world import robots
 from palaestra_trainer.ros.master import Master
+from tests.local_run import is_running
 
 EXAMPLES = Path(__file__).parents[3] / "manifests/examples"
 EVAL = Path(sys.executable).with_name("palaestra-eval")
@@ -39,11 +41,11 @@ def test_move_to_target_in_full_learns_to_reach_its_target(run):
     thousands: five seeds measured 97 to 99.
     """
     whole = run().start()
-    output, _ = whole.process.communicate(timeout=1400)
+    code, output = whole.end(1400)
 
     result = subprocess.run([EVAL, whole.directory], capture_output=True, text=True, timeout=200, check=True)
 
-    assert whole.process.returncode == 0, output
+    assert code == 0, output
     assert whole.summary()["steps"] == 50_000
     assert json.loads(result.stdout)["success_rate"] >= 0.90
 
@@ -51,18 +53,16 @@ def test_move_to_target_in_full_learns_to_reach_its_target(run):
 def test_each_simulator_has_a_legal_name_of_its_own(run):
     """What `rosnode list` shows, and what stands in the generated worlds of the run directory."""
     training = run("two-collectors", **FEW | {"steps": 50_000}).start("-v")
-    uri = next(line for line in training.process.stdout if line.startswith("ROS_MASTER_URI=")).strip()
     training.wait_for_step(100)
 
     master = Master("/test")
-    master.uri = uri.partition("=")[2]
+    master.uri = re.search("ROS_MASTER_URI=(.+)", training.output())[1]
     nodes = {name for name in master.node_names() if "robotino" in name}
 
     worlds = sorted((training.directory / "worlds").glob("*.wbt"))
     named = {f"/{robot.ros_name}" for world in worlds for robot in robots(world.read_bytes())}
     assert len(nodes) == 3
     assert nodes == named
-    training.process.stdout.close()
 
 
 def test_a_killed_simulator_is_one_fault_and_training_goes_on(run):
@@ -120,21 +120,13 @@ def test_after_a_sigkill_of_the_runner_nothing_is_left(run):
     pids = [pid for pid, _ in training.processes()]
 
     training.process.kill()
-    training.process.communicate()
+    training.end()
 
     assert len(pids) >= 8
     give_up = time.monotonic() + 10
-    while any(map(running, pids)) and time.monotonic() < give_up:
+    while any(map(is_running, pids)) and time.monotonic() < give_up:
         time.sleep(0.05)
-    assert [pid for pid in pids if running(pid)] == []
-
-
-def running(pid):
-    """Return whether a process is there and no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except (OSError, IndexError):
-        return False
+    assert [pid for pid in pids if is_running(pid)] == []
 
 
 def test_a_policy_can_be_measured_afterwards(run):

@@ -1,0 +1,56 @@
+"""`make soak`: prove that nothing ends a training run which nobody attends to; prints JSON.
+
+Every part runs whole trainings, breaks something in them, and says what came of it: figures, and
+claims that hold or do not. Names as arguments choose parts, e.g. `python -m tests.soak recovery kills`;
+`--scale 0.1` does a tenth of what a part does, to see that the part itself works.
+"""
+
+import argparse
+import json
+import sys
+import time
+import traceback
+
+from tests.soak import chaos, damage, kills, kinds, leaks, recovery, recycling, resume
+
+PARTS = {
+    "recovery": recovery.measure,
+    "damage": damage.measure,
+    "kinds": kinds.measure,
+    "kills": kills.measure,
+    "resume": resume.measure,
+    "leaks": leaks.measure,
+    "recycling": recycling.measure,
+    "chaos": chaos.measure,
+}
+
+
+def main():
+    """Print one JSON object a line: part, seconds it took, figures, claims; return 1 if one does not hold."""
+    parser = argparse.ArgumentParser(prog="tests.soak", description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")
+    asked = parser.parse_args()
+    chosen = asked.parts or list(PARTS)
+    if unknown := [name for name in chosen if name not in PARTS]:
+        parser.error(f"{unknown[0]} is no part; choose from {', '.join(PARTS)}")
+    held = [prove(name, asked.scale) for name in chosen]
+    return 0 if all(held) else 1
+
+
+def prove(name, scale):
+    """Run a part and print what it found; return whether all its claims hold."""
+    started = time.monotonic()
+    try:
+        found = PARTS[name](scale)
+    except Exception as error:  # noqa: BLE001 - the parts after it are to be run all the same
+        traceback.print_exc()
+        found = {"error": type(error).__name__, "claims": {"the part came to its end": False}}
+    line = {"part": name, "scale": scale, "seconds": round(time.monotonic() - started, 1), **found}
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()
+    return all(found["claims"].values())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,47 @@
+"""A training amid crashes, hangs and slow steps learns as much as one without any.
+
+The job is manifests/examples/chaos.yaml.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.local_run import running
+from tests.soak.jobs import example
+
+EVAL = Path(sys.executable).with_name("palaestra-eval")
+EPISODES = 100
+WANTED = 0.95
+LEAST_STEPS = 1000
+LONGEST_S = 7200.0
+
+
+def measure(scale):
+    """Return what the training came to, and its policy's success on episodes that nothing was chosen on."""
+    job = example("chaos")
+    trainer = job["spec"]["trainer"]
+    trainer["steps"] = max(round(trainer["steps"] * scale), LEAST_STEPS)
+    with running(job) as run:
+        code, output = run.end(LONGEST_S)
+        if code:
+            raise AssertionError(output)
+        success = measured(run.directory, max(round(EPISODES * scale), 10))
+        summary, faults = run.summary(), run.faults()
+    return {
+        "success_rate": success,
+        "faults": faults,
+        "summary": summary,
+        "claims": {
+            "it broke often": sum(faults.values()) >= trainer["steps"] / 4000,
+            f"success of {WANTED:.0%} and more": scale < 1 or success >= WANTED,
+        },
+    }
+
+
+def measured(directory, episodes):
+    """Return the success rate of the run's policy in a simulator without faults."""
+    command = [EVAL, directory, f"--episodes={episodes}", "--seeds=soak"]
+    told = subprocess.run(command, check=True, capture_output=True, text=True)
+    return json.loads(told.stdout)["success_rate"]

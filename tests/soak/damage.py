@@ -1,0 +1,96 @@
+"""Each file of a checkpoint is damaged in turn: it is noticed, and the checkpoint before is used."""
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from tests.local_run import LocalRun
+from tests.soak.jobs import LITTLE_DQN, make_job
+
+STEPS = 1000
+CHECKPOINT_STEPS = 200
+NOTICED = "damaged checkpoint skipped"
+
+
+def flip(file):
+    """Change one byte in the middle, as a disk does."""
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    replace(file, bytes(content))
+
+
+def cut(file):
+    """Lose the second half, as a full disk does."""
+    replace(file, file.read_bytes()[: file.stat().st_size // 2])
+
+
+def remove(file):
+    """Lose it."""
+    file.unlink()
+
+
+def replace(file, content):
+    """Write a file anew: checkpoints may share one that did not change, and only one is to be damaged."""
+    file.unlink()
+    file.write_bytes(content)
+
+
+DAMAGES = (flip, cut, remove)
+
+
+def measure(scale):
+    """Return how many damaged files were noticed, and those that were not."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = interrupted(Path(folder))
+        files = files_of(run.checkpoints()[-1])
+        chosen = DAMAGES[: max(round(len(DAMAGES) * scale), 1)]
+        missed = [
+            f"{name} {damage.__name__}"
+            for name in files
+            for damage in chosen
+            if not is_survived(run, name, damage)
+        ]
+    return {
+        "files": files,
+        "damages": [damage.__name__ for damage in chosen],
+        "missed": missed,
+        "claims": {"every damage is noticed and the checkpoint before is used": not missed},
+    }
+
+
+def job():
+    """Return a job that keeps several checkpoints."""
+    return make_job(
+        algorithm=LITTLE_DQN,
+        steps=1_000_000,
+        evaluation={"everySteps": 0},
+        checkpoint={"everySteps": CHECKPOINT_STEPS, "keep": 3},
+    )
+
+
+def interrupted(folder):
+    """Train until there are several checkpoints, and interrupt; return the run."""
+    with LocalRun(folder, job()) as run:
+        run.wait_for_step(STEPS)
+    return run
+
+
+def files_of(checkpoint):
+    """Return the names of all files of a checkpoint, those in folders of it too."""
+    return sorted(str(it.relative_to(checkpoint)) for it in checkpoint.rglob("*") if it.is_file())
+
+
+def is_survived(run, name, damage):
+    """Damage a file of the newest checkpoint, go on, and put everything back; return whether it went well."""
+    kept = run.directory.with_name("kept")
+    shutil.copytree(run.directory, kept)
+    newest, before = run.checkpoints()[-1], run.checkpoints()[-2]
+    attempts = len(run.attempts())
+    damage(newest / name)
+    with run:
+        run.until(lambda: len(run.attempts()) > attempts)
+        resumed = run.attempts()[-1] == f"resumed at step {before.name}"
+        noticed = run.until(lambda: NOTICED in run.log() or not resumed)
+    shutil.rmtree(run.directory)
+    kept.rename(run.directory)
+    return resumed and bool(noticed)

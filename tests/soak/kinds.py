@@ -1,0 +1,79 @@
+"""Every kind of fault, in short runs of two algorithms: each ends as docs/reliability.md says."""
+
+import re
+
+from tests.local_run import ROOT, running
+from tests.soak.jobs import ANY_NUMBER, LITTLE_DQN, LITTLE_PPO, make_job
+
+PAGE = ROOT / "docs/reliability.md"
+ROW = re.compile(
+    r"^\| [^|`]+ \| `(?P<fault>[^`]+)` \| (?P<reported>\w+) \|.*\| (?P<ending>\w+) \|$", re.MULTILINE
+)
+ALGORITHMS = (LITTLE_DQN, LITTLE_PPO)
+FAULT_KINDS = {"dead", "hung", "wrong_data"}
+EXIT_CODES = {"Succeeded": 0, "FaultBudgetSpent": 80, "SimulatorBudgetSpent": 80}
+# A multiple of PPO's rollout. Episodes so short that there are more than 25 resets between two restarts.
+STEPS = 96
+EPISODE = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 3}}
+A_FEW = {"limit": 2, "withinSeconds": 600}  # for a simulator that nothing mends
+LONGEST_S = 600.0
+
+
+def rows():
+    """Return the lines of the table that a stub can play: fault, what Palaestra reports, how the run ends."""
+    return [match.groups() for match in ROW.finditer(PAGE.read_text())]
+
+
+def measure(scale):
+    """Return how the run with each fault ended, and those that did not end as the table says."""
+    table = rows()
+    chosen = table[:: max(round(1 / scale), 1)]
+    runs = [
+        (fault, algorithm["name"], ending, reported, play(fault, algorithm, ending))
+        for fault, reported, ending in chosen
+        for algorithm in ALGORITHMS
+    ]
+    wrong = [
+        f"{fault} {algorithm}: {found}"
+        for fault, algorithm, ending, reported, found in runs
+        if not is_as_told(found, ending, reported)
+    ]
+    return {
+        "faults": len(chosen),
+        "runs": len(runs),
+        "not_as_told": wrong,
+        "claims": {"every run ended as docs/reliability.md says": not wrong},
+    }
+
+
+def play(fault, algorithm, ending):
+    """Return exit code, faults by kind and slow steps of a short run whose simulators have a fault."""
+    with running(job(fault, algorithm, ending)) as run:
+        code, _ = run.end(LONGEST_S)
+        slow = run.counters().get("faults", {}).get("slow", 0)
+        return {"exit": code, "faults": run.faults(), "slow": slow}
+
+
+def is_as_told(found, ending, reported):
+    """Return whether a run ended as its line of the table says, with faults of that kind and no others.
+
+    On a busy machine any step may be slow.
+    """
+    kinds = {reported} if reported in FAULT_KINDS else set()
+    noticed = set(found["faults"]) == kinds and (reported != "slow" or found["slow"] > 0)
+    return noticed and found["exit"] == EXIT_CODES[ending]
+
+
+def job(fault, algorithm, ending):
+    """Return the job: collecting and evaluating simulators have the same fault."""
+    care = {"recycle": {"afterResets": 0}, "restart": ANY_NUMBER if ending == "Succeeded" else A_FEW}
+    return make_job(
+        faults=fault,
+        collect=care,
+        evaluate=care,
+        environment=EPISODE,
+        algorithm=algorithm,
+        steps=STEPS,
+        evaluation={"everySteps": STEPS // 2, "episodes": 2},
+        checkpoint={"everySteps": STEPS // 2, "keep": 2},
+    )

@@ -1,0 +1,105 @@
+"""Nothing grows while simulators are restarted 500 times: no thread, socket, descriptor or process."""
+
+import os
+from collections import Counter
+from pathlib import Path
+
+from tests.local_run import below, running
+from tests.soak.jobs import LITTLE_DQN, make_job
+
+RESTARTS = 500
+COLLECTORS = 2
+# A reset is two steps: each life ends in the first episode.
+DIES = "crash:step=6"
+WATCHED = ("palaestra-train", "palaestra-sidecar")
+# A sidecar holds up to three more of a kind while its simulator lives; what leaks, it holds hundreds of.
+SWAY = 4
+LONGEST_S = 3600.0
+
+
+def measure(scale):
+    """Return what trainer and sidecars held in the first and in the last tenth of the restarts."""
+    restarts = max(round(RESTARTS * scale), 20)
+    with running(job()) as run:
+        run.wait_for_step(1)
+        early = least(run, restarts // 10, restarts // 5)
+        late = least(run, restarts, restarts + restarts // 10)
+    return {
+        "restarts": restarts,
+        "early": early,
+        "late": late,
+        "grown": grown(early, late),
+        "claims": {"no thread, descriptor, socket or process grew": not grown(early, late)},
+    }
+
+
+def job():
+    """Return a job whose simulators die again and again, without an end."""
+    return make_job(
+        collect={"count": COLLECTORS, "recycle": {"afterResets": 0}},
+        faults=DIES,
+        algorithm=LITTLE_DQN,
+        steps=1_000_000,
+        evaluation={"everySteps": 0},
+        checkpoint={"everySteps": 1_000_000},
+    )
+
+
+def least(run, first, last):
+    """Return the least that each watched program held between two numbers of restarts.
+
+    The least, since that is when no restart is under way, or the fewest are.
+    """
+    run.until(lambda: restarts_of(run) >= first, LONGEST_S)
+    least_held = {}
+    while restarts_of(run) < last:
+        for name, held in holdings(run).items():
+            before = least_held.get(name, held)
+            least_held[name] = {what: min(before[what], held[what]) for what in held}
+    return least_held
+
+
+def grown(early, late):
+    """Return what a program holds more of than before; memory may grow, as that of the replay buffer does."""
+    return [
+        f"{name}: {what}"
+        for name, held in early.items()
+        for what in held
+        if what != "rss_mb" and late[name][what] > held[what] + SWAY
+    ]
+
+
+def restarts_of(run):
+    """Return how often simulators were restarted so far."""
+    return sum(each["restarts"] for each in run.ask()["simulators"])
+
+
+def holdings(run):
+    """Return what the trainer and each sidecar hold now."""
+    found = {}
+    for program in WATCHED:
+        for number, pid in enumerate(sorted(run.pids(program))):
+            found[f"{program} {number}"] = held_by(pid)
+    return found
+
+
+def held_by(pid):
+    """Return numbers of threads, descriptors, sockets and processes, and megabytes of memory."""
+    process = Path(f"/proc/{pid}")
+    opened = Counter(kind for it in (process / "fd").iterdir() if (kind := kind_of(it)))
+    pages = int((process / "statm").read_text().split()[1])
+    return {
+        "threads": len(list((process / "task").iterdir())),
+        "descriptors": opened.total(),
+        "sockets": opened["socket"],
+        "processes": len(list(below(pid))),
+        "rss_mb": round(pages * os.sysconf("SC_PAGE_SIZE") / 2**20),
+    }
+
+
+def kind_of(descriptor):
+    """Return what a descriptor is, as the kernel names it: socket, pipe, a path; "" for a closed one."""
+    try:
+        return str(descriptor.readlink()).partition(":")[0]
+    except OSError:
+        return ""

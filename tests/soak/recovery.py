@@ -1,0 +1,121 @@
+"""How soon a simulator that broke steps again, and how soon a hang is noticed."""
+
+import os
+import signal
+import statistics
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from palaestra_trainer.ros.service import DEADLINE_S
+from tests.local_run import running
+from tests.soak.jobs import LITTLE_DQN, make_job
+
+TIMES = 10
+WARM_STEPS = 100
+SIMULATOR = "collect-0"
+# No promise is made about a spare that is still starting; a start takes half a second.
+SPARE_READY_S = 30.0
+
+
+def measure(scale):
+    """Return the seconds from SIGKILL to the next step, and to the notice of a hang."""
+    times = max(round(TIMES * scale), 2)
+    killed = recoveries(times)
+    swapped = recoveries(times, standby=True)
+    noticed = noticings(times)
+    return {
+        "times": times,
+        "killed_s": spread(killed),
+        "killed_with_standby_s": spread(swapped),
+        "hang_noticed_s": spread(noticed),
+        "hang_deadline_s": DEADLINE_S,
+        "claims": {
+            "stepping again within 10 s": max(killed) < 10.0,
+            "stepping again within 1 s with a standby": max(swapped) < 1.0,
+            "a hang is noticed within its deadline + 1 s": max(noticed) < DEADLINE_S + 1.0,
+        },
+    }
+
+
+def recoveries(times, *, standby=False):
+    """Return the seconds from each SIGKILL of the simulator in use until training steps again."""
+    with training(standby=standby) as run:
+        return [recovery(run, standby=standby) for _ in range(times)]
+
+
+def recovery(run, *, standby):
+    """Kill the collecting simulator; return the seconds until training has stepped again."""
+    run.until(lambda: is_ready(run, standby=standby), SPARE_READY_S)
+    process, restarts = in_use(run), simulator(run)["restarts"]
+    os.kill(process, signal.SIGKILL)
+    began = time.monotonic()
+    run.until(lambda: simulator(run)["restarts"] > restarts)
+    step = run.ask()["step"]
+    run.until(lambda: run.ask()["step"] > step)
+    return time.monotonic() - began
+
+
+def noticings(times):
+    """Return the seconds from each stop of the simulator's process until it is told of as hung."""
+    with training() as run:
+        return [noticing(run) for _ in range(times)]
+
+
+def noticing(run):
+    """Stop the collecting simulator; return the seconds until a fault is counted."""
+    run.until(lambda: is_ready(run, standby=False))
+    process, before = in_use(run), run.faults().get("hung", 0)
+    os.kill(process, signal.SIGSTOP)
+    began = time.monotonic()
+    run.until(lambda: run.faults().get("hung", 0) > before)
+    return time.monotonic() - began
+
+
+@contextmanager
+def training(*, standby=False):
+    """Yield a run without an end that collects with one simulator, past its first steps."""
+    collect = {"recycle": {"afterResets": 0}} | ({"standby": True} if standby else {})
+    job = make_job(
+        collect=collect,
+        algorithm=LITTLE_DQN,
+        steps=1_000_000,
+        evaluation={"everySteps": 0},
+        checkpoint={"everySteps": 1_000_000},
+    )
+    with running(job) as run:
+        run.wait_for_step(WARM_STEPS)
+        yield run
+
+
+def is_ready(run, *, standby):
+    """Return whether the simulator, and its spare if it has one, is up."""
+    seen = simulator(run)
+    return seen["state"] == "ready" and (not standby or seen["standby"] == "ready")
+
+
+def simulator(run):
+    """Return what /status says of the collecting simulator."""
+    return next(each for each in run.ask()["simulators"] if each["name"] == SIMULATOR)
+
+
+def in_use(run):
+    """Return the process of the collecting simulator that is stepped now: a spare uses no processor."""
+    before = {pid: processor_s(pid) for pid in run.pids("palaestra-stub", SIMULATOR)}
+    step = run.ask()["step"]
+    run.wait_for_step(step + WARM_STEPS)
+    return max(before, key=lambda pid: processor_s(pid) - before[pid])
+
+
+def processor_s(pid):
+    """Return the processor seconds that a process has used; 0 for one that is gone."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def spread(seconds):
+    """Return median and largest of some durations, in seconds."""
+    return {"median": round(statistics.median(seconds), 2), "most": round(max(seconds), 2)}
