@@ -3,7 +3,7 @@
 import pytest
 
 from tests.e2e.jobs import WAIT, make_job
-from tests.e2e.namespace import LONG_S, named
+from tests.e2e.namespace import LONG_S, SHORT_S, named
 
 pytestmark = pytest.mark.timeout(400)
 
@@ -65,7 +65,8 @@ def test_deleted_while_it_is(phase, uids, shared):
 
     shared.cluster.delete("trainingjobs", shared.name, phase)
 
-    shared.wait(lambda: not any(_left(shared, kind, phase) for kind in GONE), 30)
+    # Not sooner than its grace of 60 s goes a pod whose script was told to end before it set its trap.
+    shared.wait(lambda: not any(_left(shared, kind, phase) for kind in GONE), SHORT_S)
     claims = shared.select("persistentvolumeclaims", phase)
     assert [named(claim) for claim in claims] == [f"{phase}-0-{uid}"]
 

@@ -49,7 +49,7 @@ def test_a_simulator_is_not_started_where_one_runs(state) -> None:
     assert lifecycle.step(state, Event.START) is None
 
 
-@pytest.mark.parametrize("state", set(SidecarState) - {STARTING})
+@pytest.mark.parametrize("state", [state for state in SidecarState if state is not STARTING])
 def test_only_a_starting_simulator_gets_ready(state) -> None:
     """Rule 2: a round trip that was on its way when the simulator died proves nothing."""
     assert lifecycle.step(state, Event.READY) is None
