@@ -30,13 +30,13 @@ def progress(it: Situation, phase: Phase) -> dict[str, object]:
     fields: dict[str, object] = {"steps_per_second": None, "last_progress": last_progress(it)}
     if told_last is not None and (step := _step(told_last)) is not None:
         fields["step"] = step
-        fields["success_rate"] = _or(told_last.success_rate, it.old.success_rate)
+        fields["success_rate"] = _figure(told_last.success_rate, it.old.success_rate)
         fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or it.old.last_checkpoint
     if polled is not None and ended_with is None:
         fields |= {
             "target": min(polled.target, MOST_COUNT),
-            "mean_return": _or(polled.mean_return, it.old.mean_return),
-            "steps_per_second": polled.steps_per_second,
+            "mean_return": _figure(polled.mean_return, it.old.mean_return),
+            "steps_per_second": _figure(polled.steps_per_second, None),
             "simulators": _simulators(polled),
             **_spent(it, polled),
         }
@@ -104,5 +104,6 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
     return LastCheckpoint(step=min(checkpoint.step, MOST_COUNT), time=at)
 
 
-def _or(new: float | None, old: float | None) -> float | None:
-    return old if new is None else new
+def _figure(new: float | None, old: float | None) -> float | None:
+    """Return a figure in the four digits that people read; the old one where there is no new one."""
+    return old if new is None else float(f"{new:.4g}")
