@@ -44,16 +44,16 @@ def test_what_a_trainer_no_longer_answers_stays_but_for_its_speed(training):
     assert scene.replica().steps_per_second is None
 
 
-def test_figures_have_the_four_digits_that_people_read(training):
+def test_figures_have_the_four_decimals_that_people_read(training):
     """`kubectl get` prints what the status holds, and one in three is no 0.3333333333333333."""
     scene, pod = training()
-    scene.poll(pod, step=30, success_rate=1 / 3, mean_return=-0.0770739148936, steps_per_second=251.234)
+    scene.poll(pod, step=30, success_rate=1 / 3, mean_return=-0.0770739148936, steps_per_second=251.23456)
 
     scene.settle()
 
     replica = scene.replica()
-    assert (replica.success_rate, replica.mean_return) == (0.3333, -0.07707)
-    assert replica.steps_per_second == 251.2
+    assert (replica.success_rate, replica.mean_return) == (0.3333, -0.0771)
+    assert replica.steps_per_second == 251.2346
 
 
 def test_simulators_and_checkpoints_are_told(training, simulator):

@@ -105,5 +105,5 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
 
 
 def _figure(new: float | None, old: float | None) -> float | None:
-    """Return a figure in the four digits that people read; the old one where there is no new one."""
-    return old if new is None else float(f"{new:.4g}")
+    """Return a figure as people read it, to the fourth decimal; the old one where there is no new one."""
+    return old if new is None else round(new, 4)
