@@ -22,7 +22,7 @@ run: setup ## train move-to-target on this machine, from a TrainingJob to a poli
 	@$(BIN)/palaestra run $(JOB)
 
 test: setup ## run every test; also that generated files are current
-	@$(BIN)/pytest -n 2 --dist loadfile
+	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 check: setup ## lint, format, types and the allowed imports
 	@$(BIN)/ruff check

