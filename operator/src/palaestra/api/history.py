@@ -11,12 +11,9 @@ from pydantic import Field
 
 from palaestra.api.fields import Count, Listed, Sentence, Word
 from palaestra.api.model import ApiModel
+from palaestra_sim.protocol.status import MOST_FAULTS, MOST_LINE, MOST_LINES
 
-MOST_LINES = 10  # as many as a last word holds
-MOST_FAULTS = 10
-LONGEST_LINE = 200  # characters
-
-Line = Annotated[str, Field(max_length=LONGEST_LINE)]
+Line = Annotated[str, Field(max_length=MOST_LINE)]
 Seconds = Annotated[int, Field(ge=0, le=2_000_000_000)]
 
 

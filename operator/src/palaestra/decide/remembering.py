@@ -4,7 +4,7 @@ It is written down as soon as the trainer has ended and stays when the pod is go
 end is remembered once another has taken its place.
 """
 
-from palaestra.api.history import LONGEST_LINE, MOST_FAULTS, MOST_LINES, Fault, LastAttempt
+from palaestra.api.history import Fault, LastAttempt
 from palaestra.api.lines import one_line
 from palaestra.api.reasons import LONGEST_MESSAGE
 from palaestra.decide.attempts import Attempt, of_pod, why
@@ -15,7 +15,7 @@ from palaestra.decide.situation import Situation, Verdict
 from palaestra.decide.troubles import left_by
 from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra.observe.views import PodView
-from palaestra_sim.protocol.status import FaultRecord
+from palaestra_sim.protocol.status import MOST_FAULTS, MOST_LINE, MOST_LINES, FaultRecord
 
 
 def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | None:
@@ -90,7 +90,7 @@ def _log(attempt: Attempt) -> tuple[str, ...]:
         lines = attempt.word.log
     elif attempt.pod is not None:
         lines = tuple(left_by(attempt.pod).splitlines())
-    told = (one_line(line, LONGEST_LINE) for line in lines)
+    told = (one_line(line, MOST_LINE) for line in lines)
     return tuple(line for line in told if line)[-MOST_LINES:]
 
 
@@ -102,7 +102,7 @@ def _faults(records: tuple[FaultRecord, ...]) -> list[Fault]:
             time=at,
             simulator=one_line(each.simulator, LONGEST_NAME) or "unnamed",
             kind=each.kind,
-            fact=one_line(each.fact, LONGEST_LINE),
+            fact=one_line(each.fact, MOST_LINE),
             step=min(each.step, MOST_COUNT),
         )
         for each, at in timed[-MOST_FAULTS:]

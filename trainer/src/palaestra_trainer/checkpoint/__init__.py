@@ -10,7 +10,7 @@ rest is JSON and plain arrays. How a resumed run comes to be the same: docs/deci
 from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, describe, refuse_another_run
 from palaestra_trainer.checkpoint.state import State
 from palaestra_trainer.checkpoint.store import Saver, newest, restore
-from palaestra_trainer.checkpoint.tensors import finite, load_tensors
+from palaestra_trainer.checkpoint.tensors import load_tensors
 
 __all__ = [
     "Checkpoint",
@@ -18,7 +18,6 @@ __all__ = [
     "Saver",
     "State",
     "describe",
-    "finite",
     "load_tensors",
     "newest",
     "refuse_another_run",

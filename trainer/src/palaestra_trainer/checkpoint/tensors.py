@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
 
@@ -28,8 +27,3 @@ def load_tensors(path: Path, model: BaseAlgorithm) -> None:
     for name, value in (variables or {}).items():
         if value is not None:
             recursive_setattr(model, f"{name}.data", value.data)
-
-
-def finite(model: BaseAlgorithm) -> bool:
-    """Return whether every parameter of the model's networks is a finite number."""
-    return all(bool(torch.isfinite(parameter).all()) for parameter in model.policy.parameters())

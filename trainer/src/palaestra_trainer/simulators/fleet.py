@@ -12,7 +12,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group
-from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
+from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.member import Member, Watcher
 
 
@@ -60,8 +60,7 @@ class Fleet:
             keeper.begin_start()
         try:
             while not self._enough():
-                wait([work for keeper in self._all if (work := keeper.under_way)], LOOK_EVERY_S)
-                check()
+                await_one(self._all, check)
         except BaseException:
             for keeper in self._all:
                 keeper.abandon()
