@@ -11,11 +11,12 @@ import yaml
 from palaestra_trainer.environments import baselines
 from palaestra_trainer.environments.move_to_target import make
 from tests.bench.arena import running
-from tests.bench.runs import JOB, PALAESTRA
+from tests.local_run import PALAESTRA
+from tests.soak.jobs import example
 
 SEEDS = (1, 2, 3, 4, 5)
 EPISODES = 100
-MOVEMENTS = yaml.safe_load(JOB.read_text())["spec"]["trainer"]["environment"]["options"]["movements"]
+MOVEMENTS = example("move-to-target")["spec"]["trainer"]["environment"]["options"]["movements"]
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
@@ -32,7 +33,7 @@ def measure():
 def train_and_measure(seed):
     """Return the success rate, on seeds that nothing was chosen on, of a policy trained with `seed`."""
     with tempfile.TemporaryDirectory() as folder:
-        job = yaml.safe_load(JOB.read_text())
+        job = example("move-to-target")
         job["spec"]["seed"] = seed
         file = Path(folder) / "job.yaml"
         file.write_text(yaml.safe_dump(job))

@@ -37,6 +37,22 @@ def scratch(monkeypatch, tmp_path):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
+class Clock:
+    """A clock that is set by hand."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        """Tell the time."""
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    """Return a clock that stands still."""
+    return Clock()
+
+
 class Corridor(gymnasium.Env[np.ndarray, Any]):
     """Walk right (1) to the goal, three steps away; left (0) leads nowhere, for eight steps.
 

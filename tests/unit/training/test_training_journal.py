@@ -13,22 +13,6 @@ from palaestra_trainer.progress import Counters, Progress
 KILLED = ZeroDivisionError("as good as a kill")
 
 
-class Clock:
-    """A clock that is set by hand."""
-
-    now = 0.0
-
-    def __call__(self):
-        """Tell the time."""
-        return self.now
-
-
-@pytest.fixture
-def clock():
-    """Return a clock that stands still."""
-    return Clock()
-
-
 @pytest.fixture
 def progress(clock):
     """Return the progress of a run."""
