@@ -14,6 +14,7 @@ import pytest
 
 from tests.e2e.askers import Asker
 from tests.e2e.cluster import Cluster, Object
+from tests.e2e.evictions import Evictions
 from tests.e2e.jobs import make_job
 from tests.e2e.long_run import LongRun
 from tests.e2e.namespace import OPERATOR, SYSTEM, Namespace
@@ -21,7 +22,7 @@ from tests.e2e.namespace import OPERATOR, SYSTEM, Namespace
 CHOSEN = "PALAESTRA_E2E"  # set by whoever chose the cluster of $KUBECONFIG for tests
 MONITORING = "monitoring"  # the operator's --monitoring-namespace
 NAMESPACE_BYTES = 40
-BEGIN_FIRST = ("long_run", "always_interrupted")
+BEGIN_FIRST = ("long_run", "evictions", "always_interrupted")
 LATE = ("comes_late", "trains", "changes_the_operator")
 
 
@@ -81,6 +82,13 @@ def begun(request: pytest.FixtureRequest) -> None:
 def long_run(cluster: Cluster) -> Iterator[LongRun]:
     """move-to-target in full, with two replicas, while its operator is killed again and again."""
     with LongRun(Namespace(cluster, _unique("move-to-target"))) as run:
+        yield run
+
+
+@pytest.fixture(scope="session")
+def evictions(cluster: Cluster) -> Iterator[Evictions]:
+    """A training whose pod is evicted five times."""
+    with Evictions(Namespace(cluster, _unique("evictions"))) as run:
         yield run
 
 
