@@ -183,7 +183,10 @@ class Place:
 
     def take(self, pod: Object, reason: str, message: str, **status: Any) -> None:
         """Say that the cluster takes a pod; keywords are more of its status."""
-        taken = {"type": "DisruptionTarget", "status": "True", "reason": reason, "message": message}
+        # Kubernetes takes back a disruption that it holds for older than two minutes.
+        now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        taken = {"type": "DisruptionTarget", "status": "True", "lastTransitionTime": now}
+        taken |= {"reason": reason, "message": message}
         self._patch(pod, {"conditions": [taken], **status})
 
     def kill(self, pod: Object, container: str) -> None:
