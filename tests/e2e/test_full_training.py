@@ -39,8 +39,8 @@ def test_metrics_are_scraped_from_every_trainer_and_sidecar(long_run, monitor):
         scraped = {name: monitor.get(pod, port, "/metrics") for name, port in ports.items()}
 
         assert scraped.keys() == {"metrics", "sim-0", "sim-1"}
-        assert "palaestra_trainer_steps " in scraped["metrics"]
-        assert 'palaestra_simulator_state{state="ready"}' in scraped["sim-0"]
+        assert "palaestra_trainer_steps_total " in scraped["metrics"]
+        assert 'palaestra_simulator_state{slot="a",state="ready"}' in scraped["sim-0"]
         assert "palaestra_simulator_starts_total" in scraped["sim-1"]
 
 

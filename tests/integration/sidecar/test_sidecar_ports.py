@@ -10,6 +10,18 @@ import pytest
 from palaestra_sim.protocol.control import SidecarState
 from palaestra_sim.sidecar.keeper import children
 
+BUSY = """
+import os, signal, time
+child = os.fork()
+while time.process_time() < 0.2:
+    pass
+if not child:
+    os._exit(0)
+os.waitpid(child, 0)
+print("up")
+signal.pause()
+"""
+
 
 def raw(address, text):
     """Return the first line of the answer to bytes that need not be HTTP."""
@@ -56,19 +68,20 @@ def test_the_metrics_count_starts_faults_and_states(sidecar, ends) -> None:
     _, text = it.ask("GET", "/metrics", address=it.health)
 
     values = dict(re.findall(r"^(palaestra_\S+) (\S+)$", text, re.MULTILINE))
-    assert values.pop('palaestra_build_info{version="0.1.0"}') == "1.0"
+    assert values.pop('palaestra_sidecar_build_info{version="0.1.0"}') == "1.0"
     assert {name.removeprefix("palaestra_simulator_"): float(value) for name, value in values.items()} == {
-        "up": 0,
-        "starts_total": 1,
-        'faults_total{kind="code"}': 0,
-        'faults_total{kind="signal"}': 1,
-        'faults_total{kind="unknown"}': 0,
-        'state{state="idle"}': 0,
-        'state{state="starting"}': 0,
-        'state{state="ready"}': 0,
-        'state{state="stopping"}': 0,
-        'state{state="failed"}': 1,
-        "rss_bytes": 0,
+        'up{slot="a"}': 0,
+        'starts_total{slot="a"}': 1,
+        'unexpected_exits_total{kind="code",slot="a"}': 0,
+        'unexpected_exits_total{kind="signal",slot="a"}': 1,
+        'unexpected_exits_total{kind="unknown",slot="a"}': 0,
+        'state{slot="a",state="idle"}': 0,
+        'state{slot="a",state="starting"}': 0,
+        'state{slot="a",state="ready"}': 0,
+        'state{slot="a",state="stopping"}': 0,
+        'state{slot="a",state="failed"}': 1,
+        'rss_bytes{slot="a"}': 0,
+        'cpu_seconds_total{slot="a"}': 0,
     }
 
 
@@ -79,9 +92,20 @@ def test_the_metrics_know_the_memory_of_the_whole_family(sidecar, family) -> Non
 
     _, text = it.ask("GET", "/metrics", address=it.health)
 
-    (rss,) = re.findall(r"^palaestra_simulator_rss_bytes (\S+)$", text, re.MULTILINE)
-    assert "palaestra_simulator_up 1.0" in text
+    (rss,) = re.findall(r"^palaestra_simulator_rss_bytes{slot=\"a\"} (\S+)$", text, re.MULTILINE)
+    assert 'palaestra_simulator_up{slot="a"} 1.0' in text
     assert float(rss) > 4 * 4e6  # four Pythons
+
+
+def test_the_metrics_know_the_processor_time_of_the_whole_family(sidecar) -> None:
+    """Also that of those who have ended: by then it is their parent's."""
+    it = sidecar(BUSY)
+    it.start()
+
+    _, text = it.ask("GET", "/metrics", address=it.health)
+
+    (used,) = re.findall(r"^palaestra_simulator_cpu_seconds_total{slot=\"a\"} (\S+)$", text, re.MULTILINE)
+    assert 0.35 < float(used) < 1.0  # two times 0.2 s, in ticks of 0.01 s
 
 
 @pytest.mark.parametrize(

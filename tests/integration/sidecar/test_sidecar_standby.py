@@ -169,7 +169,7 @@ def test_a_simulator_is_told_its_slot(two) -> None:
 
 
 def test_the_metrics_tell_the_two_apart(two, waits) -> None:
-    """By a label that a sidecar with one simulator does not have."""
+    """By a label of which a sidecar with one simulator has one value."""
     it = two(waits)
     it.start(SECOND)
 
@@ -178,7 +178,7 @@ def test_the_metrics_tell_the_two_apart(two, waits) -> None:
     values = dict(re.findall(r"^palaestra_simulator_(\S+) (\S+)$", text, re.MULTILINE))
     assert (values['starts_total{slot="a"}'], values['starts_total{slot="b"}']) == ("0.0", "1.0")
     assert values['state{slot="b",state="starting"}'] == "1.0"
-    assert values['faults_total{kind="code",slot="a"}'] == "0.0"
+    assert values['unexpected_exits_total{kind="code",slot="a"}'] == "0.0"
     assert float(values['rss_bytes{slot="b"}']) > 4e6
 
 

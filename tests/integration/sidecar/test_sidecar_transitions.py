@@ -44,6 +44,11 @@ def test_a_simulator_is_told_which_start_it_is(sidecar) -> None:
     it.until_said("start 2")
 
 
+def test_a_simulator_lets_a_trainer_on_its_processor_go_on(sidecar, waits) -> None:
+    """Woken by a request, it would interrupt the trainer before that has asked the next one."""
+    assert os.sched_getscheduler(sidecar(waits).start().pid) == os.SCHED_BATCH
+
+
 def test_a_start_is_answered_before_the_simulator_is_there(sidecar, waits) -> None:
     """The trainer starts several at once and has a deadline for each."""
     state = sidecar(waits).request("/start")

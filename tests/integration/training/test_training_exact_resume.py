@@ -7,13 +7,15 @@ import json
 import os
 import random
 import signal
+import zipfile
 
 import numpy as np
 import pytest
 import torch
 from stable_baselines3.common.save_util import load_from_zip_file
+from torch.optim.optimizer import register_optimizer_step_pre_hook
 
-from palaestra_trainer import checkpoint, training
+from palaestra_trainer import checkpoint, patience, training
 from palaestra_trainer.configuration import load
 from palaestra_trainer.display import Lines
 from palaestra_trainer.errors import MasterLost
@@ -94,7 +96,7 @@ def attempt(fakes):
 
 
 def tensors(path):
-    """Return every tensor of a model and its optimisers by name, to the last bit."""
+    """Return every tensor of a model and its optimisers by name, and what it normalizes by."""
     _, parameters, variables = load_from_zip_file(path, device="cpu", load_data=False)
 
     def walk(name, value):
@@ -104,7 +106,10 @@ def tensors(path):
         elif isinstance(value, torch.Tensor):
             yield name, value.tolist()
 
-    return dict(walk("", parameters | (variables or {})))
+    with zipfile.ZipFile(path) as archive:
+        normalized = [it for it in archive.namelist() if it == "normalize.json"]
+        known = {name: json.loads(archive.read(name)) for name in normalized}
+    return dict(walk("", parameters | (variables or {}))) | known
 
 
 def outcome(directory):
@@ -130,11 +135,12 @@ def differences(one, other):
 def job(write_job):
     """Write the job of a short run of an algorithm."""
 
-    def write(name, collectors=1, actions="discrete", **hyperparameters):
+    def write(name, collectors=1, actions="discrete", normalize=None, **hyperparameters):
         options = {"max_steps": 30, "actions": "continuous" if name == "SAC" else actions}
+        algorithm = {"name": name, "hyperparameters": ALGORITHMS[name] | hyperparameters}
         return write_job(
             collectors=collectors,
-            algorithm={"name": name, "hyperparameters": ALGORITHMS[name] | hyperparameters},
+            algorithm=algorithm | ({} if normalize is None else {"normalize": normalize}),
             environment={"id": "MoveToTargetEnv-v0", "options": options},
             steps=500,
             evaluation={"everySteps": 150, "episodes": 2},
@@ -161,6 +167,80 @@ def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name
         assert attempt(job(name, collectors), parts, played, point, interrupt) == expected
     assert attempt(job(name, collectors), parts, played) == 0
 
+    assert played == ended
+    assert differences(whole, parts) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "collectors", "normalize"),
+    [
+        ("DQN", 2, {}),
+        ("PPO", 2, {"clipObservations": 2}),
+        ("A2C", 1, {"observations": False}),
+        ("SAC", 1, {"rewards": False}),
+        ("REINFORCE", 2, {}),
+    ],
+)
+def test_what_a_run_normalizes_by_goes_on_where_it_was(attempt, job, tmp_path, name, collectors, normalize):
+    """Its statistics change with every step, also amid a rollout that is played again."""
+    whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
+    normalizing = job(name, collectors, normalize=normalize)
+    ended, played = [], []
+
+    assert attempt(normalizing, whole, ended) == 0
+    for point, interrupt in zip((77, 91, 60), INTERRUPTIONS, strict=True):
+        assert attempt(normalizing, parts, played, point, interrupt) == INTERRUPTIONS[interrupt]
+    assert attempt(normalizing, parts, played) == 0
+
+    assert "normalize.json" in outcome(whole)
+    assert played == ended
+    assert differences(whole, parts) == []
+
+
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_path, name):
+    """A signal waits for no update of minutes; what it changed so far is put back.
+
+    In its second gradient step of an optimiser, where it takes so many; none is taken after it.
+    """
+    whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
+    asked_at = 1 if name in {"A2C", "REINFORCE"} else 2
+    ended, played, steps = [], [], itertools.count(1)
+
+    def ask(*_step):
+        if next(steps) == asked_at:
+            terminate()
+            patience.end(0.0)
+
+    assert attempt(job(name), whole, ended) == 0
+    assert attempt(job(name), parts, played, 130, kill) == 1
+    with register_optimizer_step_pre_hook(ask):
+        assert attempt(job(name), parts, played) == 75
+    assert attempt(job(name), parts, played) == 0
+
+    assert next(steps) == asked_at + 1
+    assert played == ended
+    assert differences(whole, parts) == []
+
+
+@pytest.mark.parametrize("name", ["DQN", "SAC"])
+def test_the_first_update_of_a_run_may_be_left_too(attempt, job, tmp_path, name):
+    """Before an off-policy run learns, its updates take no time: that says nothing of the first one."""
+    whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
+    thorough = job(name, gradient_steps=4)
+    ended, played, steps = [], [], itertools.count(1)
+
+    def ask(*_step):
+        if next(steps) == 1:
+            terminate()
+            patience.end(0.0)
+
+    assert attempt(thorough, whole, ended) == 0
+    with register_optimizer_step_pre_hook(ask):
+        assert attempt(thorough, parts, played) == 75
+    assert attempt(thorough, parts, played) == 0
+
+    assert next(steps) == 2
     assert played == ended
     assert differences(whole, parts) == []
 

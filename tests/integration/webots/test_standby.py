@@ -14,6 +14,8 @@ import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_sim.protocol.control import SidecarState
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.keeper import Keeper, settle
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
@@ -27,7 +29,7 @@ LONG_S = 5.0  # a thousand times what a change of roles takes here
 class Pair:
     """A member with a spare, and its two simulators to look at."""
 
-    def __init__(self, launcher, recycle):
+    def __init__(self, launcher, recycle, care):
         def make(robot, scene):
             return gymnasium.make("MoveToTargetEnv-v0", disable_env_checker=True, robot=robot, scene=scene)
 
@@ -36,7 +38,7 @@ class Pair:
             Simulator("collect-0", sidecar, make, START_DEADLINE_S, recycle)
             for sidecar in (launcher, launcher.standby())
         )
-        self.member = Standby(self.first, self.second)
+        self.member = Standby(self.first, self.second, care)
 
     def begin(self):
         """Start it, wait for the spare, and begin an episode."""
@@ -76,10 +78,10 @@ def pair(master, tmp_path):
     del master
     made = []
 
-    def make(*options, recycle=None):
+    def make(*options, recycle=None, care=None):
         names = ("--job=pair", f"--uid={tmp_path.name}", f"--work={tmp_path}", "--standby")
         launcher = ProcessLauncher("arena", options=options, names=names)
-        made.append(Pair(launcher, recycle))
+        made.append(Pair(launcher, recycle, care))
         return made[-1]
 
     yield make
@@ -177,9 +179,21 @@ def test_a_spare_that_broke_is_told_and_the_restart_after_that_goes_well(pair, n
     it.wait_for_spare()
 
 
-def test_a_spare_that_does_not_come_up_is_told_when_it_is_wanted(pair):
+def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
+    """Else the next fault would cost a start, however long ago the refusal was."""
+    it = pair("--fault=start_refused:start=2").begin()
+
+    it.member.restart()
+    it.wait_for_spare()
+    it.member.restart()
+
+    assert it.plays_in(it.first)
+    assert it.first.sidecar.state().starts == 3
+
+
+def test_a_spare_that_does_not_come_up_within_its_budget_is_told_when_it_is_wanted(pair):
     """The simulator that works goes on until then."""
-    it = pair("--fault=start_refused:start=2")
+    it = pair("--fault=start_refused:start=2", care=Care(restart_limit=0))
     it.member.start()
     it.member.restart()
     it.member.env.reset(seed=1)
@@ -240,6 +254,25 @@ def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
         state = simulator.sidecar.state()
         assert (state.state in {SidecarState.IDLE, SidecarState.FAILED}, state.pid) == (True, None)
     assert not [thread for thread in threading.enumerate() if thread.name.startswith("standby-")]
+
+
+def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandoned(pair):
+    """However large the budget: a run that ends gives each of its simulators a few seconds."""
+    held = [f"--fault=slow_start:latency_ms=20000,start={start}" for start in range(2, 60)]
+    it = pair(*held, care=Care(restart_limit=1000)).begin()
+    it.member.restart()
+    keeper = Keeper(it.member, Care(restart_limit=1000))
+    keeper.begin_mending(SimulatorDead("collect-0", "gone"))
+    give_up = time.monotonic() + PATIENCE_S
+    while it.first.sidecar.state().starts < 2:
+        assert time.monotonic() < give_up
+        time.sleep(0.01)
+
+    begin = time.monotonic()
+    settle([keeper])
+
+    assert not keeper.busy
+    assert time.monotonic() - begin < LONG_S
 
 
 def test_what_was_stopped_can_be_started_again(pair):

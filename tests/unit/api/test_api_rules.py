@@ -107,6 +107,27 @@ BROKEN = {
         {"trainer.environment.options": {"actions": "continuous"}},
         "spec.trainer.algorithm.name: DQN needs discrete actions; set environment.options.actions: discrete",
     ),
+    "nothing normalized": (
+        {"trainer.algorithm.normalize": {"observations": False, "rewards": False}},
+        (
+            "spec.trainer.algorithm.normalize: nothing is normalized while observations and rewards are "
+            "false; remove it"
+        ),
+    ),
+    "observations clipped that are not normalized": (
+        {"trainer.algorithm.normalize": {"observations": False, "clipObservations": 5}},
+        (
+            "spec.trainer.algorithm.normalize.clipObservations: no observation is normalized while "
+            "observations is false; remove it"
+        ),
+    ),
+    "rewards clipped that are not normalized": (
+        {"trainer.algorithm.normalize": {"rewards": False, "clipRewards": 5}},
+        (
+            "spec.trainer.algorithm.normalize.clipRewards: no reward is normalized while rewards is false; "
+            "remove it"
+        ),
+    ),
     "a claim for what is kept nowhere": (
         {"storage": {"ephemeral": True, "existingClaim": "runs"}},
         "spec.storage.ephemeral: excludes existingClaim; remove one of them",
@@ -196,6 +217,10 @@ KEPT = {
     "PPO with twists": {
         "trainer.algorithm.name": "PPO",
         "trainer.environment.options": {"actions": "continuous"},
+    },
+    "everything normalized": {"trainer.algorithm.normalize": {}},
+    "rewards normalized and clipped": {
+        "trainer.algorithm.normalize": {"observations": False, "clipRewards": 5}
     },
     "kept nowhere": {"storage.ephemeral": True},
     "another job's run": {"storage": {"existingClaim": "runs", "resumeFrom": "5a0c"}},

@@ -7,7 +7,7 @@ import yaml
 
 from palaestra.api import load
 from palaestra.plan import ClusterLayout, Images, identified, plan
-from palaestra_trainer.configuration import Recycle, parse
+from palaestra_trainer.configuration import Normalize, Recycle, parse
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "manifests" / "examples").glob("*.yaml"))
 
@@ -42,6 +42,24 @@ def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
     read = read_back(job)
 
     assert read.evaluation.every_steps == 0
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ({}, None),
+        ({"normalize": {}}, Normalize()),
+        (
+            {"normalize": {"rewards": False, "clipObservations": 5}},
+            Normalize(rewards=False, clip_observations=5.0),
+        ),
+    ],
+)
+def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
+    """What is absent has its default in the trainer alone."""
+    job = make_job(trainer={"algorithm": {"name": "PPO"} | written})
+
+    assert read_back(job).algorithm.normalize == read
 
 
 def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):

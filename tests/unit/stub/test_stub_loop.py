@@ -78,13 +78,33 @@ def test_what_arrives_is_answered_meanwhile(loop, chatter):
     assert said == [b"question"] * 3
 
 
-def test_after_a_short_wait_it_looks_before_it_sleeps(loop, chatter, looks):
+def test_after_short_waits_it_looks_before_it_sleeps(loop, chatter, looks):
     """Being woken would take longer than what comes next."""
     chatter(50)
 
     run(loop, 0.05)
 
     assert looks
+
+
+def test_a_longer_wait_now_and_then_is_enough_not_to_look(loop, pair, looks):
+    """What is looked for in vain takes the processor from the simulators beside it."""
+
+    def ask():
+        asked.append(pair.send(b"question"))
+        if len(asked) < 20:
+            loop.later(0.012, ask)
+        else:
+            loop.stop()
+
+    asked = []
+    loop.watch(pair, lambda: pair.recv(100))
+    ask()
+    run(loop, 10.0)
+    loop.forget(pair)
+
+    assert len(asked) == 20
+    assert not looks
 
 
 def test_it_does_not_look_for_a_moment_that_is_near(loop, chatter, looks):

@@ -154,6 +154,17 @@ def test_the_replay_buffer_is_restored(trained, steps):
     assert equal(before.model, after.model)
 
 
+def test_a_checkpoint_whose_size_cannot_be_looked_at_is_one_all_the_same(trained):
+    """It is written; a figure of a dashboard is no reason to end a run."""
+    it = trained()
+    it.save()
+    before = it.saver.size_bytes()
+    (it.path(it.model.num_timesteps) / "model.zip").unlink()
+
+    assert before > 1000
+    assert it.saver.size_bytes() == 0
+
+
 def test_only_chunks_that_changed_are_written_again(trained):
     """The others are the files of the checkpoint before; a million rows would take too long."""
     model = trained(steps=100)

@@ -43,7 +43,7 @@ def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
     evaluation = evaluate(Walker(), member, [10, 20])
 
     assert member.env.seeds == [10, 20, 20]
-    assert evaluation.faults == 1
+    assert (evaluation.faults, evaluation.steps_lost) == (1, 1)
     assert evaluation.success_rate == 1.0
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.configuration import parse
-from palaestra_trainer.errors import FaultBudgetSpent, SimulatorHung
+from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
 from palaestra_trainer.interruption import Interrupted, Interruption
 from palaestra_trainer.simulators.budget import Care
 from palaestra_trainer.simulators.fleet import Fleet, resting
@@ -118,6 +118,26 @@ def test_training_begins_when_enough_of_each_group_are_up(make_configuration, ma
     wait([work for keeper in fleet.collecting if (work := keeper.under_way)], DEADLINE_S)
     assert all(keeper.up() for keeper in fleet.collecting)
     assert watcher.told[-1] == "restarted collect-0"
+
+
+def test_one_that_fails_after_the_others_are_up_is_not_waited_for(make_configuration, make_member):
+    """From then on it is mended in the background, like any other."""
+    up = threading.Event()
+    late = make_member("collect-0", held=True)
+
+    def fail():
+        assert up.wait(DEADLINE_S)
+        raise SimulatorDead("collect-0", "does not come up")
+
+    late.start = fail
+    configuration = with_fewer(make_configuration(collectors=2, evaluators=0), 1)
+    fleet = Fleet(configuration, [late, make_member("collect-1")], Nobody())
+
+    fleet.start(lambda: fleet.collecting[1].up() and up.set())
+
+    assert fleet.collecting[0].busy
+    late.release.set()
+    fleet.stop()
 
 
 def test_training_does_not_begin_before_every_one_was_tried(make_configuration, make_member):

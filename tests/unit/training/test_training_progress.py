@@ -32,7 +32,7 @@ def get(server, path):
 def evaluation(*, success):
     """Return an evaluation of one episode."""
     episode = Episode(seed=1, total_reward=1.0, length=3, success=success)
-    return Evaluation(episodes=(episode,), faults=0, seconds=0.1)
+    return Evaluation(episodes=(episode,), faults=1, steps_lost=4, seconds=0.1)
 
 
 def test_at_the_start_nothing_is_known(progress):
@@ -232,6 +232,13 @@ def test_the_steps_of_an_episode_that_a_fault_cut_are_lost(progress):
     assert progress.status().steps_lost == 5
 
 
+def test_the_steps_of_an_evaluation_that_a_fault_cut_are_lost(progress):
+    """Nothing is learnt from them in any case, but they took as long."""
+    progress.evaluated(evaluation(success=True))
+
+    assert progress.status().steps_lost == 4
+
+
 def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progress):
     """As the checkpoint tells the next attempt; a run that goes on itself has lost none."""
     progress.collected(47, [])
@@ -286,13 +293,13 @@ def test_metrics_are_the_same_numbers(progress):
     with StatusServer("127.0.0.1:0", progress) as server:
         text = get(server, "/metrics")
 
-    assert "palaestra_trainer_steps 7.0" in text
+    assert "palaestra_trainer_steps_total 7.0" in text
     assert "palaestra_trainer_episodes_total 1.0" in text
-    assert 'palaestra_simulator_faults_total{kind="dead"} 1.0' in text
-    assert 'palaestra_simulator_faults_total{kind="hung"} 0.0' in text
+    assert 'palaestra_simulator_faults_total{kind="dead",simulator="collect-0"} 1.0' in text
+    assert 'palaestra_simulator_faults_total{kind="hung",simulator="collect-0"} 0.0' in text
     assert 'palaestra_trainer_seconds_total{cause="starting"} 0.0' in text
     assert "palaestra_trainer_steps_lost_total 0.0" in text
-    assert "palaestra_trainer_success_ratio" not in text
+    assert "\npalaestra_trainer_evaluation_success_ratio" not in text
 
 
 def test_probes_are_answered(progress):

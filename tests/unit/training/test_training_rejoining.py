@@ -115,3 +115,16 @@ def test_a_run_with_another_number_of_simulators_ends(play, job, directory, name
 def fields(state):
     """Return what a state was made of."""
     return {name: getattr(state, name) for name in state.__slots__}
+
+
+def test_an_episode_that_begins_anew_owes_no_reward_to_the_one_before(make_env, make_configuration):
+    """Rewards are normalized by the discounted return of an episode so far."""
+    env = make_env()
+    model = make_model(make_configuration(algorithm=TINY | {"normalize": {}}).algorithm, env, seed=1)
+    model.learn(10)
+    before = checkpoint.State.of(model, env.snapshot(), {"terms": [{}, {}]})
+
+    after, _ = rejoined(make_env(faults={1: {"resets": [1]}}), before)
+
+    assert all(before.running_returns)
+    assert after.running_returns.tolist() == [before.running_returns[0], 0.0]

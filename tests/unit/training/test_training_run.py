@@ -239,6 +239,32 @@ def test_tensorboard_has_the_tags_that_people_look_for(play, job, directory):
     }
 
 
+def in_order(folder):
+    """Return what TensorBoard shows of a folder, also where all of its files are of one second."""
+    files = sorted(folder.iterdir(), key=lambda it: (int(it.name.split(".")[3]), int(it.suffix[1:])))
+    whole = folder.with_name("events.out.tfevents")
+    whole.write_bytes(b"".join(file.read_bytes() for file in files))
+    events = EventAccumulator(str(whole))
+    events.Reload()
+    return events
+
+
+@pytest.mark.parametrize("killed_at", [30, 75], ids=["before the first checkpoint", "after it"])
+def test_tensorboard_shows_no_step_twice_when_a_run_was_resumed(play, job, directory, killed_at):
+    """The steps after the checkpoint are played again; their first points would cross the second ones."""
+    noisy = job("A2C", checkpoint={"everySteps": 50, "keep": 2}, evaluation={"everySteps": 10, "episodes": 1})
+    kill = {"collect-0": {"steps": {killed_at: ZeroDivisionError("as good as a kill")}}}
+
+    assert play(noisy, kill)[0] == 1
+    assert play(noisy)[0] == 0
+
+    steps = [event.step for event in in_order(directory.tensorboard).Scalars("eval/success_rate")]
+    lines = [line["step"] for line in read_lines(directory.evaluations)]
+    assert steps == lines
+    assert steps == sorted(set(steps))
+    assert steps[-1] >= 100
+
+
 def test_measuring_needs_a_model_and_somebody_who_evaluates(job, directory):
     """Each with its own remedy."""
     with pytest.raises(ConfigurationError, match=r"model.zip: is not there; train first"):

@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+import socket
+import threading
+import time
+from contextlib import ExitStack
+from functools import partial
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.turns import let_others, take_turns
+from palaestra_trainer import patience
+from palaestra_trainer.turns import away_s, let_others, take_turns
+from palaestra_trainer.waits import waited_s
+
+
+@pytest.fixture
+def connections():
+    """Two connections, each with an end that asks and one that answers."""
+    with ExitStack() as stack:
+        yield [[stack.enter_context(end) for end in socket.socketpair()] for _ in range(2)]
 
 
 @given(st.lists(st.integers(0, 4), max_size=5))
@@ -87,3 +102,112 @@ def test_an_interruption_ends_the_others_where_they_stand():
     with pytest.raises(KeyboardInterrupt):
         take_turns([wait, interrupt, wait])
     assert told == ["cleaned up"]
+
+
+def test_whoever_has_an_answer_goes_before_those_who_have_none(connections):
+    """A simulator that is slow holds up nobody but itself."""
+    (slow, answers_slowly), (quick, answers_quickly) = connections
+    told = []
+
+    def wait_long():
+        let_others(until=slow)
+        told.append("slow")
+
+    def wait_briefly():
+        answers_quickly.send(b"here")
+        let_others(until=quick)
+        told.append("quick")
+        answers_slowly.send(b"here")
+
+    take_turns([wait_long, wait_briefly])
+
+    assert told == ["quick", "slow"]
+
+
+def test_of_several_answers_the_first_that_was_asked_for_is_read_first(connections):
+    """An order that does not depend on chance, where there is a choice."""
+    told = []
+
+    def work(place):
+        let_others(until=connections[place][0])
+        told.append(place)
+
+    for _, answers in connections:
+        answers.send(b"here")
+    take_turns([lambda: work(0), lambda: work(1)])
+
+    assert told == [0, 1]
+
+
+def test_an_answer_that_stays_away_is_left_to_whoever_asked_first(connections):
+    """It knows its deadline, and what its simulator's silence means."""
+    told = []
+
+    def work(place):
+        let_others(until=connections[place][0])
+        told.append(place)
+        connections[1][1].send(b"here")
+
+    take_turns([lambda: work(0), lambda: work(1)])
+
+    assert told == [0, 1]
+
+
+def test_a_wait_of_all_is_nobody_s_turn(connections):
+    """It counts as waiting for simulators, and as part of every step that waits."""
+    began, waited = time.perf_counter(), waited_s()
+    found = []
+
+    def work(place):
+        let_others(until=connections[place][0])
+        found.append(time.perf_counter() - began - away_s())
+
+    answer = threading.Timer(0.01, lambda: [answers.send(b"here") for _, answers in connections])
+    answer.start()
+    take_turns([lambda: work(0), lambda: work(1)])
+    answer.join()
+
+    assert waited_s() > waited
+    assert min(found) > 0.009
+
+
+def test_the_slow_wait_beside_each_other_too(connections):
+    """A step of fifty milliseconds takes that long, whoever was asked before."""
+    began, found = time.perf_counter(), []
+
+    def work(place):
+        asks, _ = connections[place]
+        let_others(until=asks)
+        asks.recv(100)
+        found.append(time.perf_counter() - began - away_s())
+
+    answer = threading.Timer(0.05, lambda: [answers.send(b"here") for _, answers in connections])
+    answer.start()
+    take_turns([lambda: work(0), lambda: work(1)])
+    answer.join()
+
+    assert min(found) > 0.045
+
+
+def test_when_patience_is_over_nobody_is_waited_for(connections):
+    """Sixteen simulators may hang when a run is asked to end."""
+    waited = waited_s()
+    patience.end(after_s=-1.0)
+    try:
+        take_turns([partial(let_others, until=asks) for asks, _ in connections])
+    finally:
+        patience.renew()
+
+    assert waited_s() - waited < 0.4
+
+
+def test_of_several_errors_the_first_work_s_is_raised(connections):
+    """Whoever answered first, so that a run that is repeated fails in the same way."""
+
+    def fail(place):
+        if place == 0:
+            let_others(until=connections[0][0])
+        raise LookupError(str(place))
+
+    with pytest.raises(LookupError, match="0"):
+        take_turns([lambda: fail(0), lambda: fail(1)])

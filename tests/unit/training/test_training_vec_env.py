@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 import pytest
+import structlog
 from gymnasium import Wrapper, spaces
 from stable_baselines3.common.vec_env import VecEnv
 
@@ -387,6 +388,19 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
     assert member.log == ["restart"]
     assert all(infos[0]["valid"] for _, _, _, infos in rows)
     assert member.resets == 2
+
+
+def test_a_recycling_is_told_once_a_minute_with_the_number_of_all(make_member, clock):
+    """A line every few seconds hides those that matter; the first says that the limits work."""
+    keeper = Keeper(make_member(recycle_after=1), clock=clock)
+
+    with structlog.testing.capture_logs() as logs:
+        keeper.reset(seed=1)
+        for clock.now in (0.0, 5.0, 59.0, 61.0, 62.0, 122.0):
+            keeper.reset(seed=1)
+
+    told = [line["times"] for line in logs if line["event"] == "simulator recycled"]
+    assert told == [1, 4, 6]
 
 
 def test_members_are_recycled_at_the_same_time(make_env, make_member):

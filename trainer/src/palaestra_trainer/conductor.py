@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import structlog
@@ -18,9 +19,9 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer import checkpoint
+from palaestra_trainer import algorithms, checkpoint, patience
 from palaestra_trainer.algorithms.buffers import valid_rows
-from palaestra_trainer.checkpoint import Checkpoint, State
+from palaestra_trainer.checkpoint import Checkpoint, State, Tensors
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.display import Display
 from palaestra_trainer.divergence import Learner
@@ -36,8 +37,8 @@ from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 log = structlog.get_logger(__name__)
 
-# Learning phases shorter than this are not worth two service calls a simulator.
-WORTH_RESTING_S = 0.5
+# Learning phases shorter than this are not worth two service calls a simulator, nor a copy of the model.
+LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
 
 
@@ -88,8 +89,10 @@ class Conductor(BaseCallback):
         self._terms: list[Counter[str]] = [
             Counter(terms) for terms in (resumed.state.rollout["terms"] if resumed else [{}] * env.num_envs)
         ]
-        self._learning_s = 0.0
+        self._learning_s: float | None = None
+        self._before_update: Tensors | None = None
         self._rollout_ended: float | None = None
+        self._updates = 0
         self._resting = False
         self.best = best_so_far(run.directory)
 
@@ -100,7 +103,7 @@ class Conductor(BaseCallback):
         if self._evaluated != self._step:
             self._evaluate_if_wanted()
         if not self._run.directory.model.exists():
-            replace_file(self._run.directory.model, self.model.save)
+            replace_file(self._run.directory.model, partial(checkpoint.save_tensors, model=self.model))
         self.save()
 
     def save(self) -> None:
@@ -109,6 +112,8 @@ class Conductor(BaseCallback):
         if state is None:
             return
         step = int(state.numbers["num_timesteps"])
+        if self._before_update is not None:
+            self._before_update.put_back(self.model)
         started = time.monotonic()
         with run.progress.spending(Cause.CHECKPOINTING):
             # What is counted by step is played again; faults and time are over for good.
@@ -116,15 +121,26 @@ class Conductor(BaseCallback):
             manifest = checkpoint.describe(run.configuration, step, counters)
             if self._saver.save(self.model, state, manifest):
                 run.progress.saved(step)
-                seconds = round(time.monotonic() - started, 3)
-                log.info("checkpoint written", step=step, seconds=seconds)
+                seconds = time.monotonic() - started
+                run.progress.figures.saved(seconds, self._saver.size_bytes())
+                log.info("checkpoint written", step=step, seconds=round(seconds, 3))
+            else:
+                run.progress.figures.saves_refused += 1
         self._saved = step
+
+    def leave_update(self, *_step: object) -> None:
+        """Raise Interrupted before a gradient step if a signal has come and the update takes too long.
+
+        Only where the tensors before the update are kept; what was collected for it is played again.
+        """
+        if self._before_update is not None and patience.is_over():
+            self._run.interruption.check()
 
     def _init_callback(self) -> None:
         self._learner = Learner(self.model)
 
     def _on_rollout_start(self) -> None:
-        if self._rollout_ended is not None:
+        if self._rollout_ended is not None and self._updates_so_far() != self._updates:
             self._learning_s = time.monotonic() - self._rollout_ended
         if self._resumed:
             # State-dependent exploration has drawn its noise for this rollout a second time.
@@ -158,12 +174,19 @@ class Conductor(BaseCallback):
     def _on_rollout_end(self) -> None:
         for name, value in self._run.progress.scalars().items():
             self.logger.record(name, value)
-        self._rollout_ended = time.monotonic()
-        if self._learning_s >= WORTH_RESTING_S:
+        self._rollout_ended, self._updates = time.monotonic(), self._updates_so_far()
+        if self._learning_s is not None and self._learning_s >= LONG_LEARNING_S:
             self._env.pause()
             self._resting = True
+        first = self._learning_s is None and self._step > getattr(self.model, "learning_starts", -1)
+        if first or self._resting:  # it may be long, or was the last time
+            self._before_update = Tensors.of(self.model)
+
+    def _updates_so_far(self) -> int:
+        return int(self.model._n_updates)  # noqa: SLF001 - told nowhere else
 
     def _mark_boundary(self) -> None:
+        self._before_update = None
         self._step = self.model.num_timesteps
         progress = self._run.progress
         self._boundary = State.of(
@@ -195,7 +218,8 @@ class Conductor(BaseCallback):
             resting(run.fleet.collecting),
             running(run.fleet.evaluating),
         ):
-            evaluation = evaluate_on_all(self.model, run.fleet.evaluating, seeds, run.interruption.check)
+            policy = algorithms.policy_of(self.model)
+            evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)
         run.progress.evaluated(evaluation)
         self.logger.record("eval/success_rate", evaluation.success_rate)
         self.logger.record("eval/mean_reward", evaluation.mean_return)
@@ -208,7 +232,7 @@ class Conductor(BaseCallback):
         directory = self._run.directory
         if self.best is None or evaluation.score > self.best:
             self.best = evaluation.score
-            replace_file(directory.model, self.model.save)
+            replace_file(directory.model, partial(checkpoint.save_tensors, model=self.model))
         append_line(directory.evaluations, {"step": self._step} | evaluation.summary())
 
     def _record_rewards(self, infos: list[dict[str, Any]], dones: Any) -> None:

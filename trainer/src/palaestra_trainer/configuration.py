@@ -54,11 +54,34 @@ class Environment(_Section):
     options: dict[str, Any] = Field(default_factory=dict)
 
 
+class Normalize(_Section):
+    """What is brought to one scale before it is learned from, see `algorithms.normalization`.
+
+    Attributes:
+        observations: each by its running mean and deviation.
+        rewards: by the running deviation of the discounted return.
+        clip_observations: the largest absolute value of a normalized observation.
+        clip_rewards: the largest absolute value of a normalized reward.
+    """
+
+    observations: bool = True
+    rewards: bool = True
+    clip_observations: Annotated[float, Field(gt=0)] = 10.0
+    clip_rewards: Annotated[float, Field(gt=0)] = 10.0
+
+
 class Algorithm(_Section):
-    """What learns: a name of the table of algorithms, and what differs from its defaults."""
+    """What learns.
+
+    Attributes:
+        name: one of the table of algorithms.
+        hyperparameters: what differs from its defaults there.
+        normalize: what is normalized; None: nothing.
+    """
 
     name: str = "DQN"
     hyperparameters: dict[str, Any] = Field(default_factory=dict)
+    normalize: Normalize | None = None
 
 
 class Evaluation(_Section):

@@ -62,11 +62,13 @@ class Evaluation:
     Attributes:
         episodes: in the order of their seeds.
         faults: episodes that a fault cut and that were played again.
+        steps_lost: steps of those episodes, up to the faults.
         seconds: wall time of all of them together.
     """
 
     episodes: tuple[Episode, ...]
     faults: int
+    steps_lost: int
     seconds: float
 
     @property
@@ -135,7 +137,12 @@ def evaluate_on_all(
             games.play_on(left[0], check)
         else:
             _play_at_once(games, left[: games.missing], check)
-    return Evaluation(episodes=games.in_order(), faults=games.faults, seconds=time.monotonic() - started)
+    return Evaluation(
+        episodes=games.in_order(),
+        faults=games.faults,
+        steps_lost=games.steps_lost,
+        seconds=time.monotonic() - started,
+    )
 
 
 class _Games:
@@ -146,10 +153,11 @@ class _Games:
 
     Attributes:
         faults: episodes that were cut.
+        steps_lost: steps of theirs.
     """
 
     def __init__(self, policy: Policy, seeds: Iterable[int]) -> None:
-        self.faults = 0
+        self.faults = self.steps_lost = 0
         self._policy = policy
         self._waiting = deque(enumerate(seeds))
         self._played: dict[int, Episode] = {}
@@ -180,12 +188,14 @@ class _Games:
                 self._changed.wait(LOOK_EVERY_S)
                 return
             place, seed = self._waiting.popleft()
+        rewards: list[float] = []
         try:
-            episode = _play(self._policy, keeper, seed, check)
+            episode = _play(self._policy, keeper, seed, check, rewards)
         except SimulatorFault as fault:
             keeper.begin_mending(fault)
             with self._changed:
                 self.faults += 1
+                self.steps_lost += len(rewards)
                 self._waiting.appendleft((place, seed))
                 self._changed.notify_all()
         else:
@@ -214,21 +224,21 @@ def _play_at_once(games: _Games, keepers: Sequence[Keeper], check: Check) -> Non
             over.set()
 
 
-def _play(policy: Policy, keeper: Keeper, seed: int, check: Check) -> Episode:
+def _play(policy: Policy, keeper: Keeper, seed: int, check: Check, rewards: list[float]) -> Episode:
+    """Play an episode to its end; whatever cuts it, `rewards` has that of each step that was taken."""
     observation, _ = keeper.reset(seed, check=check)
-    total_reward, length, over = 0.0, 0, False
     info: dict[str, Any] = {}
+    over = False
     while not over:
         check()
         action, _ = policy.predict(observation, deterministic=True)
         observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
         keeper.watcher.stepped(1)
-        total_reward += float(reward)
-        length += 1
+        rewards.append(float(reward))
         over = terminated or truncated
     return Episode(
         seed=seed,
-        total_reward=total_reward,
-        length=length,
+        total_reward=sum(rewards),
+        length=len(rewards),
         success=bool(info.get("is_success", False)),
     )

@@ -45,10 +45,10 @@ def measure(
         stack.callback(fleet.stop)
         fleet.start()
         env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
-        policy = algorithms.make_model(configuration.algorithm, env, configuration.seed)
-        checkpoint.load_tensors(model, policy)
+        trained = algorithms.make_model(configuration.algorithm, env, configuration.seed)
+        checkpoint.load_tensors(model, trained)
         seeds = episode_seeds(configuration.seed, stream, episodes)
-        evaluation = evaluate_on_all(policy, fleet.evaluating, seeds)
+        evaluation = evaluate_on_all(algorithms.policy_of(trained), fleet.evaluating, seeds)
     return evaluation.summary() | {
         "seeds": stream,
         "run_seed": configuration.seed,

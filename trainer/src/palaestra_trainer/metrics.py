@@ -1,73 +1,161 @@
 """The run in Prometheus' words.
 
-Nothing is counted here: at each scrape the numbers are read from `Progress`,
-so that /metrics and /status can't differ.
+Nothing is counted here: at each scrape the numbers are read from `Progress`, so that /metrics and /status
+can't differ. Every family is always there, and has no value while it is not known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from statistics import fmean
+from types import MappingProxyType
 
-from prometheus_client import CollectorRegistry
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client import CollectorRegistry, ProcessCollector
+from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from palaestra_sim.protocol.status import FaultKind
-from palaestra_trainer.progress import Progress
+from palaestra_sim.protocol.metrics import Family, Values
+from palaestra_sim.protocol.status import SimulatorStatus, TrainerStatus
+from palaestra_trainer import families
+from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.figures import Figures
+from palaestra_trainer.progress import Counters, Progress
+
+# What is read of Stable-Baselines3's log: the value of a label, and the name it is logged under.
+LOSSES = MappingProxyType({name: f"train/{name}" for name in families.LOSSES})
+MEASURES = MappingProxyType(
+    {"exploration_rate": "rollout/exploration_rate", "ent_coef": "train/ent_coef", "std": "train/std"}
+)
+LEARNING_RATE = "train/learning_rate"
+
+
+def constants(configuration: Configuration) -> dict[Family, Values]:
+    """Return what does not change while a run lasts."""
+    return {
+        families.CHECKPOINT_INTERVAL: _one(configuration.checkpoint.every_steps),
+        families.STALL_DEADLINE: _one(configuration.stall_deadline_seconds),
+    }
+
+
+def registry(progress: Progress, known: Mapping[Family, Values] = MappingProxyType({})) -> CollectorRegistry:
+    """Return a registry of its own with everything that is known of a run, and of this process.
+
+    Args:
+        progress: where the run stands.
+        known: what `constants` returned.
+    """
+    made = CollectorRegistry()
+    made.register(_RunCollector(progress, known))
+    ProcessCollector(registry=made)
+    return made
 
 
 class _RunCollector(Collector):
-    def __init__(self, progress: Progress) -> None:
+    def __init__(self, progress: Progress, known: Mapping[Family, Values]) -> None:
         self._progress = progress
+        self._known = known
 
     def collect(self) -> Iterator[Metric]:
-        status, counters = self._progress.status(), self._progress.counted()
-        gauges = {
-            "palaestra_trainer_steps": ("Valid environment steps so far.", status.step),
-            "palaestra_trainer_target_steps": ("Steps at which the run ends.", status.target),
-            "palaestra_trainer_steps_per_second": ("Lately.", status.steps_per_second),
-            "palaestra_trainer_episode_return_mean": (
-                "Mean return of recent training episodes.",
-                status.mean_return,
-            ),
-            "palaestra_trainer_success_ratio": (
-                "Share of successful episodes in the last evaluation.",
-                status.success_rate,
-            ),
-            "palaestra_trainer_checkpoint_steps": (
-                "Step of the newest checkpoint.",
-                status.last_checkpoint.step if status.last_checkpoint else None,
-            ),
-            "palaestra_trainer_idle_seconds": (
-                "Since the last environment step.",
-                self._progress.idle_s(),
-            ),
+        progress = self._progress
+        values: dict[Family, Values] = {
+            **self._known,
+            **_steps(progress.status(), progress.counted()),
+            **_episodes(progress.figures, progress.returns()),
+            **_evaluations(progress.figures),
+            **_learning(progress.figures.logged),
+            **_checkpoints(progress.figures),
+            **_simulators(progress.figures),
+            families.IDLE: _one(progress.idle_s()),
+            families.FAULTS: progress.faults_by_kind(),
+            families.RESTARTS: progress.restarts_by_cause(),
+            families.BUILD: {(version("palaestra-trainer"),): 1},
         }
-        for name, (text, value) in gauges.items():
-            if value is not None:
-                yield GaugeMetricFamily(name, text, value)
-        totals = {
-            "palaestra_trainer_episodes": ("Training episodes without a fault.", counters.episodes),
-            "palaestra_simulator_restarts": ("Restarts after a fault.", counters.restarts),
-            "palaestra_simulator_recycles": ("Restarts of healthy ones.", counters.recycled),
-            "palaestra_simulators_given_up": ("Those the run went on without.", counters.given_up),
-            "palaestra_simulator_extra_steps": ("Steps for a late message.", counters.extra_steps),
-            "palaestra_trainer_steps_lost": ("Valid steps played in vain.", counters.steps_lost),
-        }
-        for name, (text, value) in totals.items():
-            yield CounterMetricFamily(name, text, value)
-        faults = CounterMetricFamily("palaestra_simulator_faults", "By kind.", labels=["kind"])
-        for kind in FaultKind:
-            faults.add_metric([kind], counters.faults[kind])
-        yield faults
-        spent = CounterMetricFamily("palaestra_trainer_seconds", "Wall clock by cause.", labels=["cause"])
-        for cause, seconds in counters.goodput.items():
-            spent.add_metric([cause], seconds)
-        yield spent
+        for family in families.FAMILIES:
+            yield family.metric(values.get(family, {}))
 
 
-def registry(progress: Progress) -> CollectorRegistry:
-    """Return a registry of its own with everything that is known of a run."""
-    made = CollectorRegistry()
-    made.register(_RunCollector(progress))
-    return made
+def _steps(status: TrainerStatus, counters: Counters) -> dict[Family, Values]:
+    checkpoint = status.last_checkpoint
+    return {
+        families.STEPS: _one(status.step),
+        families.TARGET_STEPS: _one(status.target),
+        families.STEPS_PER_SECOND: _one(status.steps_per_second),
+        families.STEPS_LOST: _one(counters.steps_lost),
+        families.EXTRA_STEPS: _one(counters.extra_steps),
+        families.EPISODES: _one(counters.episodes),
+        families.SECONDS: {(cause,): seconds for cause, seconds in counters.goodput.items()},
+        families.CHECKPOINT_STEPS: _one(checkpoint.step if checkpoint else None),
+        families.SIMULATORS: _by_state(status.simulators),
+    }
+
+
+def _episodes(figures: Figures, returns: Sequence[float]) -> dict[Family, Values]:
+    successes = tuple(figures.successes)
+    return {
+        families.RETURN: {(): figures.returns},
+        families.LENGTH: {(): figures.lengths},
+        families.RETURN_MEAN: _one(fmean(returns) if returns else None),
+        families.RETURN_QUANTILE: _quantiles(returns),
+        families.SUCCESS: _one(fmean(successes) if successes else None),
+    }
+
+
+def _evaluations(figures: Figures) -> dict[Family, Values]:
+    last = figures.evaluation
+    return {
+        families.EVALUATIONS: _one(figures.evaluations),
+        families.EVALUATION_SUCCESS: _one(last.success_rate if last else None),
+        families.EVALUATION_RETURN: _one(last.mean_return if last else None),
+        families.EVALUATION_LENGTH: _one(last.mean_length if last else None),
+    }
+
+
+def _learning(logged: Mapping[str, float]) -> dict[Family, Values]:
+    return {
+        families.LOSS: _logged(logged, LOSSES),
+        families.EXPLORATION: _logged(logged, MEASURES),
+        families.LEARNING_RATE: _one(logged.get(LEARNING_RATE)),
+    }
+
+
+def _checkpoints(figures: Figures) -> dict[Family, Values]:
+    return {
+        families.CHECKPOINT_TIME: _one(figures.saved_at),
+        families.CHECKPOINT_DURATION: {(): figures.saves},
+        families.CHECKPOINT_SIZE: _one(figures.saved_bytes),
+        families.CHECKPOINT_FAILURES: _one(figures.saves_refused),
+    }
+
+
+def _simulators(figures: Figures) -> dict[Family, Values]:
+    meters = figures.meters
+    simulated = {name: meter.simulated_s for name, meter in meters.items()}
+    return {
+        families.RESETS: {(name,): meter.resets for name, meter in meters.items()},
+        families.STEP_DURATION: {(name,): meter.steps for name, meter in meters.items()},
+        families.BUDGET: {(name,): meter.budget_spent for name, meter in meters.items()},
+        families.SIMULATED: {(name,): it for name, it in simulated.items() if it is not None},
+    }
+
+
+def _one(value: float | None) -> Values:
+    """Return the value of a family without labels; None: it is not known."""
+    return {} if value is None else {(): value}
+
+
+def _logged(logged: Mapping[str, float], names: Mapping[str, str]) -> Values:
+    return {(label,): float(logged[name]) for label, name in names.items() if name in logged}
+
+
+def _quantiles(values: Sequence[float]) -> Values:
+    """Return the value at each of `QUANTILES`, the nearest one that there is."""
+    ordered = sorted(values)
+    last = len(ordered) - 1
+    return {(f"{share:g}",): ordered[round(share * last)] for share in families.QUANTILES if ordered}
+
+
+def _by_state(simulators: Sequence[SimulatorStatus]) -> Values:
+    counted = Counter((it.role, families.GIVEN_UP if it.given_up else it.state) for it in simulators)
+    return {(role, state): counted[role, state] for role, state in families.SIMULATORS.combinations()}

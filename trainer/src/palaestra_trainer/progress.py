@@ -21,10 +21,10 @@ from palaestra_sim.protocol.status import Cause, CheckpointStatus, FaultKind, Fa
 from palaestra_trainer.configuration import Role
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.evaluation import Evaluation
+from palaestra_trainer.figures import EPISODES_IN_MEAN, Figures
 from palaestra_trainer.goodput import Goodput
 from palaestra_trainer.standings import AskStandby, Standings
 
-EPISODES_IN_MEAN = 100  # as in Stable-Baselines3's rollout/ep_rew_mean
 SPEED_WINDOW_S = 30.0
 PHASES: Mapping[Cause, str] = MappingProxyType(
     {
@@ -93,6 +93,7 @@ class Progress:
         success_rate: that of this attempt's last evaluation; None before it.
         checkpoint: the newest checkpoint; None without one.
         attempt: this one's number in the run directory's record; None before it is recorded.
+        figures: what is counted in this attempt only.
     """
 
     def __init__(
@@ -107,6 +108,7 @@ class Progress:
         self.success_rate: float | None = None
         self.checkpoint: CheckpointStatus | None = None
         self.attempt: int | None = None
+        self.figures = Figures()
         self._clock = clock
         self._lock = threading.Lock()
         self._standings = Standings(simulators, clock)
@@ -143,8 +145,9 @@ class Progress:
         self.saved(step)
 
     def returns(self) -> list[float]:
-        """Return the returns of the last episodes, the newest last; in training's thread."""
-        return list(self._returns)
+        """Return the returns of the last episodes, the newest last."""
+        with self._lock:
+            return list(self._returns)
 
     def recall(self, returns: Sequence[float]) -> None:
         """Know the returns of the last episodes before this attempt."""
@@ -167,9 +170,10 @@ class Progress:
 
     def slow(self, simulator: str, seconds: float) -> None:
         """Count a step that took much longer than others; nothing is broken by it."""
-        del simulator, seconds
+        del seconds
         with self._lock:
             self.counters.faults[FaultKind.SLOW] += 1
+            self._standings.was_slow(simulator)
 
     def flapping(self, simulator: str) -> None:
         """A simulator breaks again and again."""
@@ -197,6 +201,7 @@ class Progress:
             self._standings.is_up(simulator)
             if recycled:
                 self.counters.recycled += 1
+                self._standings.recycled(simulator)
             else:
                 self.counters.restarts += 1
                 self._standings.restarted(simulator)
@@ -212,6 +217,7 @@ class Progress:
                 if (episode := info.get("episode")) is not None:
                     self.counters.episodes += 1
                     self._returns.append(episode["r"])
+                    self.figures.played(info)
             now = self._clock()
             if not self._samples or now - self._samples[-1][0] >= 1.0:
                 self._samples.append((now, step))
@@ -220,7 +226,10 @@ class Progress:
 
     def evaluated(self, evaluation: Evaluation) -> None:
         """The policy was evaluated."""
-        self.success_rate = evaluation.success_rate
+        with self._lock:
+            self.success_rate = evaluation.success_rate
+            self.counters.steps_lost += evaluation.steps_lost
+        self.figures.evaluated(evaluation)
 
     def saved(self, step: int) -> None:
         """A checkpoint was written."""
@@ -252,6 +261,16 @@ class Progress:
             "simulators/steps_lost": counters.steps_lost,
         }
         return totals | faults | spent
+
+    def faults_by_kind(self) -> Mapping[tuple[str, ...], int]:
+        """Return the faults in this attempt by simulator and kind."""
+        with self._lock:
+            return self._standings.faults_by_kind()
+
+    def restarts_by_cause(self) -> Mapping[tuple[str, ...], int]:
+        """Return the restarts in this attempt by simulator and cause: the fault that they mended, or wear."""
+        with self._lock:
+            return self._standings.restarts_by_cause()
 
     def restarts(self) -> int:
         """Return the restarts of simulators after faults, in this attempt.

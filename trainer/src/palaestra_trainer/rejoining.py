@@ -39,6 +39,7 @@ def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
         positions=saved.positions and saved.positions._replace(newest=(None,) * env.num_envs),
         members=after,
         rollout={**saved.rollout, "terms": _terms_left(saved, begun)},
+        running_returns=_returns_left(saved, begun),
     )
 
 
@@ -55,9 +56,15 @@ def _tell(begun: np.ndarray, observation: np.ndarray, saved: State) -> None:
         log.info("simulators begin an episode anew", simulators=int(begun.sum()))
 
 
-def _resized(flags: np.ndarray, length: int) -> np.ndarray:
-    """Return as many flags, those that are missing False."""
-    return np.concatenate([flags, np.zeros(length, dtype=bool)])[:length]
+def _resized(values: np.ndarray, length: int) -> np.ndarray:
+    """Return as many values, those that are missing 0."""
+    return np.concatenate([values, np.zeros(length, dtype=values.dtype)])[:length]
+
+
+def _returns_left(saved: State, begun: np.ndarray) -> np.ndarray | None:
+    """Return the discounted rewards of the episodes that go on, if they matter."""
+    known = saved.running_returns
+    return None if known is None else np.where(begun, 0.0, _resized(known, len(begun)))
 
 
 def _terms_left(saved: State, begun: np.ndarray) -> list[dict[str, float]]:

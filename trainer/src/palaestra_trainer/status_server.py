@@ -5,14 +5,16 @@ from __future__ import annotations
 import errno
 import json
 import threading
+from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Self, cast
 
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
+from palaestra_sim.protocol.metrics import Family, Values
 from palaestra_trainer import metrics
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.progress import Progress
@@ -26,12 +28,15 @@ class StatusServer:
     Args:
         address: `host:port`; port 0 takes a free one.
         progress: what is told.
+        known: metrics that do not change, see `metrics.constants`.
 
     Raises:
         ConfigurationError: the address is taken, or not one of this machine.
     """
 
-    def __init__(self, address: str, progress: Progress) -> None:
+    def __init__(
+        self, address: str, progress: Progress, known: Mapping[Family, Values] = MappingProxyType({})
+    ) -> None:
         host, _, port = address.rpartition(":")
         try:
             self._server = _Server((host, int(port)), _Handler)
@@ -42,7 +47,7 @@ class StatusServer:
                 f"statusAddress: {address} {fact}; choose another address or free it"
             ) from error
         self._server.progress = progress
-        self._server.registry = metrics.registry(progress)
+        self._server.registry = metrics.registry(progress, known)
         self._thread = threading.Thread(
             target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, name="status", daemon=True
         )

@@ -16,6 +16,8 @@ import structlog
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
+from torch.optim.optimizer import register_optimizer_step_pre_hook
+from torch.utils.tensorboard.writer import SummaryWriter
 
 from palaestra_sim.protocol.status import Cause, ExitCode, Termination
 from palaestra_trainer import algorithms, checkpoint
@@ -25,9 +27,11 @@ from palaestra_trainer.configuration import Configuration, dump
 from palaestra_trainer.display import Display, Lines
 from palaestra_trainer.divergence import Learner
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
+from palaestra_trainer.figures import Logged
 from palaestra_trainer.interruption import Interruption
 from palaestra_trainer.journal import Journal
 from palaestra_trainer.logs import last_lines
+from palaestra_trainer.metrics import constants
 from palaestra_trainer.progress import Counters, Progress
 from palaestra_trainer.rejoining import rejoin
 from palaestra_trainer.run_directory import RunDirectory, drop_lines, replace_file
@@ -149,17 +153,19 @@ class Attempt:
         configuration, progress = self._configuration, self._progress
         algorithms.check(configuration.algorithm)
         interruption = stack.enter_context(Interruption())
-        stack.enter_context(StatusServer(configuration.status_address, progress))
         self._watch(stack)
-        stack.enter_context(self._around.display)
         found = self._newest()
+        self._take_over(found)  # before anything is served: a counter that jumps has grown, to Prometheus
+        known = constants(configuration)
+        stack.enter_context(StatusServer(configuration.status_address, progress, known))
+        stack.enter_context(self._around.display)
         self._begin(found)
-        self._take_over(found)
         members = self._around.make_members(configuration)
         for member in members:
             if isinstance(member, Spared):
                 progress.has_standby(member.name, member.spare)
         fleet = Fleet(configuration, members, progress)
+        progress.figures.meters = fleet.meters()
         stack.callback(fleet.stop)
         fleet.start(interruption.check)
         rest(fleet.evaluating)
@@ -197,12 +203,23 @@ class Attempt:
         env = SimulatorsVecEnv(run.fleet.collecting, self._configuration.seed, check=run.interruption.check)
         stack.callback(env.close)
         model = algorithms.make_model(self._configuration.algorithm, env, self._configuration.seed)
-        drop_lines(self._directory.evaluations, lambda line: line["step"] > self._progress.step)
+        self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
-        model.set_logger(configure(str(self._directory.tensorboard), ["tensorboard"]))
+        logger = configure(str(self._directory.tensorboard), ["tensorboard"])
+        logger.output_formats.append(Logged(self._progress.figures))
+        model.set_logger(logger)
         with self._progress.spending(Cause.LEARNING):
             self._learn(model, Conductor(run, env, resumed))
         write_summary(self._directory, summarise(self._directory, self._progress))
+
+    def _forget_what_is_played_again(self) -> None:
+        """Let evaluations and curves end where the run goes on; the attempt before got further."""
+        step, curves = self._progress.step, self._directory.tensorboard
+        drop_lines(self._directory.evaluations, lambda line: line["step"] > step)
+        if curves.exists():
+            # TensorBoard leaves out points from this step on in the files that are older than this mark.
+            with SummaryWriter(str(curves), purge_step=step + 1):  # type: ignore[no-untyped-call]  # as torch has it
+                pass
 
     def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: Checkpoint) -> Resumed:
         """Bring model and simulators to where the checkpoint was made."""
@@ -225,12 +242,13 @@ class Attempt:
         missing = self._configuration.steps - model.num_timesteps
         try:
             if missing > 0:
-                model.learn(
-                    missing,
-                    conductor,
-                    log_interval=LOG_INTERVAL.get(self._configuration.algorithm.name, 1),
-                    reset_num_timesteps=False,
-                )
+                with register_optimizer_step_pre_hook(conductor.leave_update):
+                    model.learn(
+                        missing,
+                        conductor,
+                        log_interval=LOG_INTERVAL.get(self._configuration.algorithm.name, 1),
+                        reset_num_timesteps=False,
+                    )
             else:
                 conductor.init_callback(model)
             self._progress.step = model.num_timesteps

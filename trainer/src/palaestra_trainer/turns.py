@@ -3,30 +3,56 @@
 A step of an environment is one function that sends, waits and reads. So that the waits of many
 environments fall together, each step runs in a greenlet of its own, and gives up its turn between
 asking its simulator for something long and awaiting the answer: `take_turns` runs them, `let_others` is
-where a turn may end. A simulator that was asked first is read first, while the others still compute.
+where a turn may end. A simulator that has answered is read while the others still compute.
 Threads did the same at twice the processor time: see docs/decisions/0006-turns-instead-of-threads.md.
 """
 
 from __future__ import annotations
 
+import select
 import time
-from collections import deque
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, Protocol
 
 from greenlet import getcurrent, greenlet
 
+from palaestra_trainer import patience
+from palaestra_trainer.waits import count_wait
+
+# After this whoever was asked first waits by itself: deadlines, and whose fault it is, are its own business.
+# Longer than a step takes, since that wait counts as its turn; short beside a deadline, which begins then.
+_SOON_MS = 500
+
+
+class Answer(Protocol):
+    """What can be read once an answer has come."""
+
+    def fileno(self) -> int:
+        """Return the descriptor to be watched."""
+        ...
+
 
 class _Turn(greenlet):
-    """One work of `take_turns`, and the seconds that it has spent in others' turns."""
+    """One work of `take_turns`.
+
+    Attributes:
+        away_s: seconds that it has spent in others' turns; those in which all wait are nobody's turn.
+        until: the descriptor of the answer that it waits for; None: it can go on.
+    """
 
     away_s = 0.0
+    until: int | None = None
 
 
-def let_others() -> None:
-    """Let the others of `take_turns` go on first; alone, this does nothing."""
+def let_others(until: Answer | None = None) -> None:
+    """Let the others of `take_turns` go on first; alone, this does nothing.
+
+    Args:
+        until: they may go on until this can be read; by default once each.
+    """
     turn = getcurrent()
     if isinstance(turn, _Turn) and turn.parent is not None:
+        turn.until = None if until is None else until.fileno()
         left = time.perf_counter()
         turn.parent.switch()
         turn.away_s += time.perf_counter() - left
@@ -44,32 +70,49 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
     All of them are finished before the first error is raised, so that none is left in the middle.
 
     Raises:
-        Exception: the first one of a work.
+        Exception: of the first work, in their order, that failed.
         BaseException: from the work whose turn it is, at once; the others are ended where they stand.
     """
     results: list[Any] = []
-    errors: list[Exception] = []
+    errors: dict[int, Exception] = {}
 
     def run(place: int, work: Callable[[], Any]) -> None:
         try:
             results[place] = work()
         except Exception as error:  # noqa: BLE001 - raised below, when no work is left in the middle
-            errors.append(error)
+            errors[place] = error
 
-    waiting: deque[_Turn] = deque()
+    turns: list[_Turn] = []
     for place, work in enumerate(works):
         results.append(None)
-        waiting.append(_Turn(lambda place=place, work=work: run(place, work)))
+        turns.append(_Turn(lambda place=place, work=work: run(place, work)))
     try:
-        while waiting:
-            turn = waiting.popleft()
-            turn.switch()
-            if not turn.dead:
-                waiting.append(turn)
+        while turns:
+            for turn in _ready(turns):
+                turn.switch()
+            turns = [turn for turn in turns if not turn.dead]
     except BaseException:
-        for turn in waiting:
+        for turn in turns:
             turn.throw()
         raise
     if errors:
-        raise errors[0]
+        raise errors[min(errors)]
     return results
+
+
+def _ready(turns: list[_Turn]) -> list[_Turn]:
+    """Return those who can go on, one at least, in their order; wait if all of them do."""
+    awaited = [turn.until for turn in turns if turn.until is not None]
+    if not awaited or len(turns) == 1:
+        return turns
+    answers = select.poll()
+    for file in awaited:
+        answers.register(file, select.POLLIN)
+    nobody_can_go_on = len(awaited) == len(turns) and not patience.is_over()
+    began = time.perf_counter()
+    come = {file for file, _ in answers.poll(_SOON_MS if nobody_can_go_on else 0)}
+    waited_s = time.perf_counter() - began
+    count_wait(waited_s)
+    for turn in turns:
+        turn.away_s -= waited_s
+    return [turn for turn in turns if turn.until is None or turn.until in come] or turns[:1]

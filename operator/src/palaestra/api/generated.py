@@ -23,6 +23,7 @@ def generated_files(root: Path) -> dict[str, str]:
     reference, operations = "docs/trainingjob.md", "docs/operations.md"
     return {
         "manifests/crd.yaml": _HEADER + crd_text(),
+        "charts/palaestra/crd.yaml": _HEADER + crd_text(),
         reference: page((root / reference).read_text(encoding="utf-8")),
         operations: reasons_page((root / operations).read_text(encoding="utf-8")),
     }

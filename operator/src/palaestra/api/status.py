@@ -222,8 +222,8 @@ class ReplicaStatus(ApiModel):
     """What the time was spent on, in seconds; absent: not known yet."""
 
     steps_lost: Count | None = None
-    """Environment steps that were played in vain, for faults and interruptions, over all attempts;
-    absent: not known yet."""
+    """Environment steps of training and evaluation that were played in vain, for faults and
+    interruptions, over all attempts; absent: not known yet."""
 
 
 class Release(ApiModel):

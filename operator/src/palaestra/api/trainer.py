@@ -50,6 +50,49 @@ class Task(ApiModel):
     """Keyword arguments of the environment, as in `gymnasium.make`."""
 
 
+Bound = Annotated[float, Field(gt=0, le=1_000_000)]
+
+
+class Normalize(ApiModel):
+    """What is brought to one scale before it is learned from: Stable-Baselines3's VecNormalize.
+
+    What is known of observations is kept in `model.zip`, since the policy cannot be used without it.
+    Evaluations see as training saw, and their returns are true ones.
+    """
+
+    observations: bool = True
+    """Each number of an observation is shifted and scaled by its running mean and deviation."""
+
+    rewards: bool = True
+    """Rewards are scaled by the running deviation of the discounted return."""
+
+    clip_observations: Bound | None = None
+    """The largest absolute value of a normalized observation; absent: 10."""
+
+    clip_rewards: Bound | None = None
+    """The largest absolute value of a normalized reward; absent: 10."""
+
+    rules = (
+        Rule(
+            holds=lambda it: it.observations or it.rewards,
+            cel="self.observations || self.rewards",
+            message="nothing is normalized while observations and rewards are false; remove it",
+        ),
+        Rule(
+            field="clipObservations",
+            holds=lambda it: it.clip_observations is None or it.observations,
+            cel="!has(self.clipObservations) || self.observations",
+            message="no observation is normalized while observations is false; remove it",
+        ),
+        Rule(
+            field="clipRewards",
+            holds=lambda it: it.clip_rewards is None or it.rewards,
+            cel="!has(self.clipRewards) || self.rewards",
+            message="no reward is normalized while rewards is false; remove it",
+        ),
+    )
+
+
 class Algorithm(ApiModel):
     """The learning algorithm."""
 
@@ -60,6 +103,10 @@ class Algorithm(ApiModel):
     hyperparameters: FreeObject = Field(default={})
     """Keyword arguments of the algorithm's class, in its own spelling (`learning_rate`, not
     `learningRate`); absent ones keep the trainer's defaults."""
+
+    normalize: Normalize | None = None
+    """What is brought to one scale before it is learned from; `{}`: observations and rewards; absent:
+    nothing."""
 
 
 class Evaluation(ApiModel):

@@ -149,7 +149,7 @@ class TrainerStatus:
         faults: how many of each `FaultKind`, over all attempts.
         goodput: seconds spent on each `Cause`, over all attempts.
         steps_lost: valid steps that were played in vain, over all attempts: after the checkpoint that a
-            resumed attempt went on from, or in an episode that a fault cut.
+            resumed attempt went on from, or in an episode of training or evaluation that a fault cut.
     """
 
     step: int

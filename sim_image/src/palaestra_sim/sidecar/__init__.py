@@ -11,5 +11,6 @@ process      the only module that starts a process
 keeper       the small program between sidecar and simulator, which lets nothing escape
 output       what the simulator prints, passed on line by line
 server       the two listeners: control, and health with metrics and state
+families     every metric by name, as data
 metrics      what /metrics says
 """

@@ -140,10 +140,20 @@ def _spawn(arguments: list[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_RDONLY), COMMANDS)
         for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGPIPE, signal.SIGXFSZ):
             signal.signal(number, signal.SIG_DFL)  # an ignored signal would stay so in the program
+        _yield_to_the_trainer()
         os.execv(arguments[0], arguments)  # noqa: S606 - the sidecar's own command line
     except OSError as error:
         _report(f"error {error.errno}")
     os._exit(_NOT_RUN)
+
+
+def _yield_to_the_trainer() -> None:
+    """Let the program not interrupt a trainer with which it shares a processor.
+
+    A trainer that wakes one simulator by a request has others to wake, and was interrupted at nearly each.
+    """
+    with contextlib.suppress(OSError):  # a wish: sandboxes may refuse it
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _report(line: str) -> None:

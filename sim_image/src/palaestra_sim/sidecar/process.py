@@ -19,6 +19,8 @@ from palaestra_sim.sidecar import keeper
 from palaestra_sim.sidecar.output import Passage
 
 _KEEPER = Path(keeper.__file__)
+# In /proc/PID/stat behind the name: time of the process, and of its children that have ended, in ticks.
+_OWN_TIME, _ENDED_TIME = slice(11, 13), slice(13, 15)  # Source: proc_pid_stat(5)
 _LAST_OUTPUT_S = 0.2  # for the lines that are still in the pipe when the simulator has ended
 
 _keepers: set[int] = set()  # those that have not ended: the only children that are no orphans
@@ -55,6 +57,14 @@ class Ended:
     last_line: str = ""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Usage:
+    """What all processes of a simulator use: memory, and processor time since its start."""
+
+    rss_bytes: int = 0
+    cpu_s: float = 0.0
+
+
 Report = Callable[[Started | Ended], None]
 
 
@@ -68,6 +78,7 @@ class Process:
     def __init__(self, keeper_pid: int, commands: int) -> None:
         self.keeper = keeper_pid
         self._commands = commands
+        self._cpu_s = 0.0
 
     @classmethod
     def start(cls, command: Command, report: Report) -> Self:
@@ -106,6 +117,17 @@ class Process:
         """Let go of the keeper, which kills what is left."""
         _close(self._commands)
 
+    def usage(self) -> Usage:
+        """Return what all processes of the simulator use; shared pages count twice. From any thread."""
+        below = found = keeper.children({self.keeper})
+        while found := keeper.children(found):
+            below |= found
+        ticks = sum(_ticks(pid, _OWN_TIME) + _ticks(pid, _ENDED_TIME) for pid in below)
+        cpu_s = (ticks + _ticks(self.keeper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
+        self._cpu_s = max(self._cpu_s, cpu_s)  # one that ends meanwhile may be missing in both
+        pages = sum(_resident_pages(pid) for pid in below)
+        return Usage(rss_bytes=pages * os.sysconf("SC_PAGE_SIZE"), cpu_s=self._cpu_s)
+
     def _say(self, command: bytes) -> None:
         with contextlib.suppress(BrokenPipeError):  # it has ended, and Ended is on its way
             os.write(self._commands, command)
@@ -118,17 +140,16 @@ def reap() -> None:
             pass
 
 
-def resident_bytes(process: Process) -> int:
-    """Return the memory in use by all processes of a simulator, in bytes; shared pages count twice."""
-    below = found = keeper.children({process.keeper})
-    while found := keeper.children(found):
-        below |= found
-    return sum(_resident_pages(pid) for pid in below) * os.sysconf("SC_PAGE_SIZE")
-
-
 def _resident_pages(pid: int) -> int:
     with contextlib.suppress(OSError, IndexError):  # it ended meanwhile
         return int(Path(f"/proc/{pid}/statm").read_bytes().split()[1])
+    return 0
+
+
+def _ticks(pid: int, fields: slice) -> int:
+    with contextlib.suppress(OSError, ValueError):  # it ended meanwhile
+        behind_name = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2]
+        return sum(int(field) for field in behind_name.split()[fields])
     return 0
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.lifecycle import Action, Event
-from palaestra_sim.sidecar.process import Command, Ended, Process, Started, resident_bytes
+from palaestra_sim.sidecar.process import Command, Ended, Process, Started, Usage
 
 SHUTDOWN_GRACE_S = 1.0  # from SIGTERM to SIGKILL; the whole shutdown has 2 s
 _ANSWER_S = 5.0
@@ -101,12 +101,13 @@ class Simulator:
     def told(self) -> SimulatorState:
         """Return the state with the memory in use, for which a simulator that is not ready is not asked."""
         state = self.state
-        return replace(state, rss_bytes=self.resident_bytes()) if state.state is SidecarState.READY else state
+        ready = state.state is SidecarState.READY
+        return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
-    def resident_bytes(self) -> int:
-        """Return the memory that its processes use, in bytes; 0 if none runs. From any thread."""
+    def usage(self) -> Usage:
+        """Return what its processes use; nothing if none runs. From any thread."""
         process = self._process
-        return 0 if process is None else resident_bytes(process)
+        return Usage() if process is None else process.usage()
 
     def run(self) -> None:
         """Take one message after the other, until a shutdown has left nothing running."""

@@ -21,6 +21,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
+from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
 from palaestra_trainer.configuration import Algorithm, nearest
@@ -135,6 +136,8 @@ def check(algorithm: Algorithm) -> Entry:
 def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
     """Return a new model of the algorithm for `env`, its networks drawn from `seed`.
 
+    Where the algorithm is to normalize, the model's own environment does, see `normalization`.
+
     Raises:
         ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
     """
@@ -150,6 +153,8 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
         # A vector step is num_envs steps: the target can't be updated more often than that.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
     chosen["policy_kwargs"] = dict(chosen.get("policy_kwargs") or {})
+    if algorithm.normalize:
+        env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
     try:
         return entry.cls("MlpPolicy", env, seed=seed, device="cpu", **chosen)
     except (AssertionError, TypeError, ValueError) as error:

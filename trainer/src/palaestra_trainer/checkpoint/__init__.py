@@ -10,16 +10,18 @@ rest is JSON and plain arrays. How a resumed run comes to be the same: docs/deci
 from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, describe, refuse_another_run
 from palaestra_trainer.checkpoint.state import State
 from palaestra_trainer.checkpoint.store import Saver, newest, restore
-from palaestra_trainer.checkpoint.tensors import load_tensors
+from palaestra_trainer.checkpoint.tensors import Tensors, load_tensors, save_tensors
 
 __all__ = [
     "Checkpoint",
     "Manifest",
     "Saver",
     "State",
+    "Tensors",
     "describe",
     "load_tensors",
     "newest",
     "refuse_another_run",
     "restore",
+    "save_tensors",
 ]

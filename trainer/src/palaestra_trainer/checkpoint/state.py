@@ -18,6 +18,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
+from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
 from palaestra_trainer.checkpoint.generators import Generators
 from palaestra_trainer.simulators.episode_state import EpisodeState
 
@@ -42,7 +43,7 @@ class State:
     Attributes:
         numbers: what the algorithm counts, by attribute.
         generators: where the random generators stand.
-        observation: the last one, a row for each member.
+        observation: the last one, a row for each member, not normalized.
         episode_starts: which rows of it are the first of an episode.
         episodes: statistics of the last episodes, as Stable-Baselines3 keeps them.
         successes: whether the last episodes succeeded.
@@ -51,6 +52,8 @@ class State:
         rollout: what else is counted amid an episode, as JSON data; the conductor's own.
         noise: matrices of state-dependent exploration, which are drawn before a boundary; none without it.
         targets: what a rollout changes of the networks, copied; never written, since it is part of the model.
+        scales: what is known of observations and rewards, where they are normalized; never written, as above.
+        running_returns: for each member the discounted reward of its episode so far, where that is needed.
     """
 
     numbers: dict[str, float]
@@ -64,15 +67,18 @@ class State:
     rollout: Mapping[str, Any]
     noise: Mapping[str, torch.Tensor]
     targets: Sequence[torch.Tensor] = ()
+    scales: Mapping[str, Moments] | None = None
+    running_returns: np.ndarray | None = None
 
     @classmethod
     def of(cls, model: BaseAlgorithm, members: Sequence[EpisodeState], rollout: Mapping[str, Any]) -> State:
         """Return the state of a model that has begun to learn and is at a rollout boundary."""
-        buffer = replay_buffer(model)
+        buffer, normalizer = replay_buffer(model), normalizer_of(model)
+        seen = normalizer.old_obs if normalizer else model._last_obs  # noqa: SLF001 - Stable-Baselines3 keeps it there
         return cls(
             numbers={name: getattr(model, name) for name in _NUMBERS if hasattr(model, name)},
             generators=Generators.now(model.action_space),
-            observation=np.asarray(model._last_obs),  # noqa: SLF001 - Stable-Baselines3 keeps it there
+            observation=np.asarray(seen),
             episode_starts=np.asarray(model._last_episode_starts),  # noqa: SLF001 - as above
             episodes=tuple(model.ep_info_buffer or ()),
             successes=tuple(model.ep_success_buffer or ()),
@@ -81,6 +87,8 @@ class State:
             rollout=rollout,
             noise={name: getattr(_noise_of(model), name) for name in _NOISE if model.use_sde},
             targets=[parameter.detach().clone() for parameter in _targets(model)],
+            scales=normalizer.scales if normalizer else None,
+            running_returns=normalizer.returns if normalizer else None,
         )
 
     def put_back(self, model: BaseAlgorithm) -> None:
@@ -88,7 +96,7 @@ class State:
         for name, value in self.numbers.items():
             setattr(model, name, value)
         self.generators.put_back(model.action_space)
-        model._last_obs = self.observation  # noqa: SLF001 - see of()
+        self._show_observation(model)
         model._last_episode_starts = self.episode_starts  # noqa: SLF001 - see of()
         model.ep_info_buffer = deque(self.episodes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
         model.ep_success_buffer = deque(self.successes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
@@ -101,9 +109,21 @@ class State:
             for parameter, copy in zip(_targets(model), self.targets, strict=False):
                 parameter.copy_(copy)
 
+    def _show_observation(self, model: BaseAlgorithm) -> None:
+        """Let the last observation be the model's, as it sees it and as it is."""
+        seen: np.ndarray = self.observation
+        if (normalizer := normalizer_of(model)) and self.running_returns is not None:
+            if self.scales is not None:
+                normalizer.scales = self.scales
+            seen = normalizer.go_on(self.observation, self.running_returns)
+        model._last_obs = seen  # noqa: SLF001 - see of()
+        model._last_original_obs = self.observation  # noqa: SLF001 - as above
+
     def write(self, folder: Path) -> None:
-        """Write it into a folder, but for `targets`."""
+        """Write it into a folder, but for what is part of the model."""
         arrays = {"observation": self.observation, "episode_starts": self.episode_starts}
+        if self.running_returns is not None:
+            arrays["running_returns"] = self.running_returns
         for index, member in enumerate(self.members):
             if member.actions is not None:
                 arrays[f"actions-{index}"] = member.actions
@@ -146,6 +166,7 @@ class State:
             ],
             rollout=content["rollout"],
             noise={name: torch.from_numpy(arrays[name]) for name in _NOISE if name in arrays},
+            running_returns=arrays.get("running_returns"),
         )
 
 

@@ -14,7 +14,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from palaestra_trainer.checkpoint import experience, manifest
 from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, digest_of
 from palaestra_trainer.checkpoint.state import State, replay_buffer
-from palaestra_trainer.checkpoint.tensors import load_tensors
+from palaestra_trainer.checkpoint.tensors import load_tensors, save_tensors
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import sync
 
@@ -68,8 +68,22 @@ class Saver:
         self._prune(described.step)
         return True
 
+    def size_bytes(self) -> int:
+        """Return the size of the newest checkpoint, with the files that others share.
+
+        0: there is none, or it cannot be looked at; no run ends for that.
+        """
+        newest = self._before
+        if newest is None:
+            return 0
+        names = (*newest.manifest.files, manifest.MANIFEST)
+        try:
+            return sum((newest.path / name).stat().st_size for name in names)
+        except OSError:
+            return 0
+
     def _write(self, draft: Path, model: BaseAlgorithm, state: State, described: Manifest) -> Manifest:
-        model.save(draft / MODEL)
+        save_tensors(draft / MODEL, model)
         state.write(draft)
         files = {}
         for file in sorted(draft.iterdir()):

@@ -1,29 +1,95 @@
-"""A model's tensors, in the zip of Stable-Baselines3, of which nothing is unpickled."""
+"""A model's tensors, in the zip of Stable-Baselines3, of which nothing is unpickled.
+
+Where a model normalizes, the zip has one more member: what it knows of observations and rewards, as JSON, so
+that whoever has the file has a policy that can be used. Stable-Baselines3 reads such a zip like any other.
+"""
 
 from __future__ import annotations
 
+import json
+import zipfile
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Self
 
+import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.save_util import load_from_zip_file, recursive_setattr
+from stable_baselines3.common.save_util import load_from_zip_file, recursive_getattr, recursive_setattr
 
+from palaestra_trainer.algorithms.normalization import normalizer_of
 from palaestra_trainer.errors import ConfigurationError
+
+NORMALIZE = "normalize.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Tensors:
+    """A copy of all tensors that an update changes, to go back to from its middle.
+
+    Attributes:
+        parameters: those of networks and optimisers, as Stable-Baselines3 names them.
+        variables: those that are learned besides.
+    """
+
+    parameters: dict[str, Any]
+    variables: dict[str, torch.Tensor]
+
+    @classmethod
+    def of(cls, model: BaseAlgorithm) -> Self:
+        """Return a copy of a model's tensors."""
+        _, names = model._get_torch_save_params()  # noqa: SLF001 - Stable-Baselines3 tells nobody else
+        variables = {name: recursive_getattr(model, name).detach().clone() for name in names}
+        return cls(deepcopy(model.get_parameters()), variables)
+
+    def put_back(self, model: BaseAlgorithm) -> None:
+        """Let the model's tensors be those that were copied."""
+        model.set_parameters(self.parameters, exact_match=True, device=model.device)
+        _set_variables(model, self.variables)
+
+
+def save_tensors(path: Path, model: BaseAlgorithm) -> None:
+    """Write the zip of a model, with all that its policy needs.
+
+    Raises:
+        OSError: it could not be written.
+    """
+    model.save(path)
+    if normalizer := normalizer_of(model):
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr(NORMALIZE, json.dumps(normalizer.to_json()))
 
 
 def load_tensors(path: Path, model: BaseAlgorithm) -> None:
-    """Put the tensors of a Stable-Baselines3 zip into `model`; nothing is unpickled.
+    """Put what `save_tensors` wrote into `model`; nothing is unpickled.
 
     Raises:
-        ConfigurationError: they are of another kind of model.
+        ConfigurationError: it is of another kind of model, or of one that normalized something else.
     """
     try:
         _, parameters, variables = load_from_zip_file(path, device=model.device, load_data=False)
         model.set_parameters(parameters, exact_match=True, device=model.device)
-    except (AttributeError, RuntimeError, ValueError) as error:
+        _load_normalization(path, model)
+    except (AttributeError, KeyError, RuntimeError, TypeError, ValueError) as error:
         raise ConfigurationError(
             f"{path}: does not fit {type(model).__name__} as configured ({error}); "
             "use the configuration it was trained with"
         ) from error
-    for name, value in (variables or {}).items():
+    _set_variables(model, variables or {})
+
+
+def _set_variables(model: BaseAlgorithm, variables: Mapping[str, torch.Tensor | None]) -> None:
+    for name, value in variables.items():
         if value is not None:
             recursive_setattr(model, f"{name}.data", value.data)
+
+
+def _load_normalization(path: Path, model: BaseAlgorithm) -> None:
+    normalizer = normalizer_of(model)
+    with zipfile.ZipFile(path) as archive:
+        known = NORMALIZE in archive.namelist()
+        if known != (normalizer is not None):
+            raise ValueError(f"algorithm.normalize is {'not ' if known else ''}set, unlike there")
+        if normalizer:
+            normalizer.learn_from_json(json.loads(archive.read(NORMALIZE)))

@@ -62,19 +62,31 @@ class RosService:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as a call.
         """
-        if self._wire is None:
-            raise SimulatorDead(self.simulator, f"{self.name} has no request under way")
+        wire = self._asked()
         try:
-            return self._read_answer(self._wire)
+            return self._read_answer(wire)
         except BaseException:  # a Ctrl-C too: the next answer would be this request's
             self.close()
             raise
+
+    def fileno(self) -> int:
+        """Return the descriptor that can be read once the response to `begin` comes, or the connection broke.
+
+        Raises:
+            SimulatorDead: there was no `begin`.
+        """
+        return self._asked().fileno()
 
     def close(self) -> None:
         """Drop the connection; the next call makes a new one."""
         if self._wire is not None:
             self._wire.close()
             self._wire = None
+
+    def _asked(self) -> Wire:
+        if self._wire is None:
+            raise SimulatorDead(self.simulator, f"{self.name} has no request under way")
+        return self._wire
 
     def _read_answer(self, wire: Wire) -> Any:
         answer = wire.receive(ahead=1)
@@ -107,13 +119,13 @@ class RosService:
 
 
 def call_together(
-    calls: Iterable[tuple[RosService, dict[str, Any]]], meanwhile: Callable[[], None] | None = None
+    calls: Iterable[tuple[RosService, dict[str, Any]]], meanwhile: Callable[[RosService], None] | None = None
 ) -> list[Any]:
     """Return the responses of calls that are all sent before the first answer is awaited.
 
     Args:
         calls: services and the fields of their requests.
-        meanwhile: what can be done before the answers are awaited.
+        meanwhile: what can be done before the answers are awaited; is told whose will be the last.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the others' connections are
@@ -124,8 +136,8 @@ def call_together(
         for service, fields in calls:
             service.begin(**fields)
             sent.append(service)
-        if meanwhile is not None:
-            meanwhile()
+        if meanwhile is not None and sent:
+            meanwhile(sent[-1])
         return [service.finish() for service in sent]
     except BaseException:  # a Ctrl-C too
         for service in sent:

@@ -40,6 +40,16 @@ class RestartBudget:
         """Whether it was restarted `FLAPPING` times or more within `restart_within_s`."""
         return len(self._spent) >= FLAPPING
 
+    @property
+    def spent_share(self) -> float:
+        """Share of `restart_limit` that was spent within `restart_within_s`, 0 to 1; from any thread.
+
+        Of none, none is spent: nothing could be warned of.
+        """
+        now, limit = self.clock(), self.care.restart_limit
+        recent = sum(now - at < self.care.restart_within_s for at, _ in tuple(self._spent))
+        return recent / limit if limit else 0.0
+
     def spend(self, fault: SimulatorFault) -> None:
         """Take one restart, to mend `fault`.
 

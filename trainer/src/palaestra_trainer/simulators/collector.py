@@ -50,7 +50,7 @@ class Collector:
         run_seed: the replica's seed.
         index: the member's position among the collecting ones.
         episode: number of the next episode.
-        reset_info: what the environment reported at the last reset.
+        reset_info: what the environment reported at the last reset; not `valid` if no episode began.
     """
 
     def __init__(self, keeper: Keeper, run_seed: int, index: int, check: Check = go_on) -> None:
@@ -90,6 +90,7 @@ class Collector:
             FaultBudgetSpent: the member's budget of restarts is used up.
         """
         self._actions = None
+        self.reset_info = {"valid": False}
         self._return, self._length = 0.0, 0
         if self.keeper.up():
             try:

@@ -16,6 +16,7 @@ from palaestra_trainer.configuration import Configuration, SimulatorConfiguratio
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.ros import ensure_node
+from palaestra_trainer.simulators.fleet import care_of
 from palaestra_trainer.simulators.member import Member
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.sidecar import Sidecar
@@ -46,7 +47,7 @@ def connect_members(configuration: Configuration) -> list[Member]:
     """
     simulators = connect(configuration)
     return [
-        Standby(simulator, _simulator(configuration, entry, simulator.sidecar.standby()))
+        Standby(simulator, _simulator(configuration, entry, simulator.sidecar.standby()), care_of(entry))
         if entry.standby
         else simulator
         for entry, simulator in zip(configuration.simulators, simulators, strict=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from concurrent.futures import wait
+from concurrent.futures import FIRST_COMPLETED, wait
 from contextlib import contextmanager
 
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
@@ -12,8 +12,9 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group
-from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member, Watcher
+from palaestra_trainer.simulators.meter import Meter
 
 
 class Fleet:
@@ -43,6 +44,10 @@ class Fleet:
         self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role("Evaluate")]
         self._all = [*self.collecting, *self.evaluating]
 
+    def meters(self) -> dict[str, Meter]:
+        """Return what counts for each member, by its name."""
+        return {keeper.name: keeper.meter for keeper in self._all}
+
     def start(self, check: Check = go_on) -> None:
         """Start all members at once; return when all have been tried, and enough of each group are up.
 
@@ -60,7 +65,13 @@ class Fleet:
             keeper.begin_start()
         try:
             while not self._enough():
-                await_one(self._all, check)
+                check()
+                # Not until one is mended: that one of them has been tried may be enough as well.
+                wait(
+                    [work for keeper in self._all if (work := keeper.under_way)],
+                    LOOK_EVERY_S,
+                    FIRST_COMPLETED,
+                )
         except BaseException:
             for keeper in self._all:
                 keeper.abandon()

@@ -10,6 +10,7 @@ gets, and what a fault means for learning, is decided elsewhere.
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -24,6 +25,7 @@ from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
 from palaestra_trainer.simulators.member import Member, Nobody, Step, Watcher
+from palaestra_trainer.simulators.meter import Meter
 from palaestra_trainer.simulators.numbers import check_observation, check_reward
 from palaestra_trainer.simulators.pace import Pace
 from palaestra_trainer.turns import away_s, let_others
@@ -33,6 +35,8 @@ log = structlog.get_logger(__name__)
 LOOK_EVERY_S = 0.1
 # A try that is told to fail ends at once, unless it waits for somebody who does not answer.
 SETTLE_S = 10.0
+# A simulator that dies every two dozen resets is recycled every few seconds, all night.
+TELL_OF_RECYCLING_EVERY_S = 60.0
 
 
 class Keeper:
@@ -44,6 +48,7 @@ class Keeper:
         group: the simulators that the member is one of.
         tried: whether it has been tried to start the member.
         lost: whether the member was given up, since the others of its group are enough.
+        meter: counts what is played.
     """
 
     def __init__(
@@ -60,6 +65,9 @@ class Keeper:
         self.tried = self.lost = False
         self._care = care or Care()
         self._budget = RestartBudget(member.name, self._care, clock)
+        self._clock = clock
+        self._recycled, self._tell_next = 0, -math.inf
+        self.meter = Meter(member, self._budget)
         self._pace = Pace()
         self._work: Future[None] | None = None
         self._abandoned = False
@@ -128,6 +136,7 @@ class Keeper:
         self._recycle_when_due(check)
         observation, info = self.member.env.reset(seed=seed, options=options)
         check_observation(self.name, observation)
+        self.meter.resets += 1
         return observation, info
 
     def step(self, action: Any) -> Step:
@@ -140,6 +149,7 @@ class Keeper:
         began = time.perf_counter() - away_s()
         step: Step = self.member.env.step(action)
         seconds = time.perf_counter() - away_s() - began
+        self.meter.steps.observe(seconds)
         if self._pace.slow(seconds):
             self.watcher.slow(self.name, seconds)
         check_observation(self.name, step[0])
@@ -217,12 +227,19 @@ class Keeper:
         reason = self.member.due()
         if reason is None:
             return
-        log.info("simulator recycled", simulator=self.name, reason=reason)
+        self._tell_of_recycling(reason)
         self._begin(self._recycle)
         while not self.up():
             let_others()
             with self.watcher.spending(Cause.RECOVERING):
                 await_one([self], check)
+
+    def _tell_of_recycling(self, reason: str) -> None:
+        """Log the first time, then one line a minute at most, with the number of all times."""
+        self._recycled += 1
+        if self._clock() >= self._tell_next:
+            log.info("simulator recycled", simulator=self.name, times=self._recycled, reason=reason)
+            self._tell_next = self._clock() + TELL_OF_RECYCLING_EVERY_S
 
     def _recycle(self) -> None:
         self.member.restart()

@@ -68,6 +68,11 @@ class Simulator:
         """Resets since the simulator was last started."""
         return self.scene.resets
 
+    @property
+    def simulated_s(self) -> float:
+        """Seconds of simulated time since this object was made, over all restarts."""
+        return self.robot.simulation.simulated_s
+
     def due(self) -> str | None:
         """Return why it ought to be recycled before the next episode, in words; None: no reason."""
         return self.wear.due(self.resets)

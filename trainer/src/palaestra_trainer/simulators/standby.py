@@ -2,9 +2,10 @@
 
 Both belong to one sidecar and differ in their ROS names. A restart is a change of roles: the spare takes
 over at once if it is ready, and the other one, however it is, is restarted in a thread of its own to be
-the spare from then on. A spare that broke meanwhile is found when it is wanted, and told as the fault it
-is; the restart after that waits for the other simulator, which is on its way by then. So whatever breaks,
-nothing waits for more than one start.
+the spare from then on. If it does not come up it is started again and again, within a budget like that of
+the one that is played in, and left down after that. A spare that broke meanwhile is found when it is wanted,
+and told as the fault it is; the restart after that waits for the other simulator, which is on its way by
+then. So whatever breaks, nothing waits for more than one start.
 
 The environment is that of whichever simulator is played in: nobody may keep it over a restart.
 """
@@ -17,8 +18,9 @@ from concurrent.futures import Future, wait
 import structlog
 
 from palaestra_sim.protocol.status import StandbyState
-from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorFault, SimulatorHung
 from palaestra_trainer.simulators.background import in_background
+from palaestra_trainer.simulators.budget import Care, RestartBudget
 from palaestra_trainer.simulators.member import Environment
 from palaestra_trainer.simulators.simulator import Simulator
 
@@ -33,11 +35,12 @@ class Standby:
     Args:
         first: is played in first.
         second: stands by.
+        care: how often, and within what time, a spare that does not come up is started again.
     """
 
-    def __init__(self, first: Simulator, second: Simulator) -> None:
-        self._active = Side(first)
-        self._spare = Side(second)
+    def __init__(self, first: Simulator, second: Simulator, care: Care | None = None) -> None:
+        self._active, self._spare = (Side(simulator, care or Care()) for simulator in (first, second))
+        self._both = (first, second)
 
     @property
     def name(self) -> str:
@@ -53,6 +56,11 @@ class Standby:
     def resets(self) -> int:
         """Resets since the simulator that is played in was last started."""
         return self._active.simulator.resets
+
+    @property
+    def simulated_s(self) -> float:
+        """Seconds of simulated time of both since they were made, over all restarts."""
+        return sum(each.simulated_s for each in self._both)
 
     def spare(self) -> StandbyState | None:
         """Return whether the spare could take over; None: it is neither ready nor on its way."""
@@ -94,7 +102,7 @@ class Standby:
 
     def abandon(self) -> None:
         """Let a start or restart that is under way in another thread fail soon."""
-        self._active.simulator.abandon()
+        self._active.abandon()
 
     def pause(self) -> None:
         """Let the simulator that is played in rest, as the spare does all the time."""
@@ -113,22 +121,24 @@ class Side:
         wanted: False: it is not started any more.
     """
 
-    def __init__(self, simulator: Simulator) -> None:
+    def __init__(self, simulator: Simulator, care: Care) -> None:
         self.simulator = simulator
+        self._budget = RestartBudget(simulator.name, care)
         self.wanted = True
         self._preparation: Future[None] | None = None
 
     @property
     def state(self) -> StandbyState | None:
         """Whether it could take over; None: it is neither ready nor on its way."""
-        if self._preparation is None:
+        preparation = self._preparation  # which another thread may set
+        if preparation is None:
             return None
-        if not self._preparation.done():
+        if not preparation.done():
             return StandbyState.STARTING
-        return None if self._preparation.exception() else StandbyState.READY
+        return None if preparation.exception() else StandbyState.READY
 
     def prepare(self) -> Future[None]:
-        """Begin to restart it, however it is, unless that is under way already."""
+        """Begin to restart it until it is up, however it is, unless that is under way already."""
         if self._preparation is None or self._preparation.done():
             self._preparation = in_background(self._restart, f"standby-{self.simulator.name}")
         return self._preparation
@@ -149,6 +159,11 @@ class Side:
         simulator.run()
         simulator.wear.begin()
 
+    def abandon(self) -> None:
+        """Let a start that is under way fail soon, and begin no other."""
+        self.wanted = False
+        self.simulator.abandon()
+
     def stop(self) -> None:
         """Stop it, however it is; no thread works on it when this returns."""
         self.wanted = False
@@ -156,20 +171,35 @@ class Side:
         while preparation is not None and not preparation.done():
             # Killed, it fails to come up, and its thread ends. That may take a second time:
             # what is only about to be started cannot be killed yet.
-            self.simulator.abandon()
+            self.abandon()
             wait([preparation], _ASK_AGAIN_S)
         self.simulator.stop()
 
     def _restart(self) -> None:
+        while True:
+            try:
+                self._come_up()
+            except SimulatorFault as fault:
+                if not self.wanted:
+                    raise
+                log.warning("standby did not come up", simulator=self.simulator.name, fact=str(fault))
+                self._spend(fault)
+            else:
+                return
+
+    def _come_up(self) -> None:
         simulator = self.simulator
+        simulator.await_sidecar()
+        simulator.stop()
+        if not self.wanted:
+            raise SimulatorDead(simulator.name, "its standby is not wanted any more")
+        simulator.start()
+        simulator.pause()
+
+    def _spend(self, fault: SimulatorFault) -> None:
+        """Return if it may be started once more; raise the fault if the budget is spent."""
         try:
-            simulator.await_sidecar()
-            simulator.stop()
-            if not self.wanted:
-                raise SimulatorDead(simulator.name, "its standby is not wanted any more")
-            simulator.start()
-            simulator.pause()
-        except SimulatorFault as fault:
-            if self.wanted:
-                log.warning("standby did not come up", simulator=simulator.name, fact=str(fault))
-            raise
+            self._budget.spend(fault)
+        except FaultBudgetSpent as spent:
+            log.error("standby left down until it is wanted", simulator=self.simulator.name, fact=str(spent))  # noqa: TRY400 - one clear line
+            raise fault from spent

@@ -63,11 +63,16 @@ class Observer:
         self.begin_pose(name)
         return self.finish_pose(name)
 
-    def begin_pose(self, name: str) -> None:
-        """Ask for a pose; `finish_pose` must follow, and may after other things were done."""
+    def begin_pose(self, name: str) -> RosService:
+        """Ask for a pose; `finish_pose` must follow, and may after other things were done.
+
+        Return the service whose answer will be the last.
+        """
         node = self.node(name)
-        for service in self._pose_services():
-            service.begin(node=node)
+        position, orientation = self._pose_services()
+        position.begin(node=node)
+        orientation.begin(node=node)
+        return orientation
 
     def finish_pose(self, name: str) -> tuple[float, float, float]:
         """Return the pose that `begin_pose` asked for."""

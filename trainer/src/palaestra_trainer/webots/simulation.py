@@ -28,12 +28,16 @@ class Simulation:
         supervisor: resets, and places what is moved.
         observer: tells the poses that are tracked.
         period_ms: simulated milliseconds a step, a multiple of the world's basicTimeStep.
+
+    Attributes:
+        simulated_s: seconds of simulated time since this object was made.
     """
 
     def __init__(
         self, robots: Sequence[str], supervisor: Supervisor, observer: Observer, period_ms: int
     ) -> None:
         self.period_ms = period_ms
+        self.simulated_s = 0.0
         self._observer = observer
         self._supervisor = supervisor
         self._steps = [RosService(f"/{robot}/robot/time_step", "webots_ros/set_int") for robot in robots]
@@ -103,10 +107,12 @@ class Simulation:
             sensor.forget_old()
         try:
             self._advance()
-            # Asked before the sensors are read, so that answers and messages come in others' turns.
+            # Asked before the sensors are read, so that answers and messages come in others' turns;
+            # a controller answers when it has sent what its sensors saw.
+            asked = None
             for name in self._tracked:
-                self._observer.begin_pose(name)
-            let_others()
+                asked = self._observer.begin_pose(name)
+            let_others(until=asked)
             silent = self._read_sensors()
             for name in self._tracked:
                 self._tracked[name] = self._observer.finish_pose(name)
@@ -131,6 +137,7 @@ class Simulation:
         answers = call_together(wanted, meanwhile=let_others)
         if not all(answer.success for answer in answers):
             raise WrongData(self._supervisor.node_name, f"refused a step of {self.period_ms} ms")
+        self.simulated_s += self.period_ms / 1000.0
 
     def _release_motors(self) -> None:
         for motor in self._motors:

@@ -1,0 +1,79 @@
+"""What the programs of a real run serve, compared with docs/metrics.md; the operator's are in its folder."""
+
+import re
+import urllib.request
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from tests.local_run import LocalRun
+from tests.metrics import complaints, documented, served
+from tests.soak.jobs import example
+
+HEALTH = re.compile(r"health=(\S+)")
+
+
+def scrape(address):
+    """Return the text of /metrics."""
+    with urllib.request.urlopen(f"http://{address}/metrics", timeout=10) as answer:
+        return answer.read().decode()
+
+
+@pytest.fixture(scope="module")
+def texts(tmp_path_factory):
+    """What trainer and sidecar of a run serve, once it has evaluated and saved."""
+    job = example("move-to-target")
+    job["spec"]["trainer"].update(
+        steps=50_000,
+        evaluation={"everySteps": 300, "episodes": 2},
+        checkpoint={"everySteps": 200, "keep": 2},
+    )
+    with LocalRun(tmp_path_factory.mktemp("run"), job) as run:
+        run.wait_for_step(2500)  # DQN begins to learn at 1,000
+        return {
+            "trainer": scrape(run.training()["statusAddress"]),
+            "sidecar": scrape(HEALTH.search(run.log("sim-collect-0"))[1]),
+        }
+
+
+def test_a_run_serves_the_page(texts):
+    """Every family of it and none besides, each with its type; and by then each has a value, but few."""
+    assert served(texts["trainer"]) == documented("trainer")
+    assert served(texts["sidecar"]) == documented("sidecar")
+    silent = {
+        family.name
+        for text in texts.values()
+        for family in text_string_to_metric_families(text)
+        if not family.samples
+    }
+    assert silent == set()
+
+
+@pytest.mark.parametrize("program", ["trainer", "sidecar"])
+def test_promtool_has_nothing_to_say_of_it(texts, program):
+    """Prometheus' own rules of names, types and texts."""
+    assert complaints(texts[program]) == ""
+
+
+def test_a_run_tells_numbers_that_fit_together(texts):
+    """From different places of the trainer, and of the process that it plays in."""
+    values = {
+        (sample.name, *sorted(sample.labels.values())): sample.value
+        for text in texts.values()
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+    }
+    steps = values["palaestra_trainer_steps_total",]
+    taken = values["palaestra_simulator_step_duration_seconds_count", "collect-0"]
+    simulated_s = values["palaestra_simulator_simulated_seconds_total", "collect-0"]
+
+    assert 0 <= taken - steps <= 100  # read one after the other, while it steps
+    assert simulated_s >= 0.192 * steps  # and the steps of each reset
+    episodes = values["palaestra_trainer_episodes_total",]
+    assert 0 <= values["palaestra_trainer_episode_return_bucket", "+Inf"] - episodes <= 3
+    assert values["palaestra_trainer_evaluations_total",] >= 2
+    assert steps - values["palaestra_trainer_checkpoint_steps",] < 400
+    assert values["palaestra_trainer_exploration", "exploration_rate"] <= 1
+    assert values["palaestra_trainer_loss", "loss"] > 0
+    assert values["palaestra_simulator_up", "a"] == values["palaestra_simulator_state", "a", "ready"] == 1
+    assert values["palaestra_simulator_cpu_seconds_total", "a"] > 0

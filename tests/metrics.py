@@ -1,0 +1,37 @@
+"""docs/metrics.md as a reader has it, and /metrics as Prometheus has it."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.control_plane.programs import REQUIRED, NoPrograms, programs
+
+PAGE = Path(__file__).parents[1] / "docs/metrics.md"
+
+
+def documented(program):
+    """Return the type of each family in a program's table of the page, by its name."""
+    table = PAGE.read_text().partition(f"\n## The {program}\n")[2].partition("\n## ")[0]
+    return dict(re.findall(r"^\| `(palaestra_\w+)` \| (\w+)", table, re.MULTILINE))
+
+
+def served(text):
+    """Return the type of each of our families in the text of /metrics, by its name."""
+    return dict(re.findall(r"^# TYPE (palaestra_\w+) (\w+)$", text, re.MULTILINE))
+
+
+def complaints(text):
+    """Return what `promtool check metrics` has to say of the text of /metrics; "": nothing."""
+    try:
+        promtool = programs(("promtool",)) / "promtool"
+    except NoPrograms as missing:
+        if os.environ.get(REQUIRED) == "1":
+            raise
+        pytest.skip(str(missing))
+    done = subprocess.run(
+        [promtool, "check", "metrics"], input=text, capture_output=True, text=True, timeout=60, check=False
+    )
+    return done.stdout + done.stderr

@@ -1,0 +1,261 @@
+"""What a trainer's /metrics tell, and where each number comes from."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from prometheus_client import generate_latest
+from prometheus_client.parser import text_string_to_metric_families
+
+from palaestra_trainer import metrics
+from palaestra_trainer.display import Lines
+from palaestra_trainer.errors import SimulatorDead, SimulatorHung
+from palaestra_trainer.evaluation import Episode, Evaluation
+from palaestra_trainer.families import FAMILIES
+from palaestra_trainer.figures import Logged
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.simulators.standby import Standby
+from palaestra_trainer.training import Attempt, Surroundings
+
+
+@pytest.fixture
+def progress(clock):
+    """Return the progress of a run with two simulators."""
+    return Progress(100, [("collect-0", "Collect"), ("evaluate-0", "Evaluate")], clock)
+
+
+def scrape(progress, known=None):
+    """Return the families that Prometheus reads, by name."""
+    text = generate_latest(metrics.registry(progress, known or {})).decode()
+    return {family.name: family for family in text_string_to_metric_families(text)}
+
+
+def values(progress, name, *labels):
+    """Return the values of a metric by its labels, the given ones in that order; empty: not known."""
+    return {
+        tuple(sample.labels[label] for label in labels): sample.value
+        for family in scrape(progress).values()
+        for sample in family.samples
+        if sample.name == name
+    }
+
+
+def episode(number, *, success=None):
+    """Return the info of the last step of an episode with a return of `number`."""
+    end = {} if success is None else {"is_success": success}
+    return {"episode": {"r": float(number), "l": 10 * number}} | end
+
+
+def test_every_family_is_there_before_anything_happened(progress):
+    """A dashboard is made before the run, and unknown is not zero."""
+    found = scrape(progress)
+
+    assert {name for name in found if name.startswith("palaestra_")} == {
+        family.name.removesuffix("_total") for family in FAMILIES
+    }
+    assert found["palaestra_trainer_evaluation_success_ratio"].samples == []
+    assert found["palaestra_trainer_checkpoint_timestamp_seconds"].samples == []
+
+
+def test_episodes_fall_into_the_buckets_of_their_returns_and_lengths(progress):
+    """Of which the quantiles of the last hundred are exact."""
+    progress.collected(7, [episode(number) for number in range(1, 6)])
+
+    returns = values(progress, "palaestra_trainer_episode_return_bucket", "le")
+    assert (returns["0.0",], returns["1.0",], returns["2.0",], returns["+Inf",]) == (0, 1, 2, 5)
+    lengths = values(progress, "palaestra_trainer_episode_length_steps_bucket", "le")
+    assert (lengths["5.0",], lengths["10.0",], lengths["20.0",], lengths["50.0",]) == (0, 1, 2, 5)
+    assert values(progress, "palaestra_trainer_episode_length_steps_sum") == {(): 150}
+    assert values(progress, "palaestra_trainer_episode_return_mean") == {(): 3}
+    quantiles = values(progress, "palaestra_trainer_episode_return_quantile", "rank")
+    assert quantiles == {("0",): 1, ("0.1",): 1, ("0.5",): 3, ("0.9",): 5, ("1",): 5}
+
+
+def test_success_in_training_is_that_of_the_last_hundred_episodes(progress):
+    """Where the environment says so; one that does not has no ratio."""
+    progress.collected(1, [episode(1)])
+    silent = values(progress, "palaestra_trainer_episode_success_ratio")
+    progress.collected(2, [episode(1, success=False)] * 100)
+    progress.collected(3, [episode(1, success=True)] * 25)
+
+    assert silent == {}
+    assert values(progress, "palaestra_trainer_episode_success_ratio") == {(): 0.25}
+
+
+def test_an_evaluation_is_told_until_the_next(progress):
+    """With how many there were."""
+    for success in (True, False):
+        played = Episode(seed=1, total_reward=2.0, length=3, success=success)
+        progress.evaluated(Evaluation(episodes=(played,), faults=0, steps_lost=0, seconds=0.1))
+
+    assert values(progress, "palaestra_trainer_evaluations_total") == {(): 2}
+    assert values(progress, "palaestra_trainer_evaluation_success_ratio") == {(): 0}
+    assert values(progress, "palaestra_trainer_evaluation_return_mean") == {(): 2}
+    assert values(progress, "palaestra_trainer_evaluation_length_mean_steps") == {(): 3}
+
+
+def test_what_tensorboard_is_told_is_told_here(progress):
+    """Of it losses, exploration and learning rate, and nothing under a name that is not declared."""
+    logged = Logged(progress.figures)
+    logged.write({"train/loss": 0.5, "train/n_updates": 4, "rollout/exploration_rate": 0.3}, {}, 7)
+    logged.write({"train/learning_rate": 0.001, "train/my_own_loss": 1.0, "train/loss": 0.25}, {}, 8)
+
+    assert values(progress, "palaestra_trainer_loss", "loss") == {("loss",): 0.25}
+    assert values(progress, "palaestra_trainer_exploration", "measure") == {("exploration_rate",): 0.3}
+    assert values(progress, "palaestra_trainer_learning_rate") == {(): 0.001}
+
+
+def test_faults_and_restarts_are_told_of_each_simulator_by_cause(progress):
+    """A restart has the cause of the fault that it mended; wear is none."""
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
+    progress.fault("collect-0", SimulatorHung("collect-0", "silent"))
+    progress.restarted("collect-0", recycled=False)
+    progress.restarted("evaluate-0", recycled=True)
+    progress.slow("evaluate-0", 0.4)
+
+    faults = values(progress, "palaestra_simulator_faults_total", "simulator", "kind")
+    restarts = values(progress, "palaestra_simulator_restarts_total", "simulator", "cause")
+    assert {labels for labels, times in faults.items() if times} == {
+        ("collect-0", "dead"), ("collect-0", "hung"), ("evaluate-0", "slow"),
+    }  # fmt: skip
+    assert {labels for labels, times in restarts.items() if times} == {
+        ("collect-0", "hung"), ("evaluate-0", "recycled"),
+    }  # fmt: skip
+    assert (len(faults), len(restarts)) == (8, 8)
+
+
+def test_simulators_are_counted_by_how_they_stand(progress):
+    """One that was given up is not one that is being mended."""
+    progress.started("evaluate-0")
+    progress.given_up("collect-0")
+
+    counted = values(progress, "palaestra_trainer_simulators", "role", "state")
+    assert {labels for labels, number in counted.items() if number} == {
+        ("Collect", "given_up"), ("Evaluate", "ready"),
+    }  # fmt: skip
+
+
+def test_what_is_played_is_told_of_each_simulator(progress, make_member, clock):
+    """Steps with their time, episodes, and what is left of the restarts; simulated time if it is known."""
+    keeper = Keeper(make_member(), Care(restart_limit=4), progress, clock)
+    progress.figures.meters = {"collect-0": keeper.meter}
+    keeper.reset(1)
+    keeper.step(1)
+    keeper.step(1)
+    keeper.begin_mending(SimulatorDead("collect-0", "gone"))
+    await_one([keeper])
+
+    steps = values(progress, "palaestra_simulator_step_duration_seconds_count", "simulator")
+    assert steps == {("collect-0",): 2}
+    assert values(progress, "palaestra_simulator_resets_total", "simulator") == {("collect-0",): 1}
+    spent = values(progress, "palaestra_simulator_restart_budget_spent_ratio", "simulator")
+    assert spent == {("collect-0",): 0.25}
+    assert values(progress, "palaestra_simulator_simulated_seconds_total", "simulator") == {}
+
+
+def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
+    """By the same window by which the simulator is given up."""
+    keeper = Keeper(make_member(), Care(restart_limit=2, restart_within_s=60.0), clock=clock)
+    keeper.begin_mending(SimulatorDead("collect-0", "gone"))
+    await_one([keeper])
+    before = keeper.meter.budget_spent
+    clock.now = 60.0
+
+    assert (before, keeper.meter.budget_spent) == (0.5, 0.0)
+
+
+def test_a_member_that_knows_its_simulated_time_is_asked(progress, make_member):
+    """The rate of it is the real-time factor."""
+    member = make_member()
+    member.simulated_s = 1.92
+    progress.figures.meters = {"collect-0": Keeper(member).meter}
+
+    assert values(progress, "palaestra_simulator_simulated_seconds_total", "simulator") == {
+        ("collect-0",): 1.92
+    }
+
+
+@pytest.fixture
+def train(job, directory, make_member):
+    """Train a short run of DQN to its end; return its progress."""
+
+    def run():
+        configuration = job("DQN")
+        progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
+        around = Surroundings(
+            make_members=lambda given: [make_member(it.name) for it in given.simulators],
+            display=Lines(),
+            environment={},
+        )
+        end = Attempt(configuration, directory, progress, around).play()
+        assert end.code == 0, end.message
+        return progress
+
+    return run
+
+
+def test_a_run_tells_of_its_checkpoints_and_losses(train):
+    """Of a whole run, once it has ended: when, how long and how large; by what it learnt."""
+    progress = train()
+
+    size = values(progress, "palaestra_trainer_checkpoint_size_bytes")[()]
+    assert size > 1000
+    assert values(progress, "palaestra_trainer_checkpoint_duration_seconds_count")[()] >= 1
+    assert values(progress, "palaestra_trainer_checkpoint_timestamp_seconds")[()] > 1.7e9
+    assert values(progress, "palaestra_trainer_checkpoint_failures_total") == {(): 0}
+    assert values(progress, "palaestra_trainer_loss", "loss").keys() == {("loss",)}
+    assert values(progress, "palaestra_trainer_exploration", "measure").keys() == {("exploration_rate",)}
+    played = values(progress, "palaestra_simulator_resets_total", "simulator")
+    assert played.keys() == {("collect-0",), ("evaluate-0",)}
+
+
+def test_a_run_that_goes_on_is_not_told_before_it_is_known_how_far_it_is(job, directory, train):
+    """A counter that begins at 0 and jumps has grown, to Prometheus: here nothing could be served at all."""
+    saved = train().step
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        configuration = job("DQN", statusAddress=f"127.0.0.1:{taken.getsockname()[1]}")
+        progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
+        around = Surroundings(make_members=lambda _: [], display=Lines(), environment={})
+        end = Attempt(configuration, directory, progress, around).play()
+
+    assert "is in use" in end.message
+    assert progress.step == saved > 0
+    assert progress.counters.episodes > 0
+
+
+def test_a_checkpoint_that_a_full_disk_refuses_is_counted(train, monkeypatch):
+    """The run goes on without, and somebody ought to know."""
+
+    def no_space(*_args, **_options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(np, "savez", no_space)
+
+    progress = train()
+
+    assert values(progress, "palaestra_trainer_checkpoint_failures_total")[()] >= 2
+    assert values(progress, "palaestra_trainer_checkpoint_size_bytes") == {}
+
+
+def test_what_a_run_is_held_to_is_told_too(progress, job):
+    """An alert compares with it: no checkpoint for three intervals, idle for most of the deadline."""
+    configuration = job(checkpoint={"everySteps": 50}, stallDeadlineSeconds=90)
+
+    found = scrape(progress, metrics.constants(configuration))
+
+    assert found["palaestra_trainer_checkpoint_interval_steps"].samples[0].value == 50
+    assert found["palaestra_trainer_stall_deadline_seconds"].samples[0].value == 90
+
+
+def test_a_member_with_a_spare_has_simulated_what_both_have():
+    """A restart changes their roles, and a counter must not fall."""
+    first, second = (SimpleNamespace(name="collect-0", simulated_s=seconds) for seconds in (1.5, 0.25))
+
+    assert Standby(first, second).simulated_s == 1.75

@@ -1,0 +1,87 @@
+"""What an attempt has come to that only /metrics shows; nothing of it is kept for the next attempt."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from stable_baselines3.common.logger import KVWriter
+
+from palaestra_sim.protocol.metrics import Tally
+from palaestra_trainer import families
+from palaestra_trainer.evaluation import Evaluation
+from palaestra_trainer.simulators.meter import Meter
+
+EPISODES_IN_MEAN = 100  # as in Stable-Baselines3's rollout/ep_rew_mean
+
+
+def _successes() -> deque[bool]:
+    return deque(maxlen=EPISODES_IN_MEAN)
+
+
+@dataclass(slots=True)
+class Figures:
+    """Written by training's thread, read by any.
+
+    Attributes:
+        returns: of training episodes.
+        lengths: of training episodes, in steps.
+        successes: whether each of the last training episodes succeeded, where its environment says so.
+        evaluations: how many there were.
+        evaluation: the last one; None before it.
+        saves: seconds that writing each checkpoint took.
+        saved_at: Unix time of the newest checkpoint; None before it.
+        saved_bytes: size of its files; None before it.
+        saves_refused: checkpoints that could not be written.
+        logged: what the learner logged last, by its name in TensorBoard.
+        meters: what each simulator has done, by its name.
+    """
+
+    returns: Tally = field(default_factory=families.RETURN.tally)
+    lengths: Tally = field(default_factory=families.LENGTH.tally)
+    successes: deque[bool] = field(default_factory=_successes)
+    evaluations: int = 0
+    evaluation: Evaluation | None = None
+    saves: Tally = field(default_factory=families.CHECKPOINT_DURATION.tally)
+    saved_at: float | None = None
+    saved_bytes: int | None = None
+    saves_refused: int = 0
+    logged: dict[str, Any] = field(default_factory=dict)
+    meters: Mapping[str, Meter] = field(default_factory=dict)
+
+    def played(self, info: Mapping[str, Any]) -> None:
+        """Count a training episode by the info of its last step."""
+        self.returns.observe(info["episode"]["r"])
+        self.lengths.observe(info["episode"]["l"])
+        if "is_success" in info:
+            self.successes.append(bool(info["is_success"]))
+
+    def evaluated(self, evaluation: Evaluation) -> None:
+        """Count an evaluation."""
+        self.evaluation = evaluation
+        self.evaluations += 1
+
+    def saved(self, seconds: float, size_bytes: int) -> None:
+        """Count a checkpoint of so many bytes, which took so many seconds."""
+        self.saves.observe(seconds)
+        self.saved_at, self.saved_bytes = time.time(), size_bytes
+
+
+class Logged(KVWriter):
+    """An output of Stable-Baselines3's logger: what TensorBoard is told, `figures` know too."""
+
+    def __init__(self, figures: Figures) -> None:
+        self._figures = figures
+
+    def write(
+        self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0
+    ) -> None:
+        """Remember the newest value of each name."""
+        del key_excluded, step
+        self._figures.logged = {**self._figures.logged, **key_values}
+
+    def close(self) -> None:
+        """Nothing is open."""
