@@ -51,7 +51,7 @@ debian_unpack() {
   file="$folder/$(basename "$path")"
   /usr/lib/apt/apt-helper download-file "$(debian_mirror)/$path" "$file" "SHA256:$sha256" >"$file.log" 2>&1 ||
     die "$(debian_mirror)/$path could not be had with checksum $sha256: $(tail -1 "$file.log")
-  Debian keeps only the newest version: if there is a newer one, set it and its checksum in $HERE/settings.sh."
+  Debian keeps only the newest version: if there is a newer one, set it and its checksum where they stand below $HERE."
   dpkg-deb -x "$file" "$folder"
   rm "$file" "$file.log"
 }

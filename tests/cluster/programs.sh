@@ -1,23 +1,43 @@
 #!/usr/bin/env bash
-# Build the programs of a cluster from Go modules (programs/*/go.mod) and print the folder that holds them.
+# Build the programs of a cluster from Go modules (programs/*/go.mod), or take them out of a Debian package
+# (programs/*/debian: its path below a mirror, and its SHA-256), and print the folder that holds them.
 #   programs.sh [PROGRAM…]             all of programs/list when none is named
 #   programs.sh --built [PROGRAM…]     build nothing: exit 3, without a word, unless they are there
 # Each is kept in the cache under the content of its module, and put in place by renaming.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
+# shellcheck source-path=SCRIPTDIR source=debian.sh
+. "$HERE/debian.sh"
 
 KEPT_DAYS=14 # what earlier versions left in the cache
 
 build() {
   local program=$1 module=$2 package=$3 target=$4 part="$4.part"
   [[ ! -x $target ]] || return 0
+  mkdir -p "$(dirname "$target")"
+  if [[ -e $HERE/programs/$module/debian ]]; then
+    unpack "$module" "$package" "$part"
+  else
+    compile "$program" "$module" "$package" "$part"
+  fi
+  mv "$part" "$target"
+}
+
+compile() {
+  local program=$1 module=$2 package=$3 part=$4
   command -v go >/dev/null || die "$program can't be built: Go is missing. Install Go 1.26 (https://go.dev/dl) and repeat."
   say "building $program"
-  mkdir -p "$(dirname "$target")"
   "$HERE/programs/build.sh" "$module" "$package" "$part" ||
     die "$program could not be built from $HERE/programs/$module: Go's message is above."
-  mv "$part" "$target"
+}
+
+unpack() {
+  local module=$1 path_inside=$2 part=$3 path sha256
+  read -r path sha256 <"$HERE/programs/$module/debian"
+  debian_unpack "$path" "$sha256" "$part.tree"
+  mv "$part.tree/$path_inside" "$part"
+  rm -rf "$part.tree"
 }
 
 # Make sure that a program is in the folder of this version.

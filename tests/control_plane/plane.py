@@ -96,7 +96,7 @@ def running(folder: Path, *, controllers: bool = True) -> Iterator[ControlPlane]
         DidNotStart: one of them did not come up in 60 s.
     """
     authority = Authority.create(folder)
-    etcd_port, peer_port, port = _free_ports(3)
+    etcd_port, peer_port, port = free_ports(3)
     plane = ControlPlane(
         folder=folder,
         port=port,
@@ -106,11 +106,11 @@ def running(folder: Path, *, controllers: bool = True) -> Iterator[ControlPlane]
     )
     _kubeconfig(plane.kubeconfig, plane, "admin", "system:masters")
     with ExitStack() as processes:
-        processes.enter_context(_process(folder, _etcd(plane, etcd_port, peer_port)))
-        api_server = processes.enter_context(_process(folder, _api_server(plane, etcd_port)))
+        processes.enter_context(started(folder, _etcd(plane, etcd_port, peer_port)))
+        api_server = processes.enter_context(started(folder, _api_server(plane, etcd_port)))
         _wait_ready(plane, api_server)
         if controllers:
-            processes.enter_context(_process(folder, _controllers(plane)))
+            processes.enter_context(started(folder, _controllers(plane)))
         yield plane
 
 
@@ -168,7 +168,8 @@ def _controllers(plane: ControlPlane) -> list[str]:
 
 
 @contextmanager
-def _process(folder: Path, command: list[str]) -> Iterator["subprocess.Popen[bytes]"]:
+def started(folder: Path, command: list[str]) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run a program until the block ends, with its log in `folder`; it does not outlive us."""
     if not shutil.which("setpriv"):
         raise DidNotStart(
             "setpriv is missing, without which processes could be left behind; install util-linux"
@@ -222,7 +223,8 @@ def _kubeconfig(path: Path, plane: ControlPlane, user: str, group: str) -> Path:
     return path
 
 
-def _free_ports(count: int) -> list[int]:
+def free_ports(count: int) -> list[int]:
+    """Return ports that nobody listens on now."""
     with ExitStack() as sockets:
         ports = []
         for _ in range(count):

@@ -1,12 +1,12 @@
-"""Where etcd, kube-apiserver, kube-controller-manager and kubectl are; built by tests/cluster/programs.sh."""
+"""Where etcd, kube-apiserver, kubectl, helm and others are; built by tests/cluster/programs.sh."""
 
 import os
 import subprocess
+from functools import cache
 from pathlib import Path
 
 SCRIPTS = Path(__file__).parents[1] / "cluster"
 PROGRAMS = ("etcd", "kube-apiserver", "kube-controller-manager", "kubectl")
-COMMAND = f"tests/cluster/programs.sh {' '.join(PROGRAMS)}"
 REQUIRED = "PALAESTRA_REQUIRE_CLUSTER"
 BUILD_DEADLINE_S = 1800
 MISSING = 3  # what programs.sh --built answers where one of them is missing
@@ -16,13 +16,15 @@ class NoPrograms(Exception):
     """The programs are not there; the message names the command that builds them."""
 
 
-def programs() -> Path:
+@cache
+def programs(names: tuple[str, ...] = PROGRAMS) -> Path:
     """Return the folder that holds the programs; build them where they are required and missing.
 
     Raises:
         NoPrograms: they are not built, and PALAESTRA_REQUIRE_CLUSTER is not 1; or building them failed.
     """
-    wanted = PROGRAMS if os.environ.get(REQUIRED) == "1" else ("--built", *PROGRAMS)
+    command = f"tests/cluster/programs.sh {' '.join(names)}"
+    wanted = names if os.environ.get(REQUIRED) == "1" else ("--built", *names)
     done = subprocess.run(
         [str(SCRIPTS / "programs.sh"), *wanted],
         capture_output=True,
@@ -31,7 +33,7 @@ def programs() -> Path:
         check=False,
     )
     if done.returncode == MISSING:
-        raise NoPrograms(f"no API server is built; build it once (8 minutes) with {COMMAND}")
+        raise NoPrograms(f"programs of a cluster are not built; build them once (minutes) with {command}")
     if done.returncode:
-        raise NoPrograms(f"{COMMAND} failed: {done.stderr[-2000:]}")
+        raise NoPrograms(f"{command} failed: {done.stderr[-2000:]}")
     return Path(done.stdout.strip().splitlines()[-1])

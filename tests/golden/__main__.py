@@ -2,20 +2,27 @@
 
     tests/golden/<example>.<layout>.yaml    the whole plan of each manifests/examples/*.yaml
     manifests/crd.yaml, docs/trainingjob.md what the API is made of
-    manifests/install.yaml                  the whole installation of this release
+    docs/metrics.md                         every metric that the programs declare
+    charts/palaestra/README.md              what its values.yaml says
+    charts/palaestra/dashboards/*.json      what tools/dashboards asks and shows
+    manifests/install.yaml                  the chart with its default values, where Helm is built
 
 A new example needs no new test: its plans are recorded here and compared by test_golden.py.
 """
 
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from palaestra.api import load
 from palaestra.api.generated import generated_files
-from palaestra.manifests import install_text
 from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
 from palaestra.plan.text import as_yaml
+from tests.chart import installation, readme
+from tests.control_plane.programs import NoPrograms
+from tools import dashboards
+from tools.metrics import page as metrics
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "manifests" / "examples"
@@ -36,7 +43,12 @@ def recorded() -> Iterator[tuple[Path, str]]:
             yield path, as_yaml(plan(job, layout).objects)
     for name, text in generated_files(ROOT).items():
         yield ROOT / name, text
-    yield ROOT / "manifests" / "install.yaml", install_text()
+    yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
+    for name, text in dashboards.generated_files().items():
+        yield ROOT / name, text
+    yield readme.PATH, readme.text()
+    with suppress(NoPrograms):  # whoever changes the chart has Helm; all others leave the file as it is
+        yield installation.PATH, installation.text()
 
 
 def main() -> int:

@@ -8,7 +8,9 @@ import pytest
 
 from palaestra.cluster import Api, NotFound, Resource, connect
 from palaestra.cluster.resources import LEASES, TRAINING_JOBS
-from palaestra.manifests import NAME, NAMESPACE, install
+from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
+from palaestra.operator.options import NAME
+from tests.chart.installation import installed as installation
 from tests.control_plane.fixture import control_plane
 from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place, eventually
@@ -18,19 +20,20 @@ __all__ = ["control_plane"]
 
 Start = Callable[..., RunningOperator]
 UNNAMESPACED = {"Namespace", "CustomResourceDefinition", "ClusterRole", "ClusterRoleBinding"}
+PLURALS = {"NetworkPolicy": "networkpolicies"}
 
 
 @pytest.fixture(scope="session")
 def installed(control_plane: ControlPlane) -> Iterator[Api]:
     """An administrator's client, once everything of install.yaml but the Deployment is there."""
     api = connect(str(control_plane.kubeconfig))
-    for obj in install("0.0.0"):
+    for obj in installation():
         if obj["kind"] != "Deployment":
             kind = obj["kind"]
             resource = Resource(
                 api_version=obj["apiVersion"],
                 kind=kind,
-                plural=f"{kind.lower()}s",
+                plural=PLURALS.get(kind, f"{kind.lower()}s"),
                 namespaced=kind not in UNNAMESPACED,
             )
             api.create(resource, obj)

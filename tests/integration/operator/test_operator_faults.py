@@ -7,7 +7,8 @@ import time
 import pytest
 
 from palaestra.cluster.resources import JOBS, LEASES, PODS
-from palaestra.manifests import NAME, NAMESPACE
+from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
+from palaestra.operator.options import NAME
 from palaestra_sim.protocol.status import Termination
 from tests.integration.operator.cluster import eventually
 

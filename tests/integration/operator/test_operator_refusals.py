@@ -4,7 +4,9 @@ import pytest
 
 from palaestra.cluster import Resource
 from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINING_JOBS
-from palaestra.manifests import NAME, NAMESPACE, SECRETS_ROLE
+from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
+from palaestra.operator.options import NAME
+from tests.chart.installation import SECRETS_ROLE
 from tests.integration.operator.cluster import eventually
 
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")

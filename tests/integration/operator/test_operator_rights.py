@@ -3,7 +3,9 @@
 import json
 
 from palaestra.cluster.resources import CONFIG_MAPS, JOBS, TRAINING_JOBS
-from palaestra.manifests import NAME, NAMESPACE, SECRETS_ROLE, install
+from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
+from palaestra.operator.options import NAME
+from tests.chart.installation import SECRETS_ROLE, installed
 from tests.integration.operator.cluster import eventually, stranger, world_map, world_of
 from tests.integration.operator.test_operator_refusals import limited, quota
 
@@ -20,7 +22,7 @@ def granted():
     """Return (group, resource, verb) of all rights that come with an installation."""
     return {
         (group, resource, verb)
-        for each in install("0.0.0")
+        for each in installed()
         if each["kind"] in {"ClusterRole", "Role"} and each["metadata"]["name"] != SECRETS_ROLE
         for rule in each["rules"]
         for group in rule["apiGroups"]

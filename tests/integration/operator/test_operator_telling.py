@@ -7,9 +7,11 @@ from datetime import UTC, datetime
 
 import pytest
 
-from palaestra.manifests import NAME, NAMESPACE
+from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
+from palaestra.operator.options import NAME
 from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
 from tests.integration.operator.cluster import eventually
+from tests.metrics import complaints, documented, served
 
 USER = f"system:serviceaccount:{NAMESPACE}:{NAME}"
 ADDRESS = "127.90.90.1"  # loopback, and nobody else's
@@ -76,10 +78,38 @@ def test_the_metrics_count_jobs_by_phase(place, start):
 
     metrics = operator.ask("/metrics")
 
-    assert 'palaestra_jobs{phase="Pending"} 1.0' in metrics
+    assert f'palaestra_jobs{{job_namespace="{place.name}",phase="Pending"}} 1.0' in metrics
     assert 'palaestra_operator_requests_total{code="200",resource="jobs",verb="create"} 1.0' in metrics
     assert operator.ask("/readyz") == "ok\n"
     assert operator.ask("/healthz") == "ok\n"
+
+
+def test_the_metrics_are_those_of_the_page(place, start):
+    """Every family of docs/metrics.md with its type, and none besides; promtool has nothing to say."""
+    operator = start()
+    place.train()
+    place.pods()
+
+    text = operator.ask("/metrics")
+
+    assert served(text) == documented("operator")
+    assert complaints(text) == ""
+
+
+def test_a_job_that_runs_and_ends_is_counted(place, start):
+    """How long it took to begin, and why it ended; from the moment that its status tells so."""
+    operator = start()
+    place.train()
+    [pod] = place.pods()
+    place.run(pod)
+    place.end(pod, code=81)
+    place.until("Failed")
+
+    def counted():
+        text = operator.ask("/metrics")
+        return 'palaestra_replica_ends_total{reason="Diverged"} 1.0' in text and text
+
+    assert "palaestra_job_time_to_running_seconds_count 1.0" in eventually(counted)
 
 
 def test_log_lines_are_constant_messages_with_fields(place, start):

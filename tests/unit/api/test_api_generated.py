@@ -23,7 +23,7 @@ EXAMPLES = [
 ]
 
 
-@pytest.mark.parametrize("name", ["manifests/crd.yaml", "docs/trainingjob.md"])
+@pytest.mark.parametrize("name", ["manifests/crd.yaml", "charts/palaestra/crd.yaml", "docs/trainingjob.md"])
 def test_the_committed_file_is_current(name, repository) -> None:
     """`make golden` writes them anew."""
     assert (repository / name).read_text(encoding="utf-8") == generated_files(repository)[name]

@@ -13,6 +13,7 @@ from palaestra.operator.metrics import Metrics
 from palaestra.operator.options import address
 
 WAIT_S = 10.0
+PHASES = [("robots", "Running"), ("robots", "Running"), ("home", "Failed")]
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def ask(told):
     """A function that returns status and text of a path."""
     metrics = Metrics()
     metrics.request("list", "pods", 200, 0.01)
-    metrics.watch(depth=lambda: 3, leads=lambda: True, phases=lambda: ["Running", "Running", "Failed"])
+    metrics.watch(depth=lambda: 3, leads=lambda: True, phases=lambda: PHASES)
     trouble = lambda: told[0] if told else None  # noqa: E731 - both questions get the same answer
     server = HealthServer(("127.0.0.1", 0), healthy=trouble, ready=trouble, metrics=metrics.text)
 
@@ -64,8 +65,9 @@ def test_nothing_else_is_served(ask):
         'palaestra_operator_requests_total{code="200",resource="pods",verb="list"} 1.0',
         "palaestra_operator_queue_depth 3.0",
         "palaestra_operator_leader 1.0",
-        'palaestra_jobs{phase="Running"} 2.0',
-        'palaestra_jobs{phase="Succeeded"} 0.0',
+        'palaestra_jobs{job_namespace="robots",phase="Running"} 2.0',
+        'palaestra_jobs{job_namespace="robots",phase="Succeeded"} 0.0',
+        'palaestra_jobs{job_namespace="home",phase="Failed"} 1.0',
         'palaestra_operator_build_info{version="VERSION"} 1.0',
     ],
 )

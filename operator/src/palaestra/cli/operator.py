@@ -4,8 +4,9 @@ import argparse
 from importlib.metadata import version
 
 from palaestra.cli.parsing import Commands, command
+from palaestra.cluster import own_namespace
 from palaestra.errors import PalaestraError
-from palaestra.operator.options import Options, address, own_namespace
+from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
 from palaestra.operator.run import run
 from palaestra.plan import Images
 
@@ -19,7 +20,14 @@ to standard error; ends within 2 s of SIGTERM. Only one leads at a time, the oth
 def add(commands: Commands) -> None:
     """Add the command."""
     parser = command(commands, "operator", _operator, "look after the jobs of a cluster", OPERATOR)
-    parser.add_argument("--namespace", metavar="NS", help="look after this namespace only; default: all")
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        dest="namespaces",
+        action="append",
+        default=[],
+        help="look after this namespace only; may be repeated; default: all",
+    )
     parser.add_argument(
         "--workers", metavar="N", type=int, default=4, help="jobs looked at at once; default: 4"
     )
@@ -52,7 +60,7 @@ def _add_cluster(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--operator-namespace",
         metavar="NS",
-        default=own_namespace(),
+        default=own_namespace(DEFAULT_NAMESPACE),
         help="where this operator runs; default: the pod's own, else palaestra-system",
     )
     parser.add_argument(
@@ -80,7 +88,7 @@ def _operator(options: argparse.Namespace) -> int:
             images=images,
             operator_namespace=options.operator_namespace,
             monitoring_namespace=options.monitoring_namespace,
-            namespace=options.namespace,
+            namespaces=tuple(dict.fromkeys(options.namespaces)),
             workers=options.workers,
             resync_s=options.resync,
             leader_elect=options.leader_elect,

@@ -6,6 +6,7 @@
     poller       the trainers' own word, over the pod network
     writing      every write to the cluster; none while another operator leads
     workers      threads that take keys from the queue
+    families     every metric by name, as data
     metrics, health, logs, run
 
 What is wanted and what it means is decided elsewhere, in `palaestra.plan` and `palaestra.decide`,

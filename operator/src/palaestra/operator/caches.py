@@ -5,11 +5,11 @@ memory does not grow with what others run in the cluster.
 """
 
 import time
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Any
 
 from palaestra.api.status import Phase
-from palaestra.cluster import Api, Reflector, Resource
+from palaestra.cluster import Api, Resource
 from palaestra.cluster.resources import (
     CLAIMS,
     CONFIG_MAPS,
@@ -20,6 +20,7 @@ from palaestra.cluster.resources import (
 )
 from palaestra.observe import trimmed
 from palaestra.observe.reading import owners
+from palaestra.operator.following import Followed
 from palaestra.operator.poller import Key, Target
 from palaestra.plan.layout import STATUS_PORT
 from palaestra.plan.replica import JOB_LABEL, TRAINER
@@ -31,25 +32,25 @@ CHILDREN = (JOBS, PODS, CLAIMS, CONFIG_MAPS.only_metadata(), NETWORK_POLICIES)
 
 
 class Caches:
-    """The objects of one namespace, or of all, as they were a moment ago.
+    """The objects of some namespaces, or of all, as they were a moment ago.
 
     Args:
         api: the cluster.
-        namespace: None for all.
+        namespaces: those that are looked at; none: all of them.
         changed: is told the key of each TrainingJob that changed, or of which a child did.
     """
 
-    def __init__(self, api: Api, namespace: str | None, changed: Changed) -> None:
+    def __init__(self, api: Api, namespaces: Sequence[str], changed: Changed) -> None:
         self._changed = changed
         self._phases: dict[Key, str] = {}
-        self._jobs = Reflector(
-            api, TRAINING_JOBS, namespace=namespace, keep=trimmed, changed=self._job_changed
+        self._jobs = Followed(
+            api, TRAINING_JOBS, namespaces=namespaces, keep=trimmed, changed=self._job_changed
         )
         self._children = {
-            resource.plural: Reflector(
+            resource.plural: Followed(
                 api,
                 resource,
-                namespace=namespace,
+                namespaces=namespaces,
                 labels=JOB_LABEL,
                 keep=trimmed,
                 changed=lambda child: changed(_parent(child)),
@@ -75,34 +76,33 @@ class Caches:
 
     def missing(self) -> tuple[str, ...]:
         """Return the plurals of the kinds that were not read yet."""
-        children = (name for name, each in self._children.items() if not each.synced)
-        return (*(() if self._jobs.synced else (TRAINING_JOBS.plural,)), *children)
+        return tuple(each.plural for each in self._all() if not each.synced)
 
     def known(self) -> Collection[Key]:
         """Return the keys of all TrainingJobs."""
-        return self._jobs.store.keys()
+        return self._jobs.keys()
 
     def training_job(self, key: Key) -> Object | None:
         """Return a TrainingJob, None if there is none or it is being deleted."""
-        found = self._jobs.store.get(*key)
+        found = self._jobs.get(*key)
         return None if found is None or "deletionTimestamp" in found["metadata"] else found
 
     def children(self, resource: Resource, key: Key) -> list[Object]:
         """Return the objects of a kind that carry the label of a TrainingJob."""
         namespace, name = key
-        return self._children[resource.plural].store.select(namespace, {JOB_LABEL: name})
+        return self._children[resource.plural].select(namespace, {JOB_LABEL: name})
 
     def job(self, namespace: str, name: str) -> Object | None:
         """Return a batch/v1 Job of ours."""
-        return self._children[JOBS.plural].store.get(namespace, name)
+        return self._children[JOBS.plural].get(namespace, name)
 
-    def phases(self) -> Iterable[str]:
-        """Return the phase of each TrainingJob."""
-        return tuple(self._phases.values())
+    def phases(self) -> Iterable[tuple[str, str]]:
+        """Return namespace and phase of each TrainingJob."""
+        return tuple((namespace, phase) for (namespace, _), phase in tuple(self._phases.items()))
 
     def trainers(self) -> Collection[Target]:
         """Return the trainers that run now."""
-        pods = [pod for pod in self._children[PODS.plural].store.select(None, {}) if _trains(pod)]
+        pods = [pod for pod in self._children[PODS.plural].select(None, {}) if _trains(pod)]
         jobs = {job["metadata"]["uid"] for job in self._jobs_of(pods)}
         return [
             Target(
@@ -116,12 +116,12 @@ class Caches:
         """Return the Jobs of TrainingJobs that have such pods: a pod is no trainer by its labels alone."""
         return [job for key in {_parent(pod) for pod in pods} for job in self.children(JOBS, key)]
 
-    def _all(self) -> tuple[Reflector, ...]:
+    def _all(self) -> tuple[Followed, ...]:
         return (self._jobs, *self._children.values())
 
     def _job_changed(self, obj: Object) -> None:
         key = (obj["metadata"]["namespace"], obj["metadata"]["name"])
-        if self._jobs.store.get(*key) is None:
+        if self._jobs.get(*key) is None:
             self._phases.pop(key, None)
         else:
             self._phases[key] = (obj.get("status") or {}).get("phase") or Phase.PENDING.value

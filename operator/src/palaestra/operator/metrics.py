@@ -1,20 +1,34 @@
-"""What the operator counts about itself and its jobs.
+"""What the operator counts about itself and its jobs; the names are in `palaestra.operator.families`."""
 
-Labels are bounded: no job's name, which would outlive the job. What a training does is told by its
-own pods.
-"""
-
-from collections import Counter as Tally
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter as Count
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from datetime import datetime
 from importlib.metadata import version
+from typing import Any, TypeVar
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
-from prometheus_client.metrics_core import GaugeMetricFamily, Metric
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Histogram,
+    ProcessCollector,
+    disable_created_metrics,
+    generate_latest,
+)
+from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from palaestra.api.status import Phase
+from palaestra.api.reasons import Reason
+from palaestra.api.status import ConditionType, Phase
+from palaestra.operator import families
+from palaestra_sim.protocol.metrics import Family, Values
 
-SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
+TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})
+
+Object = Mapping[str, Any]
+Counted = TypeVar("Counted", Counter, Histogram)
+
+# Else each counter has a second series, which nobody reads.
+disable_created_metrics()  # type: ignore[no-untyped-call]  # the client is half typed
 
 
 class Metrics:
@@ -22,40 +36,14 @@ class Metrics:
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
-        self.reconciled = Histogram(
-            "palaestra_operator_reconcile_duration_seconds",
-            "Time that one look at a TrainingJob took, by its end: done, conflict or error",
-            ["result"],
-            buckets=SECONDS,
-            registry=self.registry,
-        )
-        self._requests = Counter(
-            "palaestra_operator_requests_total",
-            "Requests to the API server; code 0: no answer",
-            ["verb", "resource", "code"],
-            registry=self.registry,
-        )
-        self._request_seconds = Histogram(
-            "palaestra_operator_request_duration_seconds",
-            "Time that a request to the API server took, watches aside",
-            ["verb"],
-            buckets=SECONDS,
-            registry=self.registry,
-        )
-        self._queued = Histogram(
-            "palaestra_operator_queue_wait_seconds",
-            "Time that a TrainingJob waited for a worker",
-            buckets=SECONDS,
-            registry=self.registry,
-        )
-        self._depth = Gauge(
-            "palaestra_operator_queue_depth", "TrainingJobs that wait for a worker", registry=self.registry
-        )
-        self._leader = Gauge(
-            "palaestra_operator_leader", "1 while this operator leads", registry=self.registry
-        )
-        build = Gauge("palaestra_operator_build_info", "1; its release", ["version"], registry=self.registry)
-        build.labels(version("palaestra")).set(1)
+        self.reconciled = self._histogram(families.RECONCILED)
+        self._requests = self._counter(families.REQUESTS)
+        self._request_seconds = self._histogram(families.REQUEST_DURATION)
+        self._queued = self._histogram(families.QUEUE_WAIT)
+        self._time_to_running = self._histogram(families.TIME_TO_RUNNING)
+        self._restarts = self._counter(families.RESTARTS)
+        self._ends = self._counter(families.REPLICA_ENDS)
+        ProcessCollector(registry=self.registry)
 
     def request(self, verb: str, resource: str, code: int, seconds: float) -> None:
         """Count a request; `code` is 0 when no answer came, `seconds` until the answer's head."""
@@ -67,29 +55,98 @@ class Metrics:
         """Count how long a key waited in the queue."""
         self._queued.observe(seconds)
 
+    def written(self, job: Object, status: Object) -> None:
+        """Count what happened to a TrainingJob, by the status that it had and the one that was written.
+
+        Whoever writes a change counts it, so that no change counts twice.
+        """
+        old = job.get("status") or {}
+        if status["phase"] == Phase.RUNNING and not _has_run(old):
+            waited = _running_since(status) - _time(job["metadata"]["creationTimestamp"])
+            self._time_to_running.observe(max(waited.total_seconds(), 0.0))
+        before = {each["index"]: each for each in old.get("replicas", ())}
+        for replica in status.get("replicas", ()):
+            self._count_replica(before.get(replica["index"], {}), replica)
+
     def watch(
-        self, *, depth: Callable[[], int], leads: Callable[[], bool], phases: Callable[[], Iterable[str]]
+        self,
+        *,
+        depth: Callable[[], int],
+        leads: Callable[[], bool],
+        phases: Callable[[], Iterable[tuple[str, str]]],
     ) -> None:
-        """Tell the queue's depth, leadership and the jobs' phases as they are when asked."""
-        self._depth.set_function(depth)
-        self._leader.set_function(lambda: float(leads()))
-        self.registry.register(_Jobs(phases))
+        """Tell the queue's depth, leadership, and the jobs' namespaces and phases as they are when asked."""
+        self.registry.register(_Now(depth, leads, phases))
 
     def text(self) -> bytes:
         """Return all of them as Prometheus reads them."""
         return generate_latest(self.registry)
 
+    def _count_replica(self, old: Object, new: Object) -> None:
+        before = old.get("restarts") or {}
+        for cause, times in new["restarts"].items():
+            self._restarts.labels(cause).inc(max(times - before.get(cause, 0), 0))
+        if new["phase"] in TERMINAL and old.get("phase") not in TERMINAL:
+            reason = new.get("reason")
+            self._ends.labels(reason if reason in families.ENDS else Reason.JOB_FAILED).inc()
 
-class _Jobs(Collector):
-    """Counts the jobs by phase when asked, so that no gauge can be left behind by a deleted job."""
+    def _histogram(self, family: Family) -> Histogram:
+        made = Histogram(
+            family.name, family.meaning, family.label_names, buckets=family.buckets, registry=self.registry
+        )
+        return _from_zero(made, family)
 
-    def __init__(self, phases: Callable[[], Iterable[str]]) -> None:
+    def _counter(self, family: Family) -> Counter:
+        made = Counter(family.name, family.meaning, family.label_names, registry=self.registry)
+        return _from_zero(made, family)
+
+
+class _Now(Collector):
+    """What is read when asked, so that no gauge can be left behind by a deleted job."""
+
+    def __init__(
+        self,
+        depth: Callable[[], int],
+        leads: Callable[[], bool],
+        phases: Callable[[], Iterable[tuple[str, str]]],
+    ) -> None:
+        self._depth = depth
+        self._leads = leads
         self._phases = phases
 
     def collect(self) -> Iterator[Metric]:
-        """Yield one gauge with a value for each phase."""
-        tally = Tally(self._phases())
-        family = GaugeMetricFamily("palaestra_jobs", "TrainingJobs by phase", labels=["phase"])
-        for phase in Phase:
-            family.add_metric([phase.value], tally[phase.value])
-        yield family
+        """Yield one family after the other; jobs are told by the leader only, so that each counts once."""
+        leads = self._leads()
+        yield families.JOBS.metric(_by_phase(self._phases()) if leads else {})
+        yield families.QUEUE_DEPTH.metric({(): self._depth()})
+        yield families.LEADER.metric({(): leads})
+        yield families.BUILD.metric({(version("palaestra"),): 1})
+
+
+def _from_zero(made: Counted, family: Family) -> Counted:
+    """Return a metric that has every value of its labels from the start: the first event is an increase."""
+    for values in family.combinations() if family.labels else ():
+        made.labels(*values)
+    return made
+
+
+def _by_phase(jobs: Iterable[tuple[str, str]]) -> Values:
+    """Return how many jobs of each namespace are in each phase."""
+    counted = Count(jobs)
+    namespaces = sorted({namespace for namespace, _ in counted})
+    return {(each, phase): counted[each, phase] for each in namespaces for phase in Phase}
+
+
+def _has_run(status: Object) -> bool:
+    """Return whether a job was running before, by what its trainers have told and how often they began."""
+    begun = (each.get("attempt", 0) > 1 or "target" in each for each in status.get("replicas", ()))
+    return status.get("phase") == Phase.RUNNING or any(begun)
+
+
+def _running_since(status: Object) -> datetime:
+    times = {each["type"]: each["lastTransitionTime"] for each in status["conditions"]}
+    return _time(times[ConditionType.RUNNING])
+
+
+def _time(text: str) -> datetime:
+    return datetime.fromisoformat(text)

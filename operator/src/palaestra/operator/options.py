@@ -1,12 +1,10 @@
 """How the operator is started."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from palaestra.errors import PalaestraError
 from palaestra.plan import Images
 
-OWN_NAMESPACE = Path("/var/run/secrets/kubernetes.io/serviceaccount/namespace")
 DEFAULT_NAMESPACE = "palaestra-system"
 NAME = "palaestra-operator"  # of the Lease, and of whatever an installation makes
 MOST_PORT = 65_535
@@ -20,7 +18,7 @@ class Options:
         images: the release's own, for jobs that name none.
         operator_namespace: where the operator and its Lease are; its pods may ask trainers.
         monitoring_namespace: whose pods may scrape trainers and simulators.
-        namespace: the only one whose jobs are looked after; None: all of them.
+        namespaces: those whose jobs are looked after; none: all of them.
         workers: jobs that are looked at at once.
         resync_s: seconds after which every job is looked at again though nothing changed.
         leader_elect: whether to wait for the Lease.
@@ -32,21 +30,13 @@ class Options:
     images: Images
     operator_namespace: str
     monitoring_namespace: str = "monitoring"
-    namespace: str | None = None
+    namespaces: tuple[str, ...] = ()
     workers: int = 4
     resync_s: float = 600.0
     leader_elect: bool = True
     metrics_address: tuple[str, int] = ("0.0.0.0", 8080)  # noqa: S104 - the pod's address, for probes
     kubeconfig: str | None = None
     context: str | None = None
-
-
-def own_namespace() -> str:
-    """Return the namespace that this process runs in; outside a cluster, the one of an installation."""
-    try:
-        return OWN_NAMESPACE.read_text(encoding="ascii").strip() or DEFAULT_NAMESPACE
-    except (OSError, UnicodeDecodeError):
-        return DEFAULT_NAMESPACE
 
 
 def address(text: str) -> tuple[str, int]:

@@ -51,7 +51,7 @@ class Operator:
         self._gate = threading.Event()
         api.on_request = metrics.request
         self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited)
-        self._caches = Caches(api, options.namespace, self._queue.add)
+        self._caches = Caches(api, options.namespaces, self._queue.add)
         self._poller = Poller(self._trainers, self._queue.add)
         identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
         self._leadership = Leadership(api, options.operator_namespace, NAME, identity)
@@ -61,7 +61,7 @@ class Operator:
             self._caches,
             Looking(api, self._caches, strangers, denials, self._poller.known),
             Acting(api, writer, self._caches, strangers, denials),
-            Telling(writer, Recorder(api, instance=identity)),
+            Telling(writer, Recorder(api, instance=identity), metrics.written),
             _layout(options),
         )
         self._workers = Workers(
@@ -78,7 +78,7 @@ class Operator:
 
     def run(self, stopping: threading.Event) -> None:
         """Look after the jobs until `stopping` is set."""
-        log.info("started", namespace=self._options.namespace or "all", address=self._server.shown)
+        log.info("started", namespaces=self._options.namespaces or "all", address=self._server.shown)
         self._caches.start()
         self._workers.start()
         self._poller.start()

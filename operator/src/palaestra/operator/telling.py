@@ -5,7 +5,7 @@ alone is written seldom; conditions and phases at once.
 """
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from typing import Any
 
@@ -18,6 +18,7 @@ from palaestra.operator.poller import Key
 from palaestra.operator.writing import Writer, difference
 
 Object = Mapping[str, Any]
+Written = Callable[[Object, Object], None]
 
 
 class Telling:
@@ -26,10 +27,12 @@ class Telling:
     Args:
         writer: for the status.
         recorder: for the events.
+        written: is told of each TrainingJob as it was, and of the status that was written.
     """
 
-    def __init__(self, writer: Writer, recorder: Recorder) -> None:
+    def __init__(self, writer: Writer, recorder: Recorder, written: Written) -> None:
         self._writer = writer
+        self._count = written
         self._recorder = recorder
         self._lock = threading.Lock()
         self._written: dict[Key, datetime] = {}
@@ -64,6 +67,7 @@ class Telling:
         if not worth_writing(old, status, last, now):
             return PROGRESS_EVERY_S if patch else None
         self._writer.status(raw, patch)
+        self._count(raw, status)
         with self._lock:
             self._written[key] = now
         return None

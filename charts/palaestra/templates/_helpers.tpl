@@ -1,0 +1,83 @@
+{{/* The name of everything that belongs to the operator. It is fixed, and so is its Lease's: a second release in the
+     namespace, or a second one for the whole cluster, is refused by Helm instead of working on the same jobs. */}}
+{{- define "palaestra.name" -}}
+palaestra-operator
+{{- end }}
+
+{{/* Labels of an object. Takes the root and the component. */}}
+{{- define "palaestra.labels" -}}
+{{ include "palaestra.selector" . }}
+app.kubernetes.io/version: {{ .root.Chart.AppVersion | quote }}
+{{- end }}
+
+{{/* Labels by which pods are found: never changed, as a Deployment's selector cannot be. */}}
+{{- define "palaestra.selector" -}}
+app.kubernetes.io/name: palaestra
+app.kubernetes.io/component: {{ .component }}
+{{- end }}
+
+{{/* An image by its name below `images`. Takes the root and the name. */}}
+{{- define "palaestra.image" -}}
+{{- $image := index .root.Values.images .name -}}
+{{- with .root.Values.images.registry }}{{ trimSuffix "/" . }}/{{ end -}}
+{{- $image.repository -}}
+{{- if $image.digest }}@{{ $image.digest }}{{ else }}:{{ $image.tag | default .root.Chart.AppVersion }}{{ end -}}
+{{- end }}
+
+{{/* The image of a job's part, or nothing where the operator's own default is the same. Takes the root and the name. */}}
+{{- define "palaestra.jobImage" -}}
+{{- $image := include "palaestra.image" . -}}
+{{- if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
+{{- end }}
+
+{{/* What *restricted* Pod Security asks of a pod, and the user of all our images. */}}
+{{- define "palaestra.podSecurity" -}}
+runAsNonRoot: true
+runAsUser: 65532
+runAsGroup: 65532
+seccompProfile:
+  type: RuntimeDefault
+{{- end }}
+
+{{/* What it asks of a container. */}}
+{{- define "palaestra.containerSecurity" -}}
+allowPrivilegeEscalation: false
+capabilities:
+  drop:
+  - ALL
+readOnlyRootFilesystem: true
+{{- end }}
+
+{{/* The namespace of `helm test`. */}}
+{{- define "palaestra.testNamespace" -}}
+{{- .Values.test.namespace | default (first .Values.watchNamespaces) | default .Release.Namespace -}}
+{{- end }}
+
+{{/* What the operator uses in the namespaces of jobs, and nothing else. */}}
+{{- define "palaestra.jobRules" -}}
+- apiGroups: [palaestra.dev]
+  resources: [trainingjobs]
+  verbs: [get, list, watch, delete] # delete: ttlSecondsAfterFinished
+- apiGroups: [palaestra.dev]
+  resources: [trainingjobs/status]
+  verbs: [patch]
+# Owner references that block deletion need it where OwnerReferencesPermissionEnforcement is on.
+- apiGroups: [palaestra.dev]
+  resources: [trainingjobs/finalizers]
+  verbs: [update]
+- apiGroups: [batch]
+  resources: [jobs]
+  verbs: [get, list, watch, create, patch]
+- apiGroups: [""]
+  resources: [pods]
+  verbs: [list, watch]
+- apiGroups: [""]
+  resources: [configmaps, persistentvolumeclaims]
+  verbs: [get, list, watch, create]
+- apiGroups: [networking.k8s.io]
+  resources: [networkpolicies]
+  verbs: [list, watch, create, patch]
+- apiGroups: [""]
+  resources: [events]
+  verbs: [get, list, create, patch] # list: why a Job's pods could not be made
+{{- end }}

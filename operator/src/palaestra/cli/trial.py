@@ -1,0 +1,47 @@
+"""`palaestra try`: have a small job carried out by a cluster, and see that it succeeds."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from palaestra.cli.cluster import REFUSED, cleaned_up, cluster_command, say
+from palaestra.cli.files import job
+from palaestra.cli.parsing import Commands
+from palaestra.client import Client
+from palaestra.errors import PalaestraError, SpecErrors
+from palaestra.trial import TrialFailed, attempt
+
+TRY = """\
+Creates the TrainingJob in FILE under a name of its own, waits until it has ended, and deletes it,
+whatever came of it. Writes a line for each phase to standard output. A job that did not succeed in time
+ends it with 1.
+"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    parser = cluster_command(commands, "try", _try, "have a cluster carry out a small job", TRY)
+    parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
+    parser.add_argument(
+        "--within",
+        metavar="S",
+        type=float,
+        default=900.0,
+        help="seconds in which it has to succeed, image pulls included; default: 900",
+    )
+
+
+def _try(client: Client, options: argparse.Namespace) -> int:
+    try:
+        tried = job(options.file)
+    except SpecErrors as error:  # of what was typed, not of what a cluster has: nothing was asked
+        raise PalaestraError(str(error)) from error
+    content = tried.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    content["metadata"].setdefault("namespace", client.namespace)
+    try:
+        with cleaned_up():
+            attempt(client.api, content, within_s=options.within, tell=lambda line: say([line]))
+    except TrialFailed as failed:
+        sys.stderr.write(f"{failed}\n")
+        return REFUSED
+    return 0

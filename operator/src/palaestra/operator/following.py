@@ -1,0 +1,79 @@
+"""One kind of objects, followed in some namespaces or in all of them.
+
+Where the operator may look at a few namespaces only, no list spans them: each has a reflector of its own.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from palaestra.cluster import Api, Reflector, Resource
+from palaestra.cluster.reflector import Changed, Keep
+
+Object = dict[str, Any]
+Key = tuple[str, str]
+
+
+class Followed:
+    """The objects of one kind, as they were a moment ago.
+
+    Args:
+        api: the cluster.
+        resource: which kind of objects.
+        namespaces: those that are looked at; none: all of them.
+        labels: a label selector.
+        keep: returns the part of an object that is cached.
+        changed: is told what was kept of each object that changed.
+    """
+
+    def __init__(
+        self,
+        api: Api,
+        resource: Resource,
+        *,
+        namespaces: Sequence[str] = (),
+        labels: str | None = None,
+        keep: Keep,
+        changed: Changed,
+    ) -> None:
+        self.plural = resource.plural
+        self._reflectors = tuple(
+            Reflector(api, resource, namespace=each, labels=labels, keep=keep, changed=changed)
+            for each in namespaces or (None,)
+        )
+
+    @property
+    def synced(self) -> bool:
+        """Whether a whole list of each namespace was read, at least once."""
+        return all(each.synced for each in self._reflectors)
+
+    def start(self) -> None:
+        """Begin to follow; once."""
+        for each in self._reflectors:
+            each.start()
+
+    def stop(self, deadline_s: float) -> None:
+        """End the watches, and wait for them until `deadline_s`."""
+        for each in self._reflectors:
+            each.stop(0.0)
+        ends = time.monotonic() + deadline_s
+        for each in self._reflectors:
+            each.stop(max(0.0, ends - time.monotonic()))
+
+    def wait_synced(self, deadline_s: float) -> bool:
+        """Return whether everything was read once, `deadline_s` from now at the latest."""
+        ends = time.monotonic() + deadline_s
+        return all(each.wait_synced(max(0.0, ends - time.monotonic())) for each in self._reflectors)
+
+    def get(self, namespace: str, name: str) -> Object | None:
+        """Return an object, None if there is none."""
+        found = (each.store.get(namespace, name) for each in self._reflectors)
+        return next((obj for obj in found if obj is not None), None)
+
+    def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
+        """Return the objects that carry these labels; namespace None: wherever they are."""
+        return [obj for each in self._reflectors for obj in each.store.select(namespace, labels)]
+
+    def keys(self) -> set[Key]:
+        """Return namespace and name of all objects."""
+        return {key for each in self._reflectors for key in each.store.keys()}  # noqa: SIM118 - no dict

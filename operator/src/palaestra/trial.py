@@ -1,0 +1,95 @@
+"""Try an installation: have a TrainingJob carried out, and take it away again, whatever came of it.
+
+`helm test` runs this in a pod that may create, read and delete TrainingJobs and nothing else, so what is
+waited for is asked for: no watch.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from palaestra.api.status import Phase
+from palaestra.cluster import Api, ApiError, NotFound
+from palaestra.cluster.resources import TRAINING_JOBS
+from palaestra.errors import PalaestraError
+
+PERIOD_S = 2.0
+ENDS = (Phase.SUCCEEDED.value, Phase.FAILED.value)
+
+Object = dict[str, Any]
+Tell = Callable[[str], None]
+
+
+class TrialFailed(PalaestraError):
+    """The job did not succeed in time; the message is the newest that its status says."""
+
+
+def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
+    """Create a job under a name of its own, wait until it has succeeded, and delete it.
+
+    Args:
+        api: the cluster.
+        job: the TrainingJob; the API server adds five characters to its name, so that two trials never meet.
+        within_s: seconds in which it has to succeed.
+        tell: is called with a line for each phase that the job comes to.
+
+    Raises:
+        TrialFailed: it failed, or had not ended in time.
+        ApiError: the API server refused something.
+    """
+    metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
+    del metadata["name"]
+    made = api.create(TRAINING_JOBS, {**job, "metadata": metadata})["metadata"]
+    try:
+        _wait(api, made["namespace"], made["name"], within_s, tell)
+    finally:
+        _take_away(api, made, tell)
+
+
+def _take_away(api: Api, made: Object, tell: Tell) -> None:
+    """Delete the job. Where that cannot be for now it is told: how the trial went is the news."""
+    namespace, name = made["namespace"], made["name"]
+    try:
+        api.delete(TRAINING_JOBS, namespace, name, uid=made["uid"])
+    except NotFound:
+        pass
+    except ApiError as error:
+        if not error.retryable:
+            raise
+        remedy = f"delete it by hand: `kubectl delete trainingjob -n {namespace} {name}`"
+        tell(f"{namespace}/{name}: could not be deleted ({error}); {remedy}")
+
+
+def _wait(api: Api, namespace: str, name: str, within_s: float, tell: Tell) -> None:
+    ends = time.monotonic() + within_s
+    phase, status = "", Object()
+    while phase not in ENDS:
+        if time.monotonic() > ends:
+            raise TrialFailed(f"{namespace}/{name}: {phase} after {within_s:g} s; {_why(status)}")
+        if phase:
+            time.sleep(PERIOD_S)
+        status = _status(api, namespace, name, tell) or status
+        before, phase = phase, status.get("phase", Phase.PENDING.value)
+        if phase != before:
+            tell(f"{namespace}/{name}: {phase}")
+    if phase != Phase.SUCCEEDED.value:
+        raise TrialFailed(f"{namespace}/{name}: {phase}; {_why(status)}")
+
+
+def _status(api: Api, namespace: str, name: str, tell: Tell) -> Object | None:
+    """Return the job's status; None while the API server has no answer."""
+    try:
+        return api.get(TRAINING_JOBS, namespace, name).get("status")
+    except ApiError as error:
+        if not error.retryable:
+            raise
+        tell(f"{namespace}/{name}: {error}; asked again")
+        return None
+
+
+def _why(status: Object) -> str:
+    """Return what the status says last, in words for people."""
+    conditions = sorted(status.get("conditions", ()), key=lambda each: str(each["lastTransitionTime"]))
+    if not conditions:
+        return "nothing has looked at it: does the operator run, and does it look after this namespace?"
+    return f"{conditions[-1]['reason']}: {conditions[-1]['message']}"

@@ -1,0 +1,56 @@
+"""The chart as Helm renders it; Helm is built by tests/cluster/programs.sh."""
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tests.control_plane.programs import programs
+
+ROOT = Path(__file__).parents[2]
+CHART = ROOT / "charts" / "palaestra"
+RELEASE = "palaestra"
+NAMESPACE = "palaestra-system"
+DEADLINE_S = 60
+
+Object = dict[str, Any]
+
+
+class HelmRefused(Exception):
+    """What Helm says instead of doing what it was asked for."""
+
+
+def helm(*arguments: str, sent: str = "", **environment: str) -> str:
+    """Run Helm with `sent` as its standard input, and return what it prints; 60 s at most.
+
+    Raises:
+        NoPrograms: Helm is not built.
+        HelmRefused: it ended with another code than 0.
+    """
+    program = programs(("helm",)) / "helm"
+    done = subprocess.run(
+        [str(program), *arguments],
+        input=sent,
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+        env={"HOME": "/nonexistent", **environment},
+    )
+    if done.returncode:
+        raise HelmRefused(done.stderr)
+    return done.stdout
+
+
+def rendered(values: Object | None = None, *options: str) -> str:
+    """Return all objects of the chart with some values, as YAML, without those of `helm test`."""
+    where = (RELEASE, str(CHART), f"--namespace={NAMESPACE}")
+    chosen = yaml.safe_dump(values or {})
+    return helm("template", *where, "--values=-", "--skip-tests", *options, sent=chosen)
+
+
+def objects(values: Object | None = None, *, tests: bool = False) -> list[Object]:
+    """Return the objects of the chart with some values; with `tests` those of `helm test` too."""
+    text = rendered(values, *(["--skip-tests=false"] if tests else []))
+    return [each for each in yaml.safe_load_all(text) if each]

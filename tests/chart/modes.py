@@ -1,0 +1,59 @@
+"""The ways to install the chart that docs/install.md tells of, as values."""
+
+from typing import Any
+
+Values = dict[str, Any]
+DIGEST = "sha256:" + "0" * 64
+
+MODES: dict[str, Values] = {
+    "default": {},
+    "namespaced": {"watchNamespaces": ["robots", "drones"], "crds": {"install": False}},
+    "available": {"operator": {"replicas": 3}},
+    "monitored": {
+        "monitoring": {
+            "podMonitor": {"enabled": True, "labels": {"release": "prometheus"}},
+            "serviceMonitor": {"enabled": True},
+            "prometheusRule": {"enabled": True},
+            "dashboards": {"enabled": True, "annotations": {"grafana_folder": "Palaestra"}},
+        }
+    },
+    "offline": {
+        "images": {
+            "registry": "registry.example.com:5000/robots",
+            **{part: {"digest": DIGEST} for part in ("operator", "trainer", "stub", "webots")},
+        },
+        "imagePullSecrets": [{"name": "registry"}],
+        "tensorboard": {"enabled": True, "existingClaim": "runs"},
+        "jupyter": {
+            "enabled": True,
+            "image": f"registry.example.com:5000/robots/notebooks@{DIGEST}",
+            "tokenSecret": {"name": "notebooks"},
+        },
+    },
+    "closed": {
+        "networkPolicy": {"egress": {"restricted": True}},
+        "operator": {
+            "priorityClassName": "system-cluster-critical",
+            "nodeSelector": {"kubernetes.io/os": "linux"},
+            "tolerations": [{"key": "dedicated", "operator": "Exists"}],
+            "affinity": {"nodeAffinity": {}},
+            "podAnnotations": {"example.com/team": "robots"},
+            "podLabels": {"team": "robots"},
+        },
+        "serviceAccount": {"create": False, "name": "existing"},
+    },
+}
+
+
+def merged(*parts: Values) -> Values:
+    """Return all values together; a later part wins."""
+    whole: Values = {}
+    for part in parts:
+        for key, value in part.items():
+            both = isinstance(value, dict) and isinstance(whole.get(key), dict)
+            whole[key] = merged(whole[key], value) if both else value
+    return whole
+
+
+MODES["everything"] = merged(*(MODES[each] for each in ("available", "monitored", "offline", "closed")))
+MODES["everything, namespaced"] = merged(MODES["everything"], MODES["namespaced"])

@@ -1,0 +1,60 @@
+"""docs/install.md can be typed as it stands, from top to bottom."""
+
+import os
+import re
+import subprocess
+
+import pytest
+
+from tests.chart.helm import NAMESPACE, ROOT
+from tests.control_plane.programs import programs
+
+PAGE = (ROOT / "docs" / "install.md").read_text()
+BLOCKS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+# Without nodes no job ends: `palaestra try` is tested with the operator, and `helm test` by `make e2e`.
+NO_NODES = 'helm() { [[ $1 == test ]] || command helm "$@"; }\n'
+AWAY = f"""
+helm uninstall palaestra --namespace {NAMESPACE} --ignore-not-found
+kubectl delete --ignore-not-found --filename manifests/install.yaml --filename manifests/crd.yaml
+kubectl delete --ignore-not-found --filename manifests/examples/platform/roles.yaml
+"""
+TYPED_S = 120
+
+
+@pytest.fixture
+def typed(cluster, kubectl, tmp_path):
+    """Type some commands in a checkout, and return what they say."""
+    for name in (NAMESPACE, "robots", "drones"):
+        kubectl("delete", "namespace", name, "--ignore-not-found", "--wait")
+    for name in ("charts", "manifests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    path = f"{programs(('helm',))}:{cluster.binaries}:{os.environ['PATH']}"
+    environment = {"KUBECONFIG": str(cluster.kubeconfig), "PATH": path, "HOME": str(tmp_path)}
+
+    def type_in(text):
+        done = subprocess.run(
+            ["bash", "-euc", NO_NODES + text],
+            cwd=tmp_path,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=TYPED_S,
+            check=False,
+        )
+        assert done.returncode == 0, f"{text}\n{done.stdout}{done.stderr}"
+        return done.stdout + done.stderr
+
+    yield type_in
+    type_in(AWAY)
+
+
+@pytest.mark.timeout(600)
+def test_the_page_can_be_typed_from_top_to_bottom(typed):
+    """Each command works after those above it, without a warning; the end is an installation without Helm."""
+    kinds = "Warning:|WARNING"
+
+    said = "".join(typed(block) for block in BLOCKS)
+
+    assert len(BLOCKS) >= 12
+    assert [line for line in said.splitlines() if re.match(kinds, line)] == []
+    assert typed(f"kubectl get deployment palaestra-operator --namespace {NAMESPACE} --output name")

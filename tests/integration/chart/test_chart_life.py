@@ -1,0 +1,161 @@
+"""A release from its installation to its end, on a real API server."""
+
+import shutil
+
+import pytest
+import yaml
+
+from palaestra.cluster import connect
+from palaestra.cluster.resources import DEFINITIONS, JOBS, TRAINING_JOBS
+from palaestra.trial import TrialFailed, attempt
+from tests.chart import installation
+from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
+from tests.chart.modes import MODES
+from tests.integration.operator.cluster import eventually, training_job
+from tests.integration.operator.operators import RunningOperator
+
+DEFINITION = "trainingjobs.palaestra.dev"
+
+
+@pytest.fixture
+def release(cluster, places, kubectl):  # noqa: ARG001 - are installed into
+    """Run Helm on the cluster; everything that it installed is gone at the end."""
+
+    def run(verb, name, *options, chart=CHART, namespace=NAMESPACE, values=None):
+        of = () if verb == "uninstall" else (str(chart), "--values=-")
+        chosen = yaml.safe_dump(values or {})
+        flags = (f"--namespace={namespace}", *options)
+        return helm(verb, name, *of, *flags, sent=chosen, KUBECONFIG=str(cluster.kubeconfig), HOME="/tmp")
+
+    yield run
+    for each in ("palaestra", "second"):
+        run("uninstall", each, "--ignore-not-found")
+        run("uninstall", each, "--ignore-not-found", namespace="robots")
+    kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
+
+
+@pytest.fixture
+def older(tmp_path):
+    """The chart as an earlier release had it: another definition, and another image."""
+    chart = tmp_path / "palaestra"
+    shutil.copytree(CHART, chart)
+    for name, change in {
+        "crd.yaml": ("shortNames:\n    - tj\n", "shortNames:\n    - old\n"),
+        "Chart.yaml": ("appVersion: ", "appVersion: 0.0.9 # was "),
+    }.items():
+        text = (chart / name).read_text()
+        assert text.count(change[0]) == 1
+        (chart / name).write_text(text.replace(*change))
+    return chart
+
+
+def short_names(api):
+    """Return the short names of TrainingJobs."""
+    return api.get(DEFINITIONS, None, DEFINITION)["spec"]["names"]["shortNames"]
+
+
+def served(api):
+    """Return once TrainingJobs can be made."""
+    eventually(lambda: api.serves("palaestra.dev/v1alpha1"))
+
+
+def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older, api):
+    """Helm never upgrades what lies in crds/, so the definition is a template."""
+    release("install", "palaestra", chart=older)
+    served(api)
+    made = api.create(TRAINING_JOBS, _in("robots", training_job("runs")))
+    assert short_names(api) == ["old"]
+
+    release("upgrade", "palaestra")
+
+    assert short_names(api) == ["tj"]
+    assert api.get(TRAINING_JOBS, "robots", "runs")["metadata"]["uid"] == made["metadata"]["uid"]
+
+
+def test_the_end_of_a_release_leaves_the_jobs(release, api):
+    """Deleting the definition would delete every TrainingJob of the cluster."""
+    release("install", "palaestra")
+    served(api)
+    api.create(TRAINING_JOBS, _in("robots", training_job("stays")))
+
+    release("uninstall", "palaestra")
+
+    assert api.get(TRAINING_JOBS, "robots", "stays")
+    release("install", "palaestra")  # and it finds its definition again
+
+
+@pytest.mark.parametrize("values", [{}, {"watchNamespaces": ["robots"]}], ids=["cluster", "namespaced"])
+def test_a_second_release_for_the_same_jobs_is_refused(release, values):
+    """Two operators would do everything twice."""
+    release("install", "palaestra", values=values)
+
+    with pytest.raises(HelmRefused, match="invalid ownership metadata"):
+        release("install", "second", values={**values, "crds": {"install": False}}, namespace="robots")
+
+
+def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
+    release, cluster, api, tmp_path
+):
+    """With the rights of such an installation, which hold for two namespaces."""
+    release("install", "palaestra", values={**MODES["namespaced"], "crds": {"install": True}})
+    served(api)
+    account = f"system:serviceaccount:{NAMESPACE}:palaestra-operator"
+    operator = RunningOperator(
+        cluster.kubeconfig_of(account, "system:serviceaccounts"),
+        tmp_path / "operator.log",
+        f"--operator-namespace={NAMESPACE}",
+        "--namespace=robots",
+        "--namespace=drones",
+    )
+    try:
+        for namespace in ("robots", "drones", "default"):
+            api.create(TRAINING_JOBS, _in(namespace, training_job("trains")))
+        for namespace in ("robots", "drones"):
+            eventually(lambda where=namespace: api.list(JOBS, where))
+
+        assert "status" not in api.get(TRAINING_JOBS, "default", "trains")
+        assert operator.said("watch broken") == []
+        assert pending(operator.ask("/metrics")) == 2
+    finally:
+        operator.kill()
+
+
+def pending(metrics):
+    """Return how many TrainingJobs an operator counts that have no pod yet."""
+    lines = [line for line in metrics.splitlines() if line.startswith("palaestra_jobs{")]
+    return sum(float(line.split()[-1]) for line in lines if 'phase="Pending"' in line)
+
+
+def _in(namespace, job):
+    return {**job, "metadata": {**job["metadata"], "namespace": namespace}}
+
+
+def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(release, cluster, kubectl, api):
+    """`helm test` where no operator runs: it ends in time, tells what to look at, and leaves nothing."""
+    release("install", "palaestra")
+    served(api)
+    rights = [each for each in objects(tests=True) if each["kind"] in {"Role", "RoleBinding"}]
+    kubectl("apply", "--server-side", "-f", "-", sent=yaml.safe_dump_all(rights))
+    account = f"system:serviceaccount:{NAMESPACE}:palaestra-test"
+    tester = connect(str(cluster.kubeconfig_of(account, "system:serviceaccounts")))
+    told = []
+
+    with pytest.raises(TrialFailed, match=r"nothing has looked at it: does the operator run"):
+        attempt(tester, _in(NAMESPACE, training_job("trial")), within_s=1.0, tell=told.append)
+
+    assert [line.rpartition(": ")[2] for line in told] == ["Pending"]
+    assert api.list(TRAINING_JOBS, NAMESPACE) == []
+
+
+def test_helm_takes_over_what_kubectl_has_installed(release, kubectl, api):
+    """Objects that kubectl made are kept, down to the definition and its jobs."""
+    kubectl("apply", "-f", str(installation.PATH))
+    served(api)
+    made = api.create(TRAINING_JOBS, _in("robots", training_job("before")))
+
+    release("install", "palaestra", "--take-ownership")
+    release("upgrade", "palaestra", "--set=operator.replicas=2", "--force-conflicts")
+
+    kept = api.get(TRAINING_JOBS, "robots", "before")
+    assert kept["metadata"]["uid"] == made["metadata"]["uid"]
+    assert "helm.sh/resource-policy" in api.get(DEFINITIONS, None, DEFINITION)["metadata"]["annotations"]

@@ -1,0 +1,54 @@
+"""A real API server takes every object of the chart and of the platform's examples, as it is."""
+
+import pytest
+
+from tests.chart.helm import ROOT, rendered
+from tests.chart.modes import MODES
+from tests.integration.operator.cluster import eventually
+
+PLATFORM = sorted((ROOT / "manifests" / "examples" / "platform").glob("*.yaml"))
+DRY = ("apply", "--server-side", "--force-conflicts", "--dry-run=server", "--validate=strict", "-f", "-")
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_an_api_server_takes_every_mode(mode, places, kubectl):  # noqa: ARG001 - are there
+    """Unknown fields are mistakes, and so is whatever it warns of: pods that are not restricted, for one."""
+    said = kubectl(*DRY, sent=rendered(MODES[mode], "--skip-tests=false"))
+
+    assert said.count("serverside-applied (server dry run)") >= 9
+    assert "Warning" not in said
+
+
+@pytest.mark.parametrize("path", PLATFORM, ids=lambda path: path.stem)
+def test_an_api_server_takes_an_example_for_the_platform(path, places, kubectl):  # noqa: ARG001 - as above
+    """They are copied, changed a little, and applied."""
+    said = kubectl(*DRY, sent=path.read_text())
+
+    assert "Warning" not in said
+
+
+@pytest.mark.parametrize("path", PLATFORM, ids=lambda path: path.stem)
+def test_an_example_says_what_each_object_is_for(path):
+    """Otherwise nobody dares to change one."""
+    for document in path.read_text().split("---\n"):
+        assert document.lstrip().startswith("# ")
+
+
+def test_authors_train_and_readers_look_on(cluster, kubectl, tmp_path):  # noqa: ARG001 - as above
+    """By the roles that every cluster has, and by the author's alone without a right to pods."""
+    (roles,) = (path for path in PLATFORM if path.stem == "roles")
+    kubectl("apply", "-f", str(roles), "-f", str(ROOT / "manifests" / "crd.yaml"))
+    for role, user in (("edit", "editor"), ("view", "viewer")):
+        kubectl("create", "rolebinding", role, f"--clusterrole={role}", f"--user={user}", "-nrobots")
+    trainer = ("--as=somebody", "--as-group=trainers")
+
+    def may(who, verb, *what):
+        return cluster.kubectl("auth", "can-i", verb, *what, "-nrobots", *who).stdout.strip() == "yes"
+
+    jobs = "trainingjobs.palaestra.dev"
+    assert eventually(lambda: may(["--as=editor"], "create", jobs))
+    assert eventually(lambda: may(["--as=viewer"], "watch", jobs))
+    assert not may(["--as=viewer"], "create", jobs)
+    assert may(trainer, "create", jobs)
+    assert not may(trainer, "create", "pods")
+    assert not may(trainer, "patch", jobs, "--subresource=status")

@@ -1,0 +1,133 @@
+"""Every alert, by itself and in a real Prometheus: it fires, and it clears.
+
+What lasts minutes is tested by promtool, whose time is not ours: how long something must be wrong before it
+is told, and that two of them, which look some minutes back, clear.
+"""
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.control_plane.programs import programs
+from tests.integration.monitoring.life import address, diverge
+from tests.local_run import LocalRun, send
+from tests.monitoring import targets
+from tests.monitoring.prometheus import PROGRAMS, scraping
+from tests.monitoring.questions import ALERTS, alerts
+from tests.soak.jobs import LITTLE_PPO, make_job
+
+CASES = Path(__file__).with_name("alerts.test.yaml")
+DEADLINE_S = 90
+# Slower than real time, and with a rollout of six checkpoints.
+SICK = {
+    "collect": {"restart": {"limit": 4, "withinSeconds": 60}},
+    "faults": "slow:latency_ms=250",
+    "algorithm": LITTLE_PPO | {"hyperparameters": {"n_steps": 64, "batch_size": 32}},
+    "steps": 100_000,
+    "evaluation": {"everySteps": 0},
+    "checkpoint": {"everySteps": 10, "keep": 2},
+}
+
+
+@pytest.fixture
+def rules(tmp_path):
+    """The alerts, each told at once."""
+    content = yaml.safe_load(ALERTS.read_text())
+    for group in content["groups"]:
+        for rule in group["rules"]:
+            rule.pop("for", None)
+    file = tmp_path / "alerts.yaml"
+    file.write_text(yaml.safe_dump(content))
+    return file
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Where Prometheus keeps its things."""
+    made = tmp_path / "prometheus"
+    made.mkdir()
+    return made
+
+
+def test_the_alerts_are_rules_that_prometheus_reads_and_fire_and_clear_in_time():
+    """Promtool has a clock of its own, so that ten minutes take none."""
+    promtool = programs(PROGRAMS) / "promtool"
+
+    for command in (["check", "rules", ALERTS], ["test", "rules", CASES]):
+        done = subprocess.run([promtool, *command], capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_not():
+    """One that nobody has seen fire is not known to."""
+    cases = [case for test in yaml.safe_load(CASES.read_text())["tests"] for case in test["alert_rule_test"]]
+    names = {rule["alert"] for rule in alerts()}
+
+    assert {case["alertname"] for case in cases if case["exp_alerts"]} == names
+    assert {case["alertname"] for case in cases if not case["exp_alerts"]} == names
+
+
+def test_what_a_sick_run_causes_is_told_and_taken_back(tmp_path, folder, rules):
+    """Slow simulators, no checkpoint, a budget that runs out, and simulators that nobody mends."""
+    job = make_job(**SICK)
+    job["spec"]["stallDeadlineSeconds"] = 30
+    with LocalRun(tmp_path, job) as run, scraping(targets.of_run(run, "lab"), folder, rules) as prometheus:
+        _fires(prometheus, "PalaestraSimulatorSlow")
+        _fires_and_clears(prometheus, "PalaestraNoCheckpoint")
+
+        for starts in (1, 2, 3):
+            _waits_for(prometheus, f'palaestra_simulator_starts_total{{simulator="collect-0"}} == {starts}')
+            send(run.until(lambda: run.pids("palaestra-stub", "collect-0.wbt"))[0], signal.SIGKILL)
+        _fires_and_clears(prometheus, "PalaestraFaultBudgetNearlySpent")
+
+        stopped = [
+            run.pid_of(program, "collect-0.wbt") for program in ("palaestra-sidecar", "palaestra-stub")
+        ]
+        for pid in stopped:  # with its sidecar, so that nobody starts it anew before it is told
+            send(pid, signal.SIGSTOP)
+        _fires(prometheus, "PalaestraTrainingStalled")
+        for pid in stopped:
+            send(pid, signal.SIGCONT)
+        _clears(prometheus, "PalaestraTrainingStalled")
+
+
+def test_operators_that_do_not_lead_or_are_gone_are_told_and_taken_back(folder, rules, place, start):
+    """The second waits for the Lease of the first, which dies as in a power failure."""
+    first = start(elect=True)
+    address(first)
+    second = start(elect=True)
+    with scraping([targets.of_operator(address(second))], folder, rules) as prometheus:
+        _fires(prometheus, "PalaestraNoLeader")
+        assert "PalaestraOperatorDown" not in _firing(prometheus)
+        first.kill()
+        _clears(prometheus, "PalaestraNoLeader")
+
+        diverge(place)
+        _fires(prometheus, "PalaestraDiverged")
+
+        second.stop()
+        _fires(prometheus, "PalaestraOperatorDown")
+
+
+def _fires_and_clears(prometheus, alert):
+    _fires(prometheus, alert)
+    _clears(prometheus, alert)
+
+
+def _fires(prometheus, alert):
+    prometheus.until(lambda: alert in _firing(prometheus), DEADLINE_S)
+
+
+def _clears(prometheus, alert):
+    prometheus.until(lambda: alert not in _firing(prometheus), DEADLINE_S)
+
+
+def _waits_for(prometheus, expr):
+    prometheus.until(lambda: prometheus.query(expr), DEADLINE_S)
+
+
+def _firing(prometheus):
+    return {series["metric"]["alertname"] for series in prometheus.query('ALERTS{alertstate="firing"}')}

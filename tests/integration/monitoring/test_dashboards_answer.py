@@ -1,0 +1,62 @@
+"""A real Prometheus scrapes a real run and a real operator: every panel and alert has something to go by."""
+
+import math
+from contextlib import suppress
+
+import pytest
+
+from tests.control_plane.programs import NoPrograms, programs
+from tests.integration.monitoring.life import address, diverge
+from tests.local_run import LocalRun
+from tests.monitoring import targets
+from tests.monitoring.prometheus import PROGRAMS, NotAnswered, scraping
+from tests.monitoring.questions import looked_at, questions
+from tests.soak.jobs import LITTLE_DQN, make_job
+
+OVER, SHOWN = "30s", "10m"  # rates are taken over; the time range at the top of a dashboard
+ANSWERED_S = 150
+# A panel about faults has nothing to show without one.
+FAULTY = {
+    "faults": "crash:step=60 lost:topic=ir1/value,every=25",
+    "algorithm": LITTLE_DQN,
+    "steps": 100_000,
+    "evaluation": {"everySteps": 100, "episodes": 1},
+    "checkpoint": {"everySteps": 50, "keep": 2},
+}
+
+
+@pytest.fixture(autouse=True)
+def _prometheus_is_there():
+    """Where the network is not, the rest of the suite still is."""
+    try:
+        programs(PROGRAMS)
+    except NoPrograms as error:
+        pytest.skip(str(error))
+
+
+def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(tmp_path, place, start):
+    """An empty panel, or an alert on something that nobody tells, is believed to say that all is well."""
+    operator = start(elect=True)
+    folder = tmp_path / "prometheus"
+    folder.mkdir()
+    asked = [*questions(OVER, SHOWN), *looked_at()]
+
+    with LocalRun(tmp_path, make_job(**FAULTY)) as run:
+        scraped = [*targets.of_run(run, place.name), targets.of_operator(address(operator))]
+        with scraping(scraped, folder) as prometheus, suppress(NotAnswered):  # told below, by its name
+            prometheus.until(lambda: prometheus.query("palaestra_operator_leader == 1"), ANSWERED_S)
+            diverge(place)
+            place.train("waiting")
+            prometheus.until(lambda: not _drop_answered(asked, prometheus), ANSWERED_S)
+
+    assert not asked, "\n".join(f"{it.dashboard}: {it.panel} {it.expr}" for it in asked)
+
+
+def _drop_answered(asked, prometheus):
+    """Return what is left of the queries once those that give a number now are taken out."""
+    asked[:] = [it for it in asked if not any(map(_is_number, prometheus.query(it.expr)))]
+    return asked
+
+
+def _is_number(series):
+    return math.isfinite(float(series["value"][1]))

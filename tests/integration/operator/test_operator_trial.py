@@ -1,0 +1,64 @@
+"""`palaestra try`: whether an installation works, found out with a job that is gone afterwards."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from palaestra.cli import main
+from palaestra.cluster.resources import TRAINING_JOBS
+from tests.integration.operator.cluster import DEADLINE_S, eventually
+from tests.integration.operator.test_operator_lifecycle import DONE
+
+JOB = """\
+apiVersion: palaestra.dev/v1alpha1
+kind: TrainingJob
+metadata: {{name: trial, namespace: {namespace}}}
+spec: {{backoffLimit: 0}}
+"""
+
+
+@pytest.fixture
+def trial(place, control_plane, tmp_path):
+    """Return the command's exit code; what is given is done meanwhile, as signals are for this thread."""
+    file = tmp_path / "job.yaml"
+    file.write_text(JOB.format(namespace=place.name))
+
+    def carry_out(meanwhile):
+        with ThreadPoolExecutor(1) as threads:
+            done = threads.submit(meanwhile)
+            code = main(["try", str(file), f"--kubeconfig={control_plane.kubeconfig}", "--within=60"])
+            done.result(DEADLINE_S)
+        return code
+
+    return carry_out
+
+
+@pytest.fixture
+def pod(place, start):
+    """Wait until the trial's pod runs, and return it with the name of the job."""
+    start()
+
+    def running():
+        [job] = eventually(lambda: place.all(TRAINING_JOBS))
+        name = job["metadata"]["name"]
+        [found] = place.pods(name)
+        place.run(found)
+        place.until("Running", name)
+        return found
+
+    return running
+
+
+def test_a_trial_that_succeeds_says_so_and_leaves_nothing(place, trial, pod, capsys):
+    """Exit code 0 is what `helm test` goes by."""
+    assert trial(lambda: place.end(pod(), word=DONE)) == 0
+    phases = [line.rpartition(": ")[2] for line in capsys.readouterr().out.splitlines()]
+    assert phases[-1] == "Succeeded"
+    assert place.all(TRAINING_JOBS) == []
+
+
+def test_a_trial_that_fails_says_why_and_leaves_nothing(place, trial, pod, capsys):
+    """The reason outlives the job, as the last line of the log."""
+    assert trial(lambda: place.end(pod(), 2)) == 1
+    assert "Failed; ConfigurationRefused: " in capsys.readouterr().err
+    assert place.all(TRAINING_JOBS) == []

@@ -1,0 +1,135 @@
+"""A Prometheus of our own, which scrapes what it is told to and answers queries.
+
+It is Debian's, unpacked by tests/cluster/programs.sh. The labels of a target are given here as the chart's
+PodMonitor and ServiceMonitor would give them.
+"""
+
+import json
+import threading
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tests.control_plane.plane import ADDRESS, free_ports, started
+from tests.control_plane.programs import programs
+
+PROGRAMS = ("prometheus", "promtool")
+SCRAPE_S = 1
+START_DEADLINE_S = 30
+QUERY_DEADLINE_S = 10
+LOOK_EVERY_S = 0.1  # nothing in its API can be waited for
+
+
+class NotAnswered(Exception):
+    """Prometheus did not come up, refused a query, or what was waited for did not come."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What is scraped: host and port, and its labels."""
+
+    address: str
+    labels: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Prometheus:
+    """A running one."""
+
+    address: str
+
+    def query(self, expr: str) -> list[dict[str, Any]]:
+        """Return the series that an expression has now.
+
+        Raises:
+            NotAnswered: the expression is wrong; the message is Prometheus' own.
+        """
+        return self._ask("query", query=expr)
+
+    def over(self, expr: str, since: float, until: float, step_s: float) -> list[dict[str, Any]]:
+        """Return the series that an expression had between two moments (Unix time), with all values."""
+        return self._ask("query_range", query=expr, start=since, end=until, step=step_s)
+
+    def until(self, claim: Callable[[], Any], deadline_s: float) -> Any:
+        """Return the first true value of `claim`.
+
+        Raises:
+            NotAnswered: there was none within `deadline_s`.
+        """
+        ends = time.monotonic() + deadline_s
+        while not (value := claim()):
+            if time.monotonic() > ends:
+                raise NotAnswered(f"not within {deadline_s:g} s; targets up: {self.query('up')}")
+            threading.Event().wait(LOOK_EVERY_S)
+        return value
+
+    def _ask(self, what: str, **parameters: Any) -> list[dict[str, Any]]:
+        sent = urllib.parse.urlencode(parameters).encode()
+        try:
+            with urllib.request.urlopen(
+                f"http://{self.address}/api/v1/{what}", sent, timeout=QUERY_DEADLINE_S
+            ) as answer:
+                found: list[dict[str, Any]] = json.load(answer)["data"]["result"]
+                return found
+        except urllib.error.HTTPError as error:
+            with error:
+                raise NotAnswered(f"{parameters['query']}: {error.read().decode()}") from error
+
+
+@contextmanager
+def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None) -> Iterator[Prometheus]:
+    """Run a Prometheus with its files in `folder`, which exists and is empty, until the block ends.
+
+    Args:
+        targets: asked every second.
+        folder: for its configuration, data and log.
+        rules: a file of alerting rules, looked at every second.
+
+    Raises:
+        NoPrograms: Prometheus is not there.
+        NotAnswered: it did not come up.
+    """
+    binaries = programs(PROGRAMS)
+    (port,) = free_ports(1)
+    prometheus = Prometheus(f"{ADDRESS}:{port}")
+    with started(folder, _command(binaries, folder, targets, rules, prometheus.address)) as process:
+        ends = time.monotonic() + START_DEADLINE_S
+        while not _is_ready(prometheus.address):
+            if process.poll() is not None or time.monotonic() > ends:
+                raise NotAnswered(f"prometheus did not come up: {(folder / 'prometheus.log').read_text()}")
+            threading.Event().wait(LOOK_EVERY_S)
+        yield prometheus
+
+
+def _command(
+    binaries: Path, folder: Path, targets: Sequence[Target], rules: Path | None, address: str
+) -> list[str]:
+    scraped = [{"targets": [target.address], "labels": dict(target.labels)} for target in targets]
+    configuration = {
+        "global": {"scrape_interval": f"{SCRAPE_S}s", "evaluation_interval": f"{SCRAPE_S}s"},
+        "scrape_configs": [{"job_name": "palaestra", "static_configs": scraped}],
+        "rule_files": [str(rules)] if rules else [],
+    }
+    file = folder / "prometheus.yaml"
+    file.write_text(yaml.safe_dump(configuration))
+    return [
+        str(binaries / "prometheus"),
+        f"--config.file={file}",
+        f"--storage.tsdb.path={folder / 'data'}",
+        f"--web.listen-address={address}",
+        "--log.level=warn",
+    ]
+
+
+def _is_ready(address: str) -> bool:
+    with suppress(OSError), urllib.request.urlopen(f"http://{address}/-/ready", timeout=5):
+        return True
+    return False

@@ -1,0 +1,43 @@
+"""The chart's objects in each mode, rendered by Helm; skips where Helm is not built."""
+
+import os
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import pytest
+
+from tests.chart.helm import objects
+from tests.chart.modes import MODES
+from tests.control_plane.programs import REQUIRED, NoPrograms, programs
+
+Object = dict[str, Any]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def helm_is_built() -> None:
+    """Nothing here works without it."""
+    if os.environ.get(REQUIRED) == "1":
+        programs(("helm",))
+        return
+    try:
+        programs(("helm",))
+    except NoPrograms as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def made() -> Callable[[str], list[Object]]:
+    """All objects of a mode, those of `helm test` too."""
+    return cache(lambda mode: objects(MODES[mode], tests=True))
+
+
+@pytest.fixture
+def one(made) -> Callable[..., Object]:
+    """The only object of a kind and a name in a mode."""
+
+    def find(mode: str, kind: str, name: str = "palaestra-operator") -> Object:
+        [found] = [each for each in made(mode) if (each["kind"], each["metadata"]["name"]) == (kind, name)]
+        return found
+
+    return find

@@ -1,0 +1,319 @@
+"""What the chart installs, in every mode."""
+
+import argparse
+import json
+import re
+from importlib.metadata import version
+
+import pytest
+import yaml
+
+import palaestra.api
+from palaestra.api.crd import crd
+from palaestra.cli import operator
+from palaestra.operator.options import NAME
+from palaestra.plan import Images
+from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm
+from tests.chart.installation import SECRETS_ROLE
+from tests.chart.modes import DIGEST, MODES
+
+CLUSTER_WIDE = {"ClusterRole", "ClusterRoleBinding", "CustomResourceDefinition"}
+REGISTRY = "registry.example.com:5000/robots/"
+every_mode = pytest.mark.parametrize("mode", MODES)
+
+
+def pods(objects):
+    """Return the spec of every pod, by the name of what makes it."""
+    return {
+        each["metadata"]["name"]: each["spec"]["template"]["spec"]
+        if each["kind"] == "Deployment"
+        else each["spec"]
+        for each in objects
+        if each["kind"] in {"Deployment", "Pod"}
+    }
+
+
+def options(deployment):
+    """Return the operator's options, as its command line understands them."""
+    [container] = deployment["spec"]["template"]["spec"]["containers"]
+    parser = argparse.ArgumentParser()
+    operator.add(parser.add_subparsers())
+    return parser.parse_args(container["command"][1:])
+
+
+def rules(roles):
+    """Return (group, resource, verb) of everything that some roles allow."""
+    return {
+        (group, resource, verb)
+        for role in roles
+        for rule in role["rules"]
+        for group in rule["apiGroups"]
+        for resource in rule["resources"]
+        for verb in rule["verbs"]
+    }
+
+
+def roles(objects):
+    """Return the roles by name and namespace."""
+    found = [each for each in objects if each["kind"] in {"Role", "ClusterRole"}]
+    return {(each["metadata"]["name"], each["metadata"].get("namespace")): each for each in found}
+
+
+def bound(objects):
+    """Return the roles that a binding comes with."""
+    bindings = [each for each in objects if each["kind"].endswith("Binding")]
+    names = {(each["roleRef"]["name"], each["metadata"].get("namespace")) for each in bindings}
+    return [role for key, role in roles(objects).items() if key in names]
+
+
+@every_mode
+def test_every_object_has_a_place_and_a_name_of_its_own(made, mode):
+    """`kubectl apply` would let the second take the place of the first."""
+    keys = [
+        (each["kind"], each["metadata"].get("namespace"), each["metadata"]["name"]) for each in made(mode)
+    ]
+
+    assert len(keys) == len(set(keys))
+    assert [key for key in keys if (key[1] is None) != (key[0] in CLUSTER_WIDE)] == []
+    assert [key for key in keys if len(key[2]) > 63] == []
+
+
+@every_mode
+def test_every_pod_meets_the_restricted_standard(made, mode):
+    """A namespace that enforces it takes them all."""
+    for pod in pods(made(mode)).values():
+        assert pod["securityContext"]["runAsNonRoot"] is True
+        assert pod["securityContext"]["seccompProfile"] == {"type": "RuntimeDefault"}
+        for container in pod["containers"]:
+            security = container["securityContext"]
+            assert security["readOnlyRootFilesystem"] is True
+            assert security["allowPrivilegeEscalation"] is False
+            assert security["capabilities"] == {"drop": ["ALL"]}
+            assert {"requests", "limits"} <= container["resources"].keys()
+
+
+@every_mode
+def test_only_the_operator_and_the_trial_hold_a_token(made, mode):
+    """Nobody else asks the API server."""
+    trusted = {
+        name for name, pod in pods(made(mode)).items() if pod.get("automountServiceAccountToken", True)
+    }
+
+    assert trusted == {NAME, "palaestra-test"}
+
+
+@every_mode
+def test_no_right_is_a_wildcard_and_none_that_is_bound_reads_secrets(made, mode):
+    """What is used is known, verb by verb; Secrets are for a person to open."""
+    assert not [right for right in rules(roles(made(mode)).values()) if "*" in "".join(right)]
+    assert bound(made(mode))
+    assert not [right for right in rules(bound(made(mode))) if "secrets" in right]
+
+
+def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
+    """Who may not make a ClusterRole can install it, but for the CustomResourceDefinition."""
+    assert not [each for each in made("namespaced") if each["kind"] in CLUSTER_WIDE]
+    assert {key for key in roles(made("namespaced")) if key[1] != NAMESPACE} == {
+        (name, namespace)
+        for name in ("palaestra-jobs", SECRETS_ROLE, "palaestra-test")
+        for namespace in ("robots", "drones")
+    } - {("palaestra-test", "drones")}
+
+
+def test_both_modes_hold_the_same_rights(made):
+    """The operator does the same in each."""
+    assert rules(bound(made("namespaced"))) == rules(bound(made("default")))
+
+
+@every_mode
+def test_the_operator_understands_its_options(one, mode):
+    """A chart of one release and an operator of another would not."""
+    chosen = options(one(mode, "Deployment"))
+
+    assert chosen.monitoring_namespace == "monitoring"
+    assert chosen.namespaces == MODES[mode].get("watchNamespaces", [])
+    assert chosen.leader_elect is True
+
+
+def test_the_operator_s_defaults_are_those_of_its_release(one):
+    """Naming them again would hide what `palaestra operator --help` says."""
+    chosen, release = options(one("default", "Deployment")), Images.of_release(version("palaestra"))
+
+    assert (chosen.trainer_image, chosen.stub_image, chosen.webots_image) == (
+        release.trainer,
+        release.stub,
+        release.webots,
+    )
+    assert (chosen.workers, chosen.resync) == (4, 600)
+
+
+def test_every_image_comes_from_the_registry_by_its_digest(made, one):
+    """Off-line, nothing else can be pulled: not by a test, and not by an option."""
+    images = {container["image"] for pod in pods(made("offline")).values() for container in pod["containers"]}
+    chosen = options(one("offline", "Deployment"))
+    images |= {chosen.trainer_image, chosen.stub_image, chosen.webots_image}
+
+    assert {image for image in images if not (image.startswith(REGISTRY) and image.endswith(DIGEST))} == set()
+    assert len(images) == 5
+
+
+def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):
+    """Also the job of `helm test`, whose pods the operator makes."""
+    job = yaml.safe_load(one("offline", "ConfigMap", "palaestra-test")["data"]["job.yaml"])
+
+    assert {len(pod["imagePullSecrets"]) for pod in pods(made("offline")).values()} == {1}
+    assert job["spec"]["imagePullSecrets"] == [{"name": "registry"}]
+
+
+def test_an_image_is_never_the_latest(made):
+    """An upgrade is somebody's decision."""
+    tags = {
+        container["image"].partition(":")[2]
+        for pod in pods(made("default")).values()
+        for container in pod["containers"]
+    }
+
+    assert tags == {version("palaestra")}
+
+
+@every_mode
+def test_the_trial_is_a_job_that_the_api_takes(one, mode):
+    """It would be refused in the cluster of whoever runs `helm test`."""
+    namespace = MODES[mode].get("watchNamespaces", [NAMESPACE])[0]
+
+    text = one(mode, "ConfigMap", "palaestra-test")["data"]["job.yaml"]
+
+    job = palaestra.api.load(text, "job.yaml")
+    assert job.metadata.namespace == namespace
+    assert job.spec.ttl_seconds_after_finished is not None
+    assert job.spec.active_deadline_seconds == 900
+
+
+def test_the_definition_is_that_of_the_models_and_is_kept(one):
+    """Helm upgrades what is a template, and leaves it at the end."""
+    definition = one("default", "CustomResourceDefinition", "trainingjobs.palaestra.dev")
+
+    annotations = definition["metadata"].pop("annotations")
+    assert annotations == {"helm.sh/resource-policy": "keep"}
+    assert definition == crd()
+
+
+def test_more_than_one_operator_is_spread_and_survives_a_drain(made, one):
+    """With one, a budget would block every drain."""
+    spec = one("available", "Deployment")["spec"]
+
+    [spread] = spec["template"]["spec"]["topologySpreadConstraints"]
+    assert spread["labelSelector"] == spec["selector"]
+    assert spread["topologyKey"] == "kubernetes.io/hostname"
+    assert one("available", "PodDisruptionBudget")["spec"] == {
+        "minAvailable": 1,
+        "selector": spec["selector"],
+    }
+    assert "PodDisruptionBudget" not in {each["kind"] for each in made("default")}
+
+
+@every_mode
+def test_selectors_find_the_pods_that_they_are_for(made, mode):
+    """A Service without pods is told by nobody."""
+    labels = {
+        each["metadata"]["name"]: each["spec"]["template"]["metadata"]["labels"]
+        for each in made(mode)
+        if each["kind"] == "Deployment"
+    }
+
+    for each in made(mode):
+        if each["kind"] in {"Service", "NetworkPolicy", "PodDisruptionBudget"}:
+            spec = each["spec"]
+            selector = spec.get("podSelector") or spec["selector"]
+            selector = selector.get("matchLabels", selector)
+            assert selector.items() <= labels[each["metadata"]["name"]].items()
+
+
+def test_the_operator_is_reached_from_the_monitoring_namespace_only(one):
+    """And reaches, where it is closed, the API server and trainers only."""
+    open_, closed = one("default", "NetworkPolicy")["spec"], one("closed", "NetworkPolicy")["spec"]
+
+    [source] = open_["ingress"][0]["from"]
+    assert source == {"namespaceSelector": {"matchLabels": {"kubernetes.io/metadata.name": "monitoring"}}}
+    assert "egress" not in open_
+    assert closed["ingress"] == open_["ingress"]
+    assert [[port["port"] for port in rule["ports"]] for rule in closed["egress"]] == [[443, 6443], [9090]]
+
+
+def test_what_has_no_login_is_reached_by_nobody(one):
+    """`kubectl port-forward` comes from the node, which no policy stops."""
+    for name in ("palaestra-tensorboard", "palaestra-jupyter"):
+        policy = one("offline", "NetworkPolicy", name)["spec"]
+        assert "Ingress" in policy["policyTypes"]
+        assert "ingress" not in policy
+
+
+def test_tensorboard_changes_no_run(one):
+    """It looks at volumes that trainings write to."""
+    pod = one("offline", "Deployment", "palaestra-tensorboard")["spec"]["template"]["spec"]
+    mounts = {mount["name"]: mount for mount in pod["containers"][0]["volumeMounts"]}
+
+    assert mounts["runs"]["readOnly"] is True
+    assert pod["volumes"][0]["persistentVolumeClaim"] == {"claimName": "runs", "readOnly": True}
+
+
+def test_the_token_of_the_notebooks_is_in_no_object(one):
+    """It stays in its Secret."""
+    pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
+
+    [token] = [each for each in pod["containers"][0]["env"] if each["name"] == "JUPYTER_TOKEN"]
+    assert token["valueFrom"] == {"secretKeyRef": {"name": "notebooks", "key": "token"}}
+
+
+def test_the_alerts_are_those_of_the_file(one):
+    """The file is what promtool checks."""
+    rules_of_file = yaml.safe_load((CHART / "alerts.yaml").read_text())
+
+    assert one("monitored", "PrometheusRule", "palaestra")["spec"] == rules_of_file
+
+
+def test_every_dashboard_is_mounted_as_it_is(made):
+    """Byte for byte, with the label that Grafana's sidecar looks for."""
+    found = {
+        name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))
+        for each in made("monitored")
+        if each["kind"] == "ConfigMap" and each["metadata"]["name"] != "palaestra-test"
+        for name, text in each["data"].items()
+    }
+
+    assert found == {
+        path.name: (json.loads(path.read_text()), "1") for path in (CHART / "dashboards").glob("*.json")
+    }
+
+
+def test_training_pods_are_scraped_on_every_port_that_has_metrics(one):
+    """The names of the ports are the plan's."""
+    [endpoint] = one("monitored", "PodMonitor", "palaestra-training")["spec"]["podMetricsEndpoints"]
+    [keep] = [each for each in endpoint["relabelings"] if each.get("action") == "keep"]
+
+    assert re.fullmatch(keep["regex"], "metrics")
+    assert re.fullmatch(keep["regex"], "sim-31")
+    assert not re.fullmatch(keep["regex"], "ros")
+
+
+def test_the_chart_is_of_the_same_release(made):  # noqa: ARG001 - skips without Helm
+    """One number, in four places."""
+    chart = yaml.safe_load((CHART / "Chart.yaml").read_text())
+
+    assert {chart["version"], chart["appVersion"]} == {version("palaestra")}
+
+
+@every_mode
+def test_the_notes_tell_what_to_type_next(mode):
+    """They are all that Helm shows."""
+    where = ("palaestra", str(CHART), f"--namespace={NAMESPACE}")
+    said = helm("install", *where, "--dry-run=client", "--values=-", sent=yaml.safe_dump(MODES[mode]))
+
+    assert f"helm test palaestra --namespace {NAMESPACE} --timeout 1080s" in said
+    assert ("kubectl apply --server-side -f manifests/crd.yaml" in said) == ("namespaced" in mode)
+
+
+def test_an_old_cluster_is_refused():
+    """Before 1.33 sidecars are no part of Kubernetes that can be relied on."""
+    with pytest.raises(HelmRefused, match=r"kubeVersion: >=1\.33\.0-0"):
+        helm("template", "palaestra", str(CHART), "--kube-version=1.32.0")

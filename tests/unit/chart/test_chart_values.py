@@ -1,0 +1,117 @@
+"""What may be chosen: every value has a sentence and a rule, and a wrong one is refused with its place."""
+
+import json
+from typing import Any
+
+import pytest
+import yaml
+
+from tests.chart import readme
+from tests.chart.helm import CHART, HelmRefused, helm, objects
+from tests.chart.modes import MODES
+
+SCHEMA = json.loads((CHART / "values.schema.json").read_text())
+VALUES = list(readme.values(readme.VALUES.read_text()))
+WRONG = [  # the value that is set, to what, and where below it the mistake is
+    ("operator.replicas", 0, ""),
+    ("operator.replicas", 1.5, ""),
+    ("operator.replicas", "2", ""),
+    ("operator.workers", 0, ""),
+    ("operator.workers", True, ""),
+    ("operator.resyncSeconds", "10m", ""),
+    ("operator.resources", {"limits": {"memory": "much"}}, "/limits/memory"),
+    ("operator.tolerations", {"key": "dedicated"}, ""),
+    ("watchNamespaces", "robots", ""),
+    ("watchNamespaces", ["robots", "robots"], ""),
+    ("watchNamespaces", ["Robots"], "/0"),
+    ("watchNamespaces", ["a,b"], "/0"),
+    ("images.pullPolicy", "Sometimes", ""),
+    ("images.registry", "https://registry.example.com", ""),
+    ("images.operator.tag", "latest", ""),
+    ("images.operator.tag", "a b", ""),
+    ("images.trainer.digest", "sha256:abc", ""),
+    ("imagePullSecrets", ["registry"], "/0"),
+    ("imagePullSecrets", [{"secret": "registry"}], "/0"),
+    ("crds.install", "yes", ""),
+    ("networkPolicy.egress.apiServerPorts", [], ""),
+    ("networkPolicy.egress.apiServerPorts", [70000], "/0"),
+    ("monitoring.podMonitor.interval", 15, ""),
+    ("monitoring.podMonitor.interval", "often", ""),
+    ("monitoring.namespace", "", ""),
+    ("monitoring.dashboards.labels", {"grafana_dashboard": 1}, "/grafana_dashboard"),
+    ("test.deadlineSeconds", -1, ""),
+    ("serviceAccount.name", "", ""),
+]
+
+
+def chosen(path: str, value: Any) -> dict[str, Any]:
+    """Return values with one of them set."""
+    for step in reversed(path.split(".")):
+        value = {step: value}
+    return value
+
+
+def refusal(values: dict[str, Any]) -> str:
+    """Return what Helm says against some values."""
+    with pytest.raises(HelmRefused) as refused:
+        objects(values)
+    return str(refused.value)
+
+
+@pytest.mark.parametrize(("path", "value", "below"), WRONG, ids=str)
+def test_a_wrong_value_is_refused_with_its_place(path, value, below):
+    """Before anything is sent to the cluster."""
+    assert f"at '/{path.replace('.', '/')}{below}'" in refusal(chosen(path, value))
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"replicas": 2}, "additional properties 'replicas' not allowed"),
+        ({"operator": {"replica": 2}}, "at '/operator': additional properties 'replica' not allowed"),
+        (
+            {"operator": {"podLabels": {"app.kubernetes.io/name": "other"}}},
+            "invalid propertyName 'app.kubernetes.io/name'",
+        ),
+        ({"operator": {"replicas": 2, "leaderElection": False}}, "at '/operator/leaderElection'"),
+        ({"tensorboard": {"enabled": True}}, "at '/tensorboard/existingClaim'"),
+        ({"jupyter": {"enabled": True, "image": "i"}}, "at '/jupyter/tokenSecret/name'"),
+        ({"jupyter": {"enabled": True, "tokenSecret": {"name": "t"}}}, "at '/jupyter/image'"),
+    ],
+)
+def test_values_that_do_not_go_together_are_refused(values, told):
+    """What is misspelt, and what needs another value, is told as well."""
+    assert told in refusal(values)
+
+
+def properties(schema: dict[str, Any], path: tuple[str, ...] = ()) -> set[str]:
+    """Return the paths of all values that the schema knows."""
+    schema = {**schema, **_definition(schema)}
+    inner = schema.get("properties")
+    if not inner or path[-1:] == ("resources",):
+        return {".".join(path)}
+    return {each for name, below in inner.items() for each in properties(below, (*path, name))}
+
+
+def _definition(schema: dict[str, Any]) -> dict[str, Any]:
+    name = schema.get("$ref", "").removeprefix("#/definitions/")
+    return SCHEMA["definitions"][name] if name else {}
+
+
+def test_the_schema_knows_every_value_and_no_other():
+    """A value that only one of them has is a mistake in either."""
+    assert properties(SCHEMA) == {value.path for value in VALUES} | {"global"}
+
+
+@pytest.mark.parametrize("value", VALUES, ids=lambda value: value.path)
+def test_every_value_has_a_sentence(value):
+    """Nobody should have to read the templates."""
+    assert value.sentence.endswith(".")
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_helm_finds_nothing_wrong(mode):
+    """Its linter, with warnings as errors."""
+    values = yaml.safe_dump(MODES[mode])
+
+    assert "0 chart(s) failed" in helm("lint", str(CHART), "--strict", "--values=-", sent=values)

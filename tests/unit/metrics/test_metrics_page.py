@@ -1,0 +1,124 @@
+"""What the programs declare: names by Prometheus' conventions, and the page that is made of them.
+
+Source of the rules: https://prometheus.io/docs/practices/naming/ and what `promtool check metrics` says.
+"""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from palaestra_sim.protocol.metrics import PREFIX, Kind
+from tools.metrics import page
+
+PAGE = Path(__file__).parents[3] / page.PAGE
+FAMILIES = [family for program in page.PROGRAMS for family in program.families]
+HOMES = {
+    "operator": ("palaestra_operator_", "palaestra_jobs", "palaestra_job_", "palaestra_replica_"),
+    "trainer": ("palaestra_trainer_", "palaestra_simulator_"),
+    "sidecar": ("palaestra_sidecar_", "palaestra_simulator_"),
+}
+# What is a unit here, or says that there is none; what ends otherwise counts things that it names.
+ENDS = ("_seconds", "_bytes", "_ratio", "_steps", "_info", "_per_second", "_total")
+UNITLESS = {
+    "palaestra_jobs",
+    "palaestra_operator_leader",
+    "palaestra_operator_queue_depth",
+    "palaestra_simulator_state",
+    "palaestra_simulator_up",
+    "palaestra_trainer_evaluation_return_mean",
+    "palaestra_trainer_episode_return",
+    "palaestra_trainer_episode_return_mean",
+    "palaestra_trainer_episode_return_quantile",
+    "palaestra_trainer_exploration",
+    "palaestra_trainer_learning_rate",
+    "palaestra_trainer_loss",
+    "palaestra_trainer_simulators",
+}
+OTHER_UNITS = re.compile(r"_(ms|milliseconds|minutes|hours|kb|mb|gb|kilobytes|megabytes|percent)(_|$)")
+# What Prometheus or its operator adds to a target: a program's own label would be renamed.
+OF_TARGETS = {
+    "job", "instance", "namespace", "pod", "container", "endpoint", "service", "training_job", "replica",
+}  # fmt: skip
+
+each_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+
+
+def test_a_name_is_declared_once():
+    """Else the same name would mean two things, by whom it was scraped."""
+    names = [family.name for family in FAMILIES]
+
+    assert sorted(names) == sorted(set(names))
+
+
+@pytest.mark.parametrize("program", page.PROGRAMS, ids=lambda program: program.name)
+def test_a_name_tells_its_home(program):
+    """And begins with the project's."""
+    assert all(family.name.startswith(PREFIX) for family in program.families)
+    assert [it.name for it in program.families if not it.name.startswith(HOMES[program.name])] == []
+
+
+@each_family
+def test_a_counter_and_nothing_else_ends_in_total(family):
+    """A reader knows by the name whether to take a rate."""
+    assert family.name.endswith("_total") is (family.kind is Kind.COUNTER)
+
+
+@each_family
+def test_a_name_has_a_base_unit_or_none(family):
+    """Seconds, bytes and ratios: no query has to convert anything."""
+    assert re.fullmatch(r"[a-z][a-z0-9_]*[a-z0-9]", family.name)
+    assert not OTHER_UNITS.search(family.name)
+    assert family.name.endswith(ENDS) is not (family.name in UNITLESS)
+
+
+@each_family
+def test_a_name_ends_in_nothing_that_prometheus_adds(family):
+    """`_sum`, `_count` and `_bucket` are parts of a histogram, and a type is no part of a name."""
+    assert not re.search(r"_(sum|count|bucket|created|counter|gauge|histogram)(_|$)", family.name)
+
+
+@each_family
+def test_a_help_text_is_a_line_that_tells_something(family):
+    """It stands beside the metric in Grafana's explorer."""
+    assert re.fullmatch(r"[A-Z1].{14,118}\.", family.meaning)
+
+
+@each_family
+def test_labels_are_bounded_and_not_those_of_a_target(family):
+    """Each has a list of values, or something that there are few of."""
+    for label in family.labels:
+        assert re.fullmatch(r"[a-z][a-z_]*", label.name)
+        assert label.name not in OF_TARGETS | {"le", "quantile"}  # two that are Prometheus' own
+        assert label.values or label.bound in page.SIZES
+
+
+@each_family
+def test_a_histogram_has_ascending_buckets_and_nothing_else_has_any(family):
+    """Few enough that each of thousands of trainers may have them."""
+    buckets = family.buckets
+
+    assert bool(buckets) is (family.kind is Kind.HISTOGRAM)
+    assert list(buckets) == sorted(set(buckets))
+    assert len(buckets) <= 30
+
+
+def test_the_page_has_every_family_and_no_other():
+    """It is made from the same tables; here it is read as a person does."""
+    named = re.findall(r"^\| `(palaestra_\w+)` \|", PAGE.read_text(), re.MULTILINE)
+
+    assert named == [family.name for family in FAMILIES]
+
+
+def test_the_queries_of_the_page_name_metrics_that_there_are():
+    """A name that was changed is found here."""
+    text = PAGE.read_text()
+    known = {family.name for family in FAMILIES}
+
+    words = set(re.findall(r"palaestra_\w+", text))
+    assert {re.sub(r"_(bucket|sum|count)$", "", word) for word in words} == known
+
+
+def test_the_series_of_a_large_cluster_are_few_enough_for_one_prometheus():
+    """A thousand jobs at once; a server takes some millions of series."""
+    assert sum(program.series * program.count for program in page.PROGRAMS) < 600_000

@@ -1,0 +1,119 @@
+"""What all dashboards share: their variables, the links between them, the grid and the panels' numbers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from grafana_foundation_sdk.builders.dashboard import (
+    Dashboard,
+    DashboardLink,
+    DatasourceVariable,
+    QueryVariable,
+    Row,
+)
+from grafana_foundation_sdk.models.common import TimeZoneBrowser
+from grafana_foundation_sdk.models.dashboard import (
+    Dashboard as DashboardModel,
+)
+from grafana_foundation_sdk.models.dashboard import (
+    DashboardCursorSync,
+    DashboardLinkType,
+    VariableOption,
+    VariableRefresh,
+    VariableSort,
+)
+
+from tools.dashboards.panels import SOURCE, Panel
+
+TAG = "palaestra"
+EVERYTHING = ".+"  # what "All" stands for in a matcher: short, and right for namespaces that come later
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variable:
+    """A choice at the top of a dashboard: the values that a label of a metric has."""
+
+    name: str
+    metric: str
+    label: str
+    says: str
+
+    def build(self) -> QueryVariable:
+        """Return it as Grafana has it: several may be chosen, and all are at first."""
+        return (
+            QueryVariable(self.name)
+            .label(self.name.capitalize())
+            .description(self.says)
+            .datasource(SOURCE)
+            .query(f"label_values({self.metric}, {self.label})")
+            .refresh(VariableRefresh.ON_TIME_RANGE_CHANGED)
+            .sort(VariableSort.ALPHABETICAL_ASC)
+            .current(VariableOption(selected=True, text="All", value="$__all"))
+            .multi(multi=True)
+            .include_all(include_all=True)
+            .all_value(EVERYTHING)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A row of panels under one heading."""
+
+    title: str
+    panels: Sequence[Panel]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Board:
+    """One dashboard.
+
+    Attributes:
+        name: its file, its title, and its address in Grafana: /d/palaestra-<name>.
+        says: what it answers, and for whom.
+        since: the time that it shows at first, as Grafana has it: now-1h.
+    """
+
+    name: str
+    says: str
+    since: str
+    variables: Sequence[Variable]
+    sections: tuple[Section, ...]
+
+    def build(self) -> DashboardModel:
+        """Return it as Grafana's model."""
+        made = (
+            Dashboard(f"Palaestra / {self.name.capitalize()}")
+            .uid(f"palaestra-{self.name}")
+            .description(self.says)
+            .tags([TAG])
+            .time(self.since, "now")
+            .timezone(TimeZoneBrowser)
+            .refresh("30s")
+            .tooltip(DashboardCursorSync.CROSSHAIR)
+            .link(_others())
+            .with_variable(_datasource())
+        )
+        for variable in self.variables:
+            made.with_variable(variable.build())
+        for section in self.sections:
+            made.with_row(Row(section.title))
+            for panel in section.panels:
+                made.with_panel(panel.build())
+        model = made.build()
+        for number, placed in enumerate(model.panels or (), 1):
+            placed.id_val = number
+        return model
+
+
+def _datasource() -> DatasourceVariable:
+    return DatasourceVariable("datasource").label("Prometheus").type("prometheus")
+
+
+def _others() -> DashboardLink:
+    return (
+        DashboardLink("Palaestra")
+        .type(DashboardLinkType.DASHBOARDS)
+        .tags([TAG])
+        .as_dropdown(as_dropdown=True)
+        .include_vars(include_vars=True)
+        .keep_time(keep_time=True)
+    )

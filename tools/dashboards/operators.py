@@ -1,0 +1,215 @@
+"""Operator: does it keep up, is it refused anything, who leads."""
+
+from grafana_foundation_sdk.models import units
+
+from tools.dashboards.board import Board, Section, Variable
+from tools.dashboards.metrics import quantile, rate, selected, total
+from tools.dashboards.panels import Look, Panel, Query
+
+_IS_OPERATOR = "palaestra_operator_build_info"
+
+
+def board() -> Board:
+    """Return the dashboard."""
+    return Board(
+        name="operator",
+        says="Whether the operator keeps up, what the API server answers, and who leads.",
+        since="now-6h",
+        variables=(
+            Variable(name="operator", metric=_IS_OPERATOR, label="namespace", says="Where operators run"),
+        ),
+        sections=(
+            Section("Is somebody there?", (_leader(), _releases(), _uptime())),
+            Section("Does it keep up?", (_depth(), _waits(), _looks(), _seconds(), _failed())),
+            Section("What does it ask of the API server?", (_answers(), _refused(), _requests(), _latency())),
+            Section("What does it need?", (_memory(), _cores())),
+        ),
+    )
+
+
+def _of(metric: str, *matchers: str) -> str:
+    """Return a metric of the chosen operators; `namespace` is that of jobs on the other dashboards."""
+    return selected(metric, 'namespace=~"$operator"', *matchers)
+
+
+def _of_process(expr: str) -> str:
+    """Return what every process tells, of operators only."""
+    return f"{expr} and on (namespace, pod) {_of(_IS_OPERATOR)}"
+
+
+def _leader() -> Panel:
+    return Panel(
+        question="Who leads?",
+        says=(
+            "1 for the pod that leads; the others wait. Nobody for minutes is an alert: read the operators' "
+            "logs, and look at the Lease palaestra-operator."
+        ),
+        unit=units.Short,
+        least=0,
+        most=1,
+        queries=(Query(_of("palaestra_operator_leader"), "{{pod}}"),),
+    )
+
+
+def _releases() -> Panel:
+    return Panel(
+        question="Which releases run?",
+        says="Pods by release. Two for longer than an upgrade: it is stuck; describe the Deployment.",
+        unit=units.Short,
+        look=Look.FIGURES,
+        queries=(Query(total("version", _of(_IS_OPERATOR)), "{{version}}"),),
+    )
+
+
+def _uptime() -> Panel:
+    return Panel(
+        question="For how long have they run?",
+        says="Back to zero again and again: it crashes; read `kubectl logs --previous` of the pod.",
+        unit=units.Seconds,
+        least=0,
+        queries=(Query(f"time() - ({_of_process(_of('process_start_time_seconds'))})", "{{pod}}"),),
+    )
+
+
+def _depth() -> Panel:
+    return Panel(
+        question="How many TrainingJobs wait for a worker?",
+        says="It returns to zero. Growing: the API server is slow, or raise the operator's workers.",
+        unit=units.Short,
+        least=0,
+        queries=(Query(_of("palaestra_operator_queue_depth"), "{{pod}}"),),
+    )
+
+
+def _waits() -> Panel:
+    waits = _of("palaestra_operator_queue_wait_seconds_bucket")
+    return Panel(
+        question="How long do they wait?",
+        says="Median and the slowest of a hundred. Above a second: see how many wait, how long a look is.",
+        unit=units.Seconds,
+        least=0,
+        queries=(
+            Query(quantile(0.5, "", waits), "median"),
+            Query(quantile(0.99, "", waits), "q0.99"),
+        ),
+    )
+
+
+def _looks() -> Panel:
+    looks = _of("palaestra_operator_reconcile_duration_seconds_count")
+    return Panel(
+        question="How do its looks at a job end?",
+        says=(
+            "Looks a second. conflict is harmless: somebody else wrote meanwhile. error is not: the log says "
+            "`not reconciled` or `refused`, and why."
+        ),
+        unit=units.OpsPerSecond,
+        least=0,
+        queries=(Query(total("result", rate(looks)), "{{result}}"),),
+    )
+
+
+def _seconds() -> Panel:
+    looks = _of("palaestra_operator_reconcile_duration_seconds_bucket")
+    return Panel(
+        question="How long is one look?",
+        says="Median and the slowest of a hundred; nearly all of it is waiting for the API server.",
+        unit=units.Seconds,
+        least=0,
+        width=12,
+        queries=(
+            Query(quantile(0.5, "", looks), "median"),
+            Query(quantile(0.99, "", looks), "q0.99"),
+        ),
+    )
+
+
+def _failed() -> Panel:
+    looks = "palaestra_operator_reconcile_duration_seconds_count"
+    errors = _of(looks, 'result="error"')
+    return Panel(
+        question="Which share of its looks fails?",
+        says="Anything above zero for minutes is an alert: the log says `not reconciled`, with a traceback.",
+        unit=units.PercentUnit,
+        least=0,
+        width=12,
+        queries=(Query(f"(sum({rate(errors)}) or vector(0)) / sum({rate(_of(looks))})", "failed"),),
+    )
+
+
+def _answers() -> Panel:
+    requests = _of("palaestra_operator_requests_total")
+    return Panel(
+        question="What does the API server answer?",
+        says=(
+            "Answers a second by code. 0: no answer. 403: a right is missing, install the chart anew. 409: "
+            "harmless. 429: it is throttled."
+        ),
+        unit=units.RequestsPerSecond,
+        least=0,
+        width=6,
+        queries=(Query(total("code", rate(requests)), "{{code}}"),),
+    )
+
+
+def _refused() -> Panel:
+    requests = "palaestra_operator_requests_total"
+    refused = _of(requests, 'code=~"0|4..|5.."', 'code!~"404|409"')
+    return Panel(
+        question="Which share of its requests fails?",
+        says="Without those that are part of its work (404, 409). Above zero: see the codes, then its log.",
+        unit=units.PercentUnit,
+        least=0,
+        width=6,
+        queries=(Query(f"(sum({rate(refused)}) or vector(0)) / sum({rate(_of(requests))})", "failed"),),
+    )
+
+
+def _requests() -> Panel:
+    requests = _of("palaestra_operator_requests_total")
+    return Panel(
+        question="What does it ask for?",
+        says=(
+            "Requests a second by verb and resource. While no job changes it is its Lease and nothing else; "
+            "if not, something changes the jobs all the time."
+        ),
+        unit=units.RequestsPerSecond,
+        least=0,
+        width=6,
+        queries=(Query(total("verb, resource", rate(requests)), "{{verb}} {{resource}}"),),
+    )
+
+
+def _latency() -> Panel:
+    requests = _of("palaestra_operator_request_duration_seconds_bucket")
+    return Panel(
+        question="How long does an answer take?",
+        says="The slowest of a hundred, by verb, watches aside. Above a second: the API server is loaded.",
+        unit=units.Seconds,
+        least=0,
+        width=6,
+        queries=(Query(quantile(0.99, "verb", requests), "{{verb}}"),),
+    )
+
+
+def _memory() -> Panel:
+    return Panel(
+        question="Does its memory grow?",
+        says="It grows with the number of jobs (75 MB for 200). It grows without them: please report it.",
+        unit=units.BytesIEC,
+        least=0,
+        width=12,
+        queries=(Query(_of_process(_of("process_resident_memory_bytes")), "{{pod}}"),),
+    )
+
+
+def _cores() -> Panel:
+    cpu = rate(_of("process_cpu_seconds_total"))
+    return Panel(
+        question="How many cores does it use?",
+        says="At the limit of its resources it is throttled, and jobs wait: raise it.",
+        unit=units.Short,
+        least=0,
+        width=12,
+        queries=(Query(_of_process(cpu), "{{pod}}"),),
+    )

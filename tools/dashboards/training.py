@@ -1,0 +1,277 @@
+"""Training: is it learning, how fast, and what would be lost if it ended now."""
+
+from grafana_foundation_sdk.models import units
+
+from tools.dashboards.board import Board, Section
+from tools.dashboards.metrics import RUN, RUN_CHOICES, grown, of_run, quantile, rate, total
+from tools.dashboards.panels import Look, Panel, Query
+
+_BY_RUN = "namespace, training_job, replica"
+
+
+def board() -> Board:
+    """Return the dashboard."""
+    return Board(
+        name="training",
+        says="Whether the chosen runs learn, how fast, and what would be lost if they ended now.",
+        since="now-1h",
+        variables=RUN_CHOICES,
+        sections=(
+            Section("Is it learning?", (_success(), _returns(), _spread(), _lengths(), _evaluated())),
+            Section("Why does it learn, or not?", (_exploration(), _loss(), _learning_rate())),
+            Section("How fast is it?", (_progress(), _speed(), _time(), _idle(), _lost())),
+            Section("What if it ended now?", (_behind(), _age(), _saving(), _size(), _unwritten())),
+        ),
+    )
+
+
+def _success() -> Panel:
+    return Panel(
+        question="How often does it reach its goal?",
+        says=(
+            "Evaluation: the policy without exploration, on seeds of its own. Training: the last 100 "
+            "episodes, with exploration. Both flat at zero after a tenth of the steps: read the returns; "
+            "if these are flat too, the reward gives nothing to follow."
+        ),
+        unit=units.PercentUnit,
+        least=0,
+        most=1,
+        queries=(
+            Query(of_run("palaestra_trainer_evaluation_success_ratio"), f"{RUN} evaluation"),
+            Query(of_run("palaestra_trainer_episode_success_ratio"), f"{RUN} training"),
+        ),
+    )
+
+
+def _returns() -> Panel:
+    return Panel(
+        question="What do episodes return?",
+        says=(
+            "Quantiles of the last 100 training episodes: 0.5 is the median. All rise: it learns. The best "
+            "rise and the worst do not: some starts are never solved; look at the evaluation's videos."
+        ),
+        unit=units.Short,
+        queries=(Query(of_run("palaestra_trainer_episode_return_quantile"), f"{RUN} q{{{{rank}}}}"),),
+    )
+
+
+def _spread() -> Panel:
+    return Panel(
+        question="How are the returns spread?",
+        says=(
+            "How many training episodes of all chosen runs ended with which return. Two bands that stay: "
+            "the policy solves one kind of start and not the other."
+        ),
+        unit=units.Short,
+        look=Look.SPREAD,
+        queries=(Query(total("le", grown(of_run("palaestra_trainer_episode_return_bucket"))), "{{le}}"),),
+    )
+
+
+def _lengths() -> Panel:
+    steps = "palaestra_trainer_episode_length_steps_bucket"
+    return Panel(
+        question="How long are episodes?",
+        says=(
+            "Steps of the training episodes. They get shorter when the goal is reached earlier. All at the "
+            "limit of the environment: it is never reached."
+        ),
+        unit=units.Short,
+        least=0,
+        queries=(
+            Query(quantile(0.5, _BY_RUN, of_run(steps)), f"{RUN} median"),
+            Query(quantile(0.9, _BY_RUN, of_run(steps)), f"{RUN} q0.9"),
+        ),
+    )
+
+
+def _evaluated() -> Panel:
+    return Panel(
+        question="What do evaluations return?",
+        says=(
+            "Mean return of the last evaluation; the best one so far is what model.zip has. It falls while "
+            "training's rises: the policy leans on exploration, or forgets; lower the learning rate."
+        ),
+        unit=units.Short,
+        width=16,
+        queries=(Query(of_run("palaestra_trainer_evaluation_return_mean"), RUN),),
+    )
+
+
+def _exploration() -> Panel:
+    return Panel(
+        question="Does it still explore?",
+        says=(
+            "Share of random actions (exploration_rate), entropy coefficient or standard deviation of the "
+            "actions, by algorithm. At its floor with no success: raise exploration_fraction or ent_coef."
+        ),
+        unit=units.Short,
+        least=0,
+        queries=(Query(of_run("palaestra_trainer_exploration"), f"{RUN} {{{{measure}}}}"),),
+    )
+
+
+def _loss() -> Panel:
+    return Panel(
+        question="Does the loss stay within bounds?",
+        says=(
+            "Losses of the last update. A loss need not fall, but one that grows by orders of magnitude ends "
+            "as Diverged: lower the learning rate, or scale the reward."
+        ),
+        unit=units.Short,
+        queries=(Query(of_run("palaestra_trainer_loss"), f"{RUN} {{{{loss}}}}"),),
+    )
+
+
+def _learning_rate() -> Panel:
+    return Panel(
+        question="How large are its updates?",
+        says="The learning rate. It falls only if the job's hyperparameters say so (lin_...).",
+        unit=units.ScientificNotation,
+        least=0,
+        queries=(Query(of_run("palaestra_trainer_learning_rate"), RUN),),
+    )
+
+
+def _progress() -> Panel:
+    done, target = of_run("palaestra_trainer_steps_total"), of_run("palaestra_trainer_target_steps")
+    return Panel(
+        question="How far is it?",
+        says="Valid environment steps as a share of trainer.steps. Flat: see how long ago its last step was.",
+        unit=units.PercentUnit,
+        look=Look.FIGURES,
+        queries=(Query(f"{done} / {target}", RUN),),
+    )
+
+
+def _speed() -> Panel:
+    return Panel(
+        question="How many steps does it make in a second?",
+        says=(
+            "Valid steps over the last 30 s. Regular dips are evaluations and checkpoints. It halves and "
+            "stays so: look for the cause where its time goes, then at Simulators."
+        ),
+        unit=units.OpsPerSecond,
+        least=0,
+        queries=(Query(of_run("palaestra_trainer_steps_per_second"), RUN),),
+    )
+
+
+def _time() -> Panel:
+    spent = rate(of_run("palaestra_trainer_seconds_total"))
+    share = f"{total('cause', spent)} / on () group_left sum({spent})"
+    return Panel(
+        question="Where does its time go?",
+        says=(
+            "Each second of the trainer has one cause. Mostly stepping: the simulators are the limit, add "
+            "some. Mostly learning: give it more CPU. Recovering: it waits for restarts, after faults or for "
+            "`recycle`; see Simulators for which, and give the group a standby."
+        ),
+        unit=units.PercentUnit,
+        look=Look.SHARES,
+        least=0,
+        most=1,
+        queries=(Query(share, "{{cause}}"),),
+    )
+
+
+def _idle() -> Panel:
+    return Panel(
+        question="When was its last step?",
+        says=(
+            "Seconds since the last step that was learned from or evaluated, beside stallDeadlineSeconds, "
+            "at which the trainer ends itself and is tried again. Rising: see the simulators' states."
+        ),
+        unit=units.Seconds,
+        width=12,
+        least=0,
+        queries=(
+            Query(of_run("palaestra_trainer_idle_seconds"), f"{RUN} idle"),
+            Query(of_run("palaestra_trainer_stall_deadline_seconds"), f"{RUN} deadline"),
+        ),
+    )
+
+
+def _lost() -> Panel:
+    return Panel(
+        question="What was played in vain?",
+        says=(
+            "Since the run began: steps of episodes that a fault cut or that were played again after an "
+            "interruption, and simulation steps that late messages cost. Many lost: see the faults under "
+            "Simulators; none there: save more often (checkpoint.everySteps)."
+        ),
+        unit=units.Short,
+        width=12,
+        least=0,
+        queries=(
+            Query(of_run("palaestra_trainer_steps_lost_total"), f"{RUN} lost"),
+            Query(of_run("palaestra_trainer_extra_steps_total"), f"{RUN} extra"),
+        ),
+    )
+
+
+def _behind() -> Panel:
+    done = of_run("palaestra_trainer_steps_total")
+    saved = of_run("palaestra_trainer_checkpoint_steps")
+    interval = of_run("palaestra_trainer_checkpoint_interval_steps")
+    return Panel(
+        question="How many checkpoints is it behind?",
+        says=(
+            "Steps since the newest checkpoint, in intervals: what would be trained again if it ended now. "
+            "Above 1 for long: read the trainer's log; the disk may be full. Above 3 it is an alert."
+        ),
+        unit=units.Short,
+        least=0,
+        alarm=3,
+        queries=(Query(f"({done} - ({saved} or {done} * 0)) / {interval}", RUN),),
+    )
+
+
+def _age() -> Panel:
+    return Panel(
+        question="How old is the newest checkpoint?",
+        says="Its age: what would be lost in time. See how many checkpoints it is behind for what to do.",
+        unit=units.Seconds,
+        least=0,
+        queries=(Query(f"time() - {of_run('palaestra_trainer_checkpoint_timestamp_seconds')}", RUN),),
+    )
+
+
+def _saving() -> Panel:
+    seconds = of_run("palaestra_trainer_checkpoint_duration_seconds_bucket")
+    return Panel(
+        question="How long does saving take?",
+        says=(
+            "Slowest of ten checkpoints lately; training waits meanwhile. More than a few seconds: the "
+            "volume is slow; choose another storage class, or save less often."
+        ),
+        unit=units.Seconds,
+        least=0,
+        queries=(Query(quantile(0.9, _BY_RUN, seconds, "10m"), f"{RUN} q0.9"),),
+    )
+
+
+def _size() -> Panel:
+    return Panel(
+        question="Do checkpoints fit on the volume?",
+        says=(
+            "Size of the newest one. checkpoint.keep of them and one more must fit into storage.size: make "
+            "it larger, keep fewer, or give the algorithm a smaller buffer_size."
+        ),
+        unit=units.BytesIEC,
+        width=12,
+        least=0,
+        queries=(Query(of_run("palaestra_trainer_checkpoint_size_bytes"), RUN),),
+    )
+
+
+def _unwritten() -> Panel:
+    return Panel(
+        question="Was a checkpoint not written?",
+        says="For want of space, since the run began. The run ends with StorageFull: free some, or resize.",
+        unit=units.Short,
+        width=12,
+        least=0,
+        alarm=1,
+        queries=(Query(of_run("palaestra_trainer_checkpoint_failures_total"), RUN),),
+    )

@@ -1,0 +1,106 @@
+"""The tables of docs/metrics.md, made from the families that the programs declare.
+
+Here and in no program, since operator and trainer know nothing of each other.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from palaestra.api.marks import between_marks
+from palaestra.operator import families as operator
+from palaestra_sim.protocol.metrics import Family, Kind, Label
+from palaestra_sim.sidecar import families as sidecar
+from palaestra_trainer import families as trainer
+
+PAGE = "docs/metrics.md"
+SERIES = "<!-- generated: how many series -->"
+PROCESS = 6  # process_*, as prometheus_client tells them of each program
+MOST_NAMED = 10  # values of a label that are written out
+
+JOBS, REPLICAS, SIMULATORS, NAMESPACES = 1000, 2, 3, 50
+SIZES: Mapping[str, int] = {
+    "release": 1,
+    "simulator": SIMULATORS,
+    "simulator of the sidecar": 1,
+    "namespace with jobs": NAMESPACES,
+    "kind of object": 12,
+    "HTTP status that occurred": 8,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """One program that serves metrics, and how many of it such a cluster has."""
+
+    name: str
+    families: Sequence[Family]
+    count: int
+
+    @property
+    def mark(self) -> str:
+        """What its table stands behind in the page."""
+        return f"<!-- generated: metrics of the {self.name} -->"
+
+    @property
+    def series(self) -> int:
+        """How many series one of it has at most, its process's among them."""
+        return sum(family.series(SIZES) for family in self.families) + PROCESS
+
+
+PROGRAMS = (
+    Program(name="operator", families=operator.FAMILIES, count=1),
+    Program(name="trainer", families=trainer.FAMILIES, count=JOBS * REPLICAS),
+    Program(name="sidecar", families=sidecar.FAMILIES, count=JOBS * REPLICAS * SIMULATORS),
+)
+
+
+def page(text: str) -> str:
+    """Return docs/metrics.md, of which `text` is what it was, with its tables made anew.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    for program in PROGRAMS:
+        text = between_marks(text, program.mark, table(program.families))
+    return between_marks(text, SERIES, cardinality())
+
+
+def table(families: Sequence[Family]) -> str:
+    """Return a row for each family."""
+    rows = (
+        f"| `{it.name}` | {_type(it)} | {'<br>'.join(map(_label, it.labels))} | {it.meaning} |"
+        for it in families
+    )
+    return "\n".join(("| metric | type | labels | what it tells |", "|---|---|---|---|", *rows, ""))
+
+
+def cardinality() -> str:
+    """Return how many series the programs of a large cluster have, each and together."""
+    rows = [f"| {it.name} | {it.series} | {it.count:,} | {it.series * it.count:,} |" for it in PROGRAMS]
+    total = sum(it.series * it.count for it in PROGRAMS)
+    cluster = f"{JOBS:,} jobs that all run, of {REPLICAS} replicas with {SIMULATORS} simulators each"
+    return "\n".join(
+        (
+            f"{cluster}, in {NAMESPACES} namespaces:",
+            "",
+            "| program | series of one, at most | programs | series |",
+            "|---|---|---|---|",
+            *rows,
+            f"| all | | | {total:,} |",
+            "",
+        )
+    )
+
+
+def _type(family: Family) -> str:
+    if family.kind is not Kind.HISTOGRAM:
+        return family.kind
+    first, last = family.buckets[0], family.buckets[-1]
+    return f"histogram, {len(family.buckets)} bounds from {first:g} to {last:g}"
+
+
+def _label(label: Label) -> str:
+    if label.bound:
+        return f"`{label.name}`: one for each {label.bound}"
+    values = ", ".join(label.values) if len(label.values) <= MOST_NAMED else f"{len(label.values)} values"
+    return f"`{label.name}`: {values}"
