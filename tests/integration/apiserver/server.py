@@ -1,14 +1,18 @@
 """An API server that misbehaves: real sockets, and answers that a test writes down beforehand."""
 
 import json
+import struct
 import threading
+from base64 import b64encode
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from hashlib import sha1
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
+MAGIC = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # Source: RFC 6455, section 1.3
 Answer = Callable[["Exchange"], None]
 
 
@@ -135,6 +139,31 @@ def stream(*events: Any, ends: str = "properly") -> Answer:
             exchange.close_connection = True
             return
         exchange.chunk(b"")
+
+    return answer
+
+
+def command(*messages: bytes, ends: str = "properly") -> Answer:
+    """Run a command: send messages, each with the number of its stream first.
+
+    It `ends` properly, by closing the websocket; is silent for ever; or is broken off.
+    """
+
+    def answer(exchange: Exchange) -> None:
+        key = exchange.headers["Sec-WebSocket-Key"] + MAGIC
+        exchange.send_response(101)
+        exchange.send_header("Upgrade", "websocket")
+        exchange.send_header("Connection", "Upgrade")
+        exchange.send_header("Sec-WebSocket-Protocol", "v5.channel.k8s.io")
+        exchange.send_header("Sec-WebSocket-Accept", b64encode(sha1(key.encode()).digest()).decode())
+        exchange.end_headers()
+        for message in messages:
+            exchange.wfile.write(struct.pack("!BBH", 0x82, 126, len(message)) + message)
+        if ends == "silent":
+            exchange.script.over.wait(30)
+        if ends == "properly":
+            exchange.wfile.write(b"\x88\x00")
+        exchange.close_connection = True
 
     return answer
 

@@ -10,7 +10,15 @@ from types import SimpleNamespace
 import pytest
 from kubernetes.config import incluster_config
 
-from palaestra.cluster import ApiError, Forbidden, NotConfigured, Unreachable, connect
+from palaestra.cluster import (
+    ApiError,
+    Forbidden,
+    NotConfigured,
+    Unreachable,
+    connect,
+    connection,
+    own_namespace,
+)
 from palaestra.cluster.resources import PODS
 from tests.control_plane.certificates import Authority
 from tests.integration.apiserver.conftest import write_kubeconfig
@@ -148,3 +156,18 @@ def test_nowhere_to_connect_to_is_said_with_a_remedy():
     """On a laptop without any cluster."""
     with pytest.raises(NotConfigured, match="--kubeconfig"):
         connect()
+
+
+@pytest.mark.parametrize(
+    ("content", "namespace"),
+    [(b"robots\n", "robots"), (b"", "usual"), (b"\xff", "usual"), (None, "usual")],
+    ids=["a pod's", "empty", "damaged", "no pod"],
+)
+def test_the_own_namespace_is_the_pods_or_the_usual_one(monkeypatch, tmp_path, content, namespace):
+    """Also where a service account is mounted in part."""
+    file = tmp_path / "namespace"
+    if content is not None:
+        file.write_bytes(content)
+    monkeypatch.setattr(connection, "OWN_NAMESPACE", file)
+
+    assert own_namespace("usual") == namespace

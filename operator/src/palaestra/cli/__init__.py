@@ -4,8 +4,9 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from pathlib import Path
 
-from palaestra.cli import documents, operator, run
+from palaestra.cli import changing, doctor, documents, fetching, looking, operator, run, trial, watching
 from palaestra.cli.parsing import EXIT_CODES, WRONG_INPUT
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import LocalError
@@ -34,9 +35,14 @@ def _failed(error: Exception, exit_code: int) -> int:
     return exit_code
 
 
+def _typed() -> str:
+    """Return how the command line is called: by itself, or by kubectl, which finds a plugin by its name."""
+    return "kubectl palaestra" if Path(sys.argv[0]).name == "kubectl-palaestra" else "palaestra"
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="palaestra",
+        prog=_typed(),
         description="Train robots in simulators, from a TrainingJob.",
         epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -46,4 +52,10 @@ def _parser() -> argparse.ArgumentParser:
     run.add(commands)
     documents.add(commands)
     operator.add(commands)
+    looking.add(commands)
+    watching.add(commands)
+    changing.add(commands)
+    fetching.add(commands)
+    doctor.add(commands)
+    trial.add(commands)
     return parser

@@ -33,13 +33,14 @@ def command(
     function: Callable[[argparse.Namespace], int],
     summary: str,
     description: str,
+    exit_codes: str = EXIT_CODES,
 ) -> argparse.ArgumentParser:
     """Return the parser of a new command, which `function` carries out and returns its exit code."""
     parser = commands.add_parser(
         name,
         help=summary,
         description=description,
-        epilog=EXIT_CODES,
+        epilog=exit_codes,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(command=function)

@@ -9,13 +9,15 @@ Requests and answers are plain JSON; the official client gives configuration, cr
     watching    one watch, until it ends                        reflector   a cache that follows it
     store       what the cache holds                            queue       work, one worker a key
     lease       who leads                                       recorder    events for people
+    lines       a log that goes on                              executing   a command in a container
 """
 
 from palaestra.cluster.api import Api
-from palaestra.cluster.connection import connect
+from palaestra.cluster.connection import connect, namespace_of, own_namespace
 from palaestra.cluster.errors import (
     AlreadyExists,
     ApiError,
+    CommandFailed,
     Conflict,
     Forbidden,
     Gone,
@@ -38,6 +40,7 @@ __all__ = [
     "AlreadyExists",
     "Api",
     "ApiError",
+    "CommandFailed",
     "Conflict",
     "Forbidden",
     "Gone",
@@ -55,4 +58,6 @@ __all__ = [
     "Unreachable",
     "WorkQueue",
     "connect",
+    "namespace_of",
+    "own_namespace",
 ]

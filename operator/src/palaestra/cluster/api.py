@@ -4,12 +4,15 @@ Nothing is retried but what certainly was not done: a request that a busy server
 deadline of the call, and a read on a connection that broke. Everything else is for the caller's queue.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from palaestra.cluster.errors import Gone, NotFound
-from palaestra.cluster.resources import Resource, of
+from palaestra.cluster.executing import output
+from palaestra.cluster.lines import lines
+from palaestra.cluster.resources import PODS, Resource, of
 from palaestra.cluster.transport import JSON, Call, OnRequest, Transport
 from palaestra.cluster.watching import Watch
 
@@ -20,6 +23,7 @@ MANAGER = "palaestra-operator"
 MERGE_PATCH = "application/merge-patch+json"
 APPLY_PATCH = "application/apply-patch+yaml"  # JSON is YAML
 LISTS_FROM_THE_START = 3
+TABLE = "application/json;as=Table;v=v1;g=meta.k8s.io"
 METADATA = "application/json;as={kind};g=meta.k8s.io;v=v1"
 READS = {
     "get": "PartialObjectMetadata",
@@ -138,14 +142,35 @@ class Api:
         """
         return _complete(resource, self._object(_call("get", resource, namespace, name)))
 
-    def create(self, resource: Resource, obj: Mapping[str, Any]) -> Object:
+    def table(
+        self,
+        resource: Resource,
+        namespace: str | None = None,
+        name: str | None = None,
+        *,
+        labels: str | None = None,
+    ) -> Object:
+        """Return one object or a list as the `Table` that the API server makes for people.
+
+        Raises:
+            NotFound: there is none of that name.
+        """
+        call = _call("get" if name else "list", resource, namespace, name, query={"labelSelector": labels})
+        return self._object(replace(call, accept=TABLE))
+
+    def create(self, resource: Resource, obj: Mapping[str, Any], *, dry_run: bool = False) -> Object:
         """Create an object in the namespace that it names, and return it as stored.
+
+        With `dry_run` the API server goes through everything, admission included, and stores nothing.
 
         Raises:
             AlreadyExists: the name is taken.
             Invalid: the API server names the wrong field.
         """
-        return self._object(_call("create", resource, _namespace(obj)).sending(obj, method="POST"))
+        query = {"dryRun": "All" if dry_run else None}
+        return self._object(
+            _call("create", resource, _namespace(obj), query=query).sending(obj, method="POST")
+        )
 
     def merge(
         self,
@@ -213,6 +238,7 @@ class Api:
         *,
         version: str,
         labels: str | None = None,
+        fields: str | None = None,
         seconds: float,
     ) -> Watch:
         """Return the changes after `version`, where a list or an earlier watch ended.
@@ -228,13 +254,68 @@ class Api:
             "resourceVersion": version,
             "timeoutSeconds": str(max(1, round(seconds))),
             "labelSelector": labels,
+            "fieldSelector": fields,
         }
         call = _call("watch", resource, namespace, query=query)
-        return Watch(self._transport.open(call, silence_s=self.limits.silence_s), call, self.on_request)
+        silence_s = min(self.limits.silence_s, seconds + self.limits.call_s)
+        return Watch(self._transport.open(call, silence_s=silence_s), call, self.on_request)
+
+    def logs(
+        self,
+        namespace: str,
+        pod: str,
+        container: str,
+        *,
+        follow: bool = False,
+        tail: int | None = None,
+        within_s: float,
+    ) -> Iterator[str]:
+        """Yield the lines of a container's log, the last `tail` of them; `follow`: until it has ended.
+
+        Raises:
+            NotFound: there is no such pod.
+            Invalid: the container has not started, or there is none of that name.
+            Unreachable: the connection broke, or the log did not end `within_s`.
+        """
+        query = {
+            "container": container,
+            "follow": "true" if follow else None,
+            "tailLines": None if tail is None else str(tail),
+        }
+        call = _call("get", PODS, namespace, pod, subresource="log", query=query)
+        yield from self._lines(call, within_s)
+
+    def proxied(self, namespace: str, pod: str, port: int, path: str) -> str:
+        """Return what a pod answers to a GET, by way of the API server; `path` has no leading slash.
+
+        Raises:
+            ApiError: the pod's answer is none, or the API server does not reach it.
+        """
+        call = _call("get", PODS, namespace, f"{pod}:{port}", subresource=f"proxy/{path}")
+        return "\n".join(self._lines(call, self._call_s))
+
+    def execute(
+        self, namespace: str, pod: str, container: str, command: Sequence[str], *, within_s: float
+    ) -> Iterator[bytes]:
+        """Run a command in a container and yield what it writes to standard output; it gets no input.
+
+        Raises:
+            CommandFailed: it ended with another code than 0.
+            Unreachable: the connection broke, or the command did not end `within_s`: what came is not whole.
+            ApiError: the API server refuses.
+        """
+        deadline = time.monotonic() + within_s
+        query = {"container": container, "command": command, "stdout": "true", "stderr": "true"}
+        call = _call("create", PODS, namespace, pod, subresource="exec", query=query)
+        yield from output(self._transport.channel(call), deadline)
 
     def close(self) -> None:
         """Close all idle connections."""
         self._transport.close()
+
+    def _lines(self, call: Call, within_s: float) -> Iterator[str]:
+        deadline = time.monotonic() + within_s
+        return lines(self._transport.open(call, silence_s=within_s), deadline)
 
     def _object(self, call: Call) -> Object:
         return self._transport.call(call, self._call_s)
@@ -247,7 +328,7 @@ def _call(
     name: str | None = None,
     *,
     subresource: str | None = None,
-    query: Mapping[str, str | None] | None = None,
+    query: Mapping[str, str | Sequence[str] | None] | None = None,
 ) -> Call:
     path = resource.address(namespace, name) + (f"/{subresource}" if subresource else "")
     accept = JSON

@@ -5,10 +5,16 @@ A pod's token is read anew from its file every minute, as kubelets replace it.
 
 import os
 from pathlib import Path
+from typing import Any
 
 import yaml
 from kubernetes.client.configuration import Configuration
-from kubernetes.config import ConfigException, load_incluster_config, load_kube_config
+from kubernetes.config import (
+    ConfigException,
+    list_kube_config_contexts,
+    load_incluster_config,
+    load_kube_config,
+)
 
 from palaestra.cluster.api import Api
 from palaestra.cluster.errors import NotConfigured
@@ -16,6 +22,8 @@ from palaestra.cluster.limits import Limits
 from palaestra.cluster.transport import Transport
 
 POOL = 32  # connections kept open: more than there are workers and watches
+OWN_NAMESPACE = Path("/var/run/secrets/kubernetes.io/serviceaccount/namespace")
+DEFAULT = "default"
 REMEDY = "name a kubeconfig with --kubeconfig or KUBECONFIG, or run in a pod with a service account"
 
 
@@ -42,6 +50,36 @@ def connect(kubeconfig: str | None = None, context: str | None = None, limits: L
         fact = " ".join(str(error).split())  # YAML's mistakes come on several lines
         raise NotConfigured(f"{files or 'service account'}: {fact}; {REMEDY}") from error
     return Api(Transport(configuration, limits or Limits()))
+
+
+def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> str:
+    """Return the namespace of the connection that `connect` makes from the same arguments.
+
+    Raises:
+        NotConfigured: the kubeconfig has no such context, or cannot be read.
+    """
+    files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
+    if not files:
+        return own_namespace(DEFAULT)
+    try:
+        contexts: Any = list_kube_config_contexts(files)  # type: ignore[no-untyped-call]  # as above
+    except (ConfigException, OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
+        raise NotConfigured(f"{files}: {' '.join(str(error).split())}; {REMEDY}") from error
+    known, current = contexts
+    chosen = next((each for each in known if each["name"] == context), None) if context else current
+    if chosen is None:
+        raise NotConfigured(
+            f"--context: {files} has no {context!r}; `kubectl config get-contexts` names them"
+        )
+    return str(chosen["context"].get("namespace") or DEFAULT)
+
+
+def own_namespace(default: str) -> str:
+    """Return the namespace of the pod that this process runs in; outside a cluster, `default`."""
+    try:
+        return OWN_NAMESPACE.read_text(encoding="ascii").strip() or default
+    except (OSError, UnicodeDecodeError):
+        return default
 
 
 def _home() -> str | None:

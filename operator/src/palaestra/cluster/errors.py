@@ -11,10 +11,12 @@ ApiError                    any answer but success; `retryable` says whether it 
 ├── ServerError             5xx, the API server or its store is in trouble
 └── Unreachable             no answer, or none that can be read
 NotConfigured               no API server is named, or its credentials cannot be read
+CommandFailed               a command in a container ended with another code than 0
 
 A message is the API server's own: it names the object and, for an invalid one, the field.
 """
 
+import re
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -70,6 +72,11 @@ class Conflict(ApiError):
 class Forbidden(ApiError):
     """RBAC, a quota, Pod Security or a webhook refuses; a person has to act."""
 
+    @property
+    def lacks_right(self) -> bool:
+        """Whether it is RBAC that refuses, as its words say: no field of the answer does."""
+        return re.search(r" cannot \S+ resource ", self.message) is not None
+
 
 class Invalid(ApiError):
     """The object is wrong; the message names the field."""
@@ -105,6 +112,20 @@ class Unreachable(ApiError):
     """No answer in time, or none that can be read; whether a write took place is not known."""
 
     retryable = True
+
+
+class CommandFailed(PalaestraError):
+    """A command in a container failed.
+
+    Attributes:
+        code: its exit code; -1: not known.
+        said: the beginning of what it wrote to standard error.
+    """
+
+    def __init__(self, code: int, said: str) -> None:
+        super().__init__(f"exit code {code}: {said or 'it said nothing'}")
+        self.code = code
+        self.said = said
 
 
 BY_REASON: dict[str, type[ApiError]] = {"AlreadyExists": AlreadyExists, "Expired": Gone, "Gone": Gone}

@@ -67,6 +67,24 @@ DEFINITIONS = Resource(
     plural="customresourcedefinitions",
     namespaced=False,
 )
+# What only people's tools look at.
+DEPLOYMENTS = Resource(api_version="apps/v1", kind="Deployment", plural="deployments")
+STORAGE_CLASSES = Resource(
+    api_version="storage.k8s.io/v1", kind="StorageClass", plural="storageclasses", namespaced=False
+)
+# Questions to RBAC, asked by creating them: may I, and may somebody else?
+OWN_RIGHTS = Resource(
+    api_version="authorization.k8s.io/v1",
+    kind="SelfSubjectAccessReview",
+    plural="selfsubjectaccessreviews",
+    namespaced=False,
+)
+RIGHTS = Resource(
+    api_version="authorization.k8s.io/v1",
+    kind="SubjectAccessReview",
+    plural="subjectaccessreviews",
+    namespaced=False,
+)
 
 ALL: tuple[Resource, ...] = (
     TRAINING_JOBS,

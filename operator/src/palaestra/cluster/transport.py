@@ -7,7 +7,7 @@ twice the memory of plain JSON, and its calls have no deadline on the answer's b
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 from urllib.parse import urlencode
@@ -17,13 +17,16 @@ from kubernetes.client.rest import RESTClientObject
 from kubernetes.config import ConfigException
 from urllib3 import BaseHTTPResponse, Timeout
 from urllib3.exceptions import HTTPError, ProtocolError
+from websocket import WebSocket
 
 from palaestra.cluster.errors import ApiError, TooManyRequests, Unreachable, from_status
+from palaestra.cluster.executing import open_socket
 from palaestra.cluster.limits import Limits
 
 OnRequest = Callable[[str, str, int, float], None]
 CHUNK = 1 << 16
 MOST_BYTES = 1 << 26  # an object has 1.5 MiB at most, a page 500 objects, of which few are large
+SWITCHED = 101  # to the protocol of websockets
 FIRST_ERROR = 400
 JSON = "application/json"
 
@@ -45,7 +48,7 @@ class Call:
         verb: as metrics and RBAC have it: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
         plural: the resource, for metrics.
         path: from the root of the API server.
-        query: parameters; those that are None are left out.
+        query: parameters; those that are None are left out, lists are repeated.
         accept: media type of the answer.
         body: an object, sent as JSON.
     """
@@ -54,7 +57,7 @@ class Call:
     plural: str
     path: str
     method: str = "GET"
-    query: Mapping[str, str | None] = field(default_factory=dict)
+    query: Mapping[str, str | Sequence[str] | None] = field(default_factory=dict)
     accept: str = JSON
     body: Mapping[str, Any] | None = None
     media_type: str = JSON
@@ -66,7 +69,8 @@ class Call:
     @property
     def address(self) -> str:
         """Path and query."""
-        query = urlencode({key: value for key, value in self.query.items() if value is not None})
+        given = {key: value for key, value in self.query.items() if value is not None}
+        query = urlencode(given, doseq=True)
         return f"{self.path}?{query}" if query else self.path
 
 
@@ -121,6 +125,24 @@ class Transport:
         except ApiError as error:
             self.on_request(call.verb, call.plural, error.code, time.monotonic() - started)
             raise
+
+    def channel(self, call: Call) -> WebSocket:
+        """Return the socket of a command in a container, to be closed by the caller.
+
+        Raises:
+            ApiError: the API server refuses, or cannot be reached.
+        """
+        started, code = time.monotonic(), 0
+        try:
+            headers = {"User-Agent": "palaestra", **self._authorization()}
+            socket = open_socket(self._configuration, self.host + call.address, headers, self.limits.call_s)
+            code = SWITCHED
+        except ApiError as error:
+            code = error.code
+            raise
+        finally:
+            self.on_request(call.verb, call.plural, code, time.monotonic() - started)
+        return socket
 
     def close(self) -> None:
         """Close all idle connections."""

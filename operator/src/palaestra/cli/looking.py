@@ -1,0 +1,118 @@
+"""`palaestra get`, `describe`, `events` and `logs`: what there is, and why."""
+
+import argparse
+import json
+from datetime import UTC, datetime
+
+from palaestra.api import validate
+from palaestra.cli.cluster import cluster_command, say
+from palaestra.cli.parsing import Commands
+from palaestra.client import Client
+from palaestra.cluster.resources import TRAINING_JOBS
+from palaestra.errors import PalaestraError
+from palaestra.plan.text import as_yaml
+from palaestra.view import describe, happened, server_table
+
+READS = "Reads the cluster; writes nothing but its output.\n"
+GET = f"""\
+Lists TrainingJobs, or shows one. {READS}"""
+DESCRIBE = f"""\
+Tells everything that is known of a TrainingJob: spec, conditions, each replica's progress, simulators,
+faults and last attempt, and events. {READS}"""
+EVENTS = f"""\
+Lists the events about a TrainingJob and about its Jobs, pods and claims, oldest first; a cluster forgets
+them after an hour. {READS}"""
+LOGS = f"""\
+Prints the log of a container of a replica's newest pod. {READS}"""
+LOG_S = 86_400.0
+
+
+def add(commands: Commands) -> None:
+    """Add the four commands."""
+    _add_get(commands)
+    for name, work, summary, description in (
+        ("describe", _describe, "tell everything about a job", DESCRIBE),
+        ("events", _events, "list what happened to a job", EVENTS),
+    ):
+        parser = cluster_command(commands, name, work, summary, description)
+        parser.add_argument("name", metavar="NAME", help="of the job")
+    _add_logs(commands)
+
+
+def _add_get(commands: Commands) -> None:
+    parser = cluster_command(commands, "get", _get, "list jobs", GET)
+    parser.add_argument("name", metavar="NAME", nargs="?", help="of one job; default: all")
+    parser.add_argument("-A", "--all-namespaces", action="store_true", help="of all namespaces")
+    parser.add_argument("-l", "--selector", metavar="LABELS", help="with these labels: key=value,...")
+    parser.add_argument(
+        "-o", "--output", choices=("wide", "json", "yaml", "name"), help="default: a table for people"
+    )
+
+
+def _add_logs(commands: Commands) -> None:
+    parser = cluster_command(commands, "logs", _logs, "print the log of a container", LOGS)
+    parser.add_argument("name", metavar="NAME", help="of the job")
+    parser.add_argument("--replica", metavar="N", type=int, default=0, help="default: 0")
+    parser.add_argument(
+        "-c",
+        "--container",
+        metavar="NAME",
+        default="trainer",
+        help="trainer, ros-master or sim-<group>-<number>; default: trainer",
+    )
+    parser.add_argument("-f", "--follow", action="store_true", help="wait for more until the container ends")
+    parser.add_argument("--tail", metavar="N", type=int, help="the last N lines only")
+    parser.add_argument(
+        "--timeout", metavar="S", type=float, default=LOG_S, help="seconds to follow; default: a day"
+    )
+
+
+def _get(client: Client, options: argparse.Namespace) -> int:
+    if options.name and (options.all_namespaces or options.selector):
+        raise PalaestraError("NAME: excludes -A and -l; leave it out, or them")
+    namespace = None if options.all_namespaces else client.namespace
+    if options.output in {None, "wide"}:
+        if options.name:
+            client.raw(options.name)  # tells in our words that there is none
+        table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
+        say(server_table(table, wide=options.output == "wide", namespaces=options.all_namespaces))
+        return 0
+    if options.name:
+        found = [client.raw(options.name)]
+    else:
+        found = client.api.list(TRAINING_JOBS, namespace, labels=options.selector)
+    if options.output == "name":
+        say(f"trainingjob.palaestra.dev/{each['metadata']['name']}" for each in found)
+    elif options.output == "yaml":
+        say([as_yaml(found).rstrip("\n")])
+    else:
+        whole = found[0] if options.name else {"apiVersion": "v1", "kind": "List", "items": found}
+        say([json.dumps(whole, indent=2, ensure_ascii=False)])
+    return 0
+
+
+def _describe(client: Client, options: argparse.Namespace) -> int:
+    found, now = client.raw(options.name), datetime.now(UTC)
+    created = datetime.fromisoformat(found["metadata"]["creationTimestamp"])
+    say(describe(validate(found, options.name), created, now))
+    say(["", "Events:", *(f"  {line}" for line in happened(client.events(options.name), now))])
+    return 0
+
+
+def _events(client: Client, options: argparse.Namespace) -> int:
+    say(happened(client.events(options.name), datetime.now(UTC)))
+    return 0
+
+
+def _logs(client: Client, options: argparse.Namespace) -> int:
+    say(
+        client.logs(
+            options.name,
+            replica=options.replica,
+            container=options.container,
+            follow=options.follow,
+            tail=options.tail,
+            deadline_s=options.timeout,
+        )
+    )
+    return 0

@@ -1,0 +1,28 @@
+"""TrainingJobs of a cluster, from Python.
+
+    from palaestra import Client
+
+    with Client() as client:
+        client.apply(Path("job.yaml"))
+        job = client.wait("job", deadline_s=3600)
+
+`client` is what people call; `reading` understands a status, `following` waits for changes, `happenings`
+reads events, `fetching` copies a run out of its volume, with the pod of `reading_pod`, which runs `packing`.
+"""
+
+from palaestra.client.client import Client
+from palaestra.client.errors import ClientError, EndedOtherwise, NoPod, NoSuchJob, NotFetched, TookTooLong
+from palaestra.client.happenings import Happening
+from palaestra.client.reading import why
+
+__all__ = [
+    "Client",
+    "ClientError",
+    "EndedOtherwise",
+    "Happening",
+    "NoPod",
+    "NoSuchJob",
+    "NotFetched",
+    "TookTooLong",
+    "why",
+]

@@ -1,0 +1,269 @@
+"""The client: one method for each thing that people do with a TrainingJob of a cluster."""
+
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from palaestra.api import Spec, Status, TrainingJob, validate
+from palaestra.api.job import API_VERSION, KIND
+from palaestra.api.yaml_text import NotYaml, read
+from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob
+from palaestra.client.fetching import fetch
+from palaestra.client.following import changes
+from palaestra.client.happenings import Happening, happenings
+from palaestra.client.reading import ENDS, current, why
+from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
+from palaestra.cluster.api import Object
+from palaestra.cluster.resources import TRAINING_JOBS
+from palaestra.errors import SpecErrors
+from palaestra.plan.replica import TRAINER
+
+MANAGER = "palaestra"
+FETCH_S = 600.0
+
+Until = Literal["ended", "Running", "Suspended", "Succeeded", "Failed"]
+
+
+class Client:
+    """The TrainingJobs of one namespace of a cluster; safe to use from several threads.
+
+    Attributes:
+        api: the cluster, for what is not done here.
+        namespace: where the jobs are that are named.
+    """
+
+    def __init__(
+        self, *, namespace: str | None = None, kubeconfig: str | None = None, context: str | None = None
+    ) -> None:
+        """Choose a cluster; nothing is sent yet.
+
+        Args:
+            namespace: None for that of the context, or of the pod.
+            kubeconfig: None for $KUBECONFIG, then ~/.kube/config, then the pod's service account.
+            context: of the kubeconfig; None for its current one.
+
+        Raises:
+            NotConfigured: no API server is named, or its credentials cannot be read.
+        """
+        self.api: Api = connect(kubeconfig, context)
+        self.namespace = namespace or namespace_of(kubeconfig, context)
+
+    def __enter__(self) -> Self:
+        """Return the client."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close its connections."""
+        self.close()
+
+    def close(self) -> None:
+        """Close all idle connections."""
+        self.api.close()
+
+    def apply(self, job: TrainingJob | Mapping[str, Any] | Path) -> TrainingJob:
+        """Create a job, or change what of it may change, and return it as stored.
+
+        Args:
+            job: the job, plain data, or a file with one. What it leaves out is left to the cluster.
+
+        Raises:
+            SpecErrors: it is wrong, with every mistake; nothing was sent.
+            OSError: the file cannot be read.
+            ApiError: the API server refuses, as it does to change what a job is fixed on.
+        """
+        data = _data(job)
+        validate(data, str(job) if isinstance(job, Path) else "job")
+        metadata = {"namespace": self.namespace, **data["metadata"]}
+        # An empty spec that is applied twice is taken for one that is to be removed, and is then missing.
+        spec = data["spec"] or {"replicas": Spec().replicas}
+        return _job(self.api.apply({**data, "metadata": metadata, "spec": spec}, manager=MANAGER))
+
+    def get(self, name: str) -> TrainingJob:
+        """Return a job as it is now.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+            SpecErrors: another release has written what this one cannot read.
+        """
+        return _job(self.raw(name))
+
+    def list(self, labels: str | None = None) -> tuple[TrainingJob, ...]:
+        """Return all jobs of the namespace, or those that a label selector chooses."""
+        return tuple(_job(each) for each in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
+
+    def raw(self, name: str) -> Object:
+        """Return a job as the API server has it, as plain data.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+        """
+        try:
+            return self.api.get(TRAINING_JOBS, self.namespace, name)
+        except NotFound as error:
+            raise self._none(name) from error
+
+    def changes(self, name: str, *, deadline_s: float) -> Iterator[TrainingJob]:
+        """Yield a job as it is, then after each change; ends when it has ended or was deleted.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+            TookTooLong: it went on for longer than `deadline_s`.
+        """
+        found = None
+        deadline = time.monotonic() + deadline_s
+        for each in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
+            found = _job(each)
+            yield found
+            if current(found) and found.status.phase in ENDS:
+                return
+        if found is None:
+            raise self._none(name)
+
+    def statuses(self, name: str, *, deadline_s: float) -> Iterator[Status]:
+        """Yield the status of a job as `changes` yields the job; raises the same."""
+        for job in self.changes(name, deadline_s=deadline_s):
+            yield job.status
+
+    def wait(self, name: str, *, until: Until = "ended", deadline_s: float) -> TrainingJob:
+        """Return the job once it is in a phase, or has ended in any.
+
+        Raises:
+            EndedOtherwise: it has ended, and not as `until` says.
+            NoSuchJob: there is none of that name, or it was deleted.
+            TookTooLong: it did not come to that within `deadline_s`.
+        """
+        for job in self.changes(name, deadline_s=deadline_s):
+            phase = job.status.phase
+            if not current(job) or phase is None:
+                continue
+            if phase == until or (until == "ended" and phase in ENDS):
+                return job
+            if phase in ENDS:
+                raise EndedOtherwise(f"job {name}: is {phase}, not {until}: {why(job.status)}")
+        raise self._none(name)
+
+    def logs(
+        self,
+        name: str,
+        *,
+        replica: int = 0,
+        container: str = TRAINER,
+        follow: bool = False,
+        tail: int | None = None,
+        deadline_s: float,
+    ) -> Iterator[str]:
+        """Yield the lines of a container of a replica's newest pod.
+
+        Args:
+            name: of the job.
+            replica: its number.
+            container: `trainer`, `ros-master`, or `sim-<group>-<number>`.
+            follow: wait for more until the container has ended.
+            tail: the last so many lines only; None: all that the node has kept.
+            deadline_s: for all of it.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+            NoPod: the replica has no pod, or its container did not start.
+        """
+        job = self.get(name)
+        pod = next((each.pod for each in job.status.replicas if each.index == replica), None)
+        if pod is None:
+            raise NoPod(
+                f"job {name}: replica {replica} has no pod; "
+                f"the job has {job.spec.replicas}, and `palaestra describe {name}` tells what they wait for"
+            )
+        try:
+            yield from self.api.logs(
+                self.namespace, pod.name, container, follow=follow, tail=tail, within_s=deadline_s
+            )
+        except NotFound as error:
+            raise NoPod(
+                f"pod {pod.name}: is gone, and its log with it; "
+                f"`palaestra describe {name}` has the last lines of an attempt that has ended"
+            ) from error
+        except Invalid as error:
+            raise NoPod(
+                f"pod {pod.name}: {error.message}; `palaestra describe {name}` names what it waits for"
+            ) from error
+
+    def events(self, name: str) -> tuple[Happening, ...]:
+        """Return the events about a job and about what was made for it, oldest first.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+        """
+        return happenings(self.api, self.get(name))
+
+    def suspend(self, name: str) -> TrainingJob:
+        """Let the pods of a job be deleted after a checkpoint; raises as `resume`."""
+        return self._suspended(name, suspend=True)
+
+    def resume(self, name: str) -> TrainingJob:
+        """Let a suspended job go on.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+            Invalid: its queue decides.
+        """
+        return self._suspended(name, suspend=False)
+
+    def delete(self, name: str, *, deadline_s: float | None = None) -> None:
+        """Delete a job and its pods; with a deadline, wait until it is gone. Claims stay with `retain: Keep`.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+            TookTooLong: it is still there after `deadline_s`.
+        """
+        found = self.raw(name)
+        propagation = "Background" if deadline_s is None else "Foreground"
+        self.api.delete(
+            TRAINING_JOBS, self.namespace, name, uid=found["metadata"]["uid"], propagation=propagation
+        )
+        if deadline_s is not None:
+            deadline = time.monotonic() + deadline_s
+            for _ in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
+                pass
+
+    def fetch(self, name: str, *, replica: int = 0, into: Path, deadline_s: float = FETCH_S) -> Path:
+        """Copy policy, evaluations and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
+
+        Needs the rights to make and delete pods and to run commands in them.
+
+        Raises:
+            NoSuchJob: there is none of that name.
+            NotFetched: the folder is there already, the run is not, or it cannot be read.
+            TookTooLong: it took more than `deadline_s`; nothing was written.
+        """
+        deadline = time.monotonic() + deadline_s
+        return fetch(self.api, self.get(name), replica, into, deadline=deadline)
+
+    def _suspended(self, name: str, *, suspend: bool) -> TrainingJob:
+        try:
+            return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, {"spec": {"suspend": suspend}}))
+        except NotFound as error:
+            raise self._none(name) from error
+
+    def _none(self, name: str) -> NoSuchJob:
+        return NoSuchJob(
+            f"job {name}: there is none in namespace {self.namespace}; "
+            "`palaestra get` lists those of a namespace, -A those of all"
+        )
+
+
+def _data(job: TrainingJob | Mapping[str, Any] | Path) -> Any:
+    """Return a job as plain data, as far as it was given."""
+    if isinstance(job, TrainingJob):
+        given = job.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"status"})
+        return {**given, "apiVersion": API_VERSION, "kind": KIND}
+    if isinstance(job, Path):
+        try:
+            return read(job.read_text(encoding="utf-8"), str(job))
+        except NotYaml as error:
+            raise SpecErrors(str(job), (error.problem,)) from None
+    return job
+
+
+def _job(found: Object) -> TrainingJob:
+    return validate(found, found["metadata"]["name"])

@@ -1,0 +1,252 @@
+"""Copy a run's results out of its volume: from the pod that runs, or with a pod of its own.
+
+The folder is written whole or not at all: beside its place first, then renamed. Why a command in a container
+carries it, docs/decisions/0011 says.
+"""
+
+import io
+import secrets
+import shutil
+import tarfile
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from palaestra.api import TrainingJob
+from palaestra.api.status import Phase
+from palaestra.client.errors import ClientError, NotFetched, TookTooLong
+from palaestra.client.following import changes
+from palaestra.client.reading_pod import CONTAINER, reading_pod, run_directory
+from palaestra.cluster import Api, ApiError, CommandFailed, NotFound
+from palaestra.cluster.api import Object
+from palaestra.cluster.resources import JOBS, PODS
+from palaestra.plan.replica import TRAINER
+
+PARTS = (
+    "training.yaml",
+    "model.zip",
+    "evaluations.jsonl",
+    "summary.json",
+    "attempts.jsonl",
+    "tensorboard",
+)
+GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # a replica that has no pod is about to get one
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A container that sees a run directory."""
+
+    namespace: str
+    pod: str
+    container: str
+    directory: str
+
+
+def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: float) -> Path:
+    """Return the new folder `into/<job>/<replica>`: policy, evaluations and TensorBoard data of a run.
+
+    Raises:
+        NotFetched: the folder is there already, the run is not, or it cannot be read or written.
+        TookTooLong: the deadline, on the monotonic clock, passed.
+        ApiError: the API server refuses.
+    """
+    target = into / job.metadata.name / str(replica)
+    if target.exists():
+        raise NotFetched(f"{target}: is there already; move it away, or name another folder")
+    with _source(api, job, replica, deadline) as source:
+        try:
+            _copy(api, source, target, deadline)
+        except (ApiError, ClientError):  # some of which are OSErrors too
+            raise
+        except CommandFailed as error:
+            raise NotFetched(
+                f"{source.directory} in pod {source.pod}: cannot be read ({error}); "
+                "type the same command when the run has ended"
+            ) from error
+        except (OSError, tarfile.TarError) as error:
+            raise NotFetched(f"{target}: {error}; choose a folder that can be written") from error
+    return target
+
+
+def _copy(api: Api, source: Source, target: Path, deadline: float) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    program = files("palaestra.client").joinpath("packing.py").read_text(encoding="utf-8")
+    command = ["python3", "-I", "-c", program, source.directory, *PARTS]
+    chunks = api.execute(
+        source.namespace, source.pod, source.container, command, within_s=deadline - time.monotonic()
+    )
+    with tempfile.TemporaryDirectory(prefix=".fetch-", dir=target.parent) as beside:
+        partial = Path(beside) / "run"
+        partial.mkdir()
+        unpack(chunks, partial)
+        if not any(partial.iterdir()):
+            raise NotFetched(
+                f"{source.directory} in pod {source.pod}: holds nothing yet; "
+                "try again after the first evaluation"
+            )
+        partial.rename(target)
+
+
+def unpack(chunks: Iterator[bytes], into: Path) -> None:
+    """Write the files of a tar that comes in chunks into a folder, and read it to its end.
+
+    Raises:
+        TarError: it is no tar, or a member of it is no file, or would land elsewhere.
+        OSError: a file cannot be written.
+    """
+    with tarfile.open(fileobj=_Stream(chunks), mode="r|") as tar:
+        for member in tar:
+            path = PurePosixPath(member.name)
+            content = tar.extractfile(member) if member.isfile() else None
+            if content is None or path.is_absolute() or ".." in path.parts:
+                raise tarfile.ExtractError(f"{member.name} is not a file of the run")
+            file = into / path
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with content, file.open("xb") as target:
+                shutil.copyfileobj(content, target)
+    for _ in chunks:  # the word about success comes last
+        pass
+
+
+class _Stream(io.RawIOBase):
+    """Chunks that come one by one, as a file that is read."""
+
+    def __init__(self, chunks: Iterator[bytes]) -> None:
+        self._chunks = chunks
+        self._rest = b""
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill the buffer with what has come and return how much that is; 0 at the end."""
+        while not self._rest:
+            try:
+                self._rest = next(self._chunks)
+            except StopIteration:
+                return 0
+        size = min(len(buffer), len(self._rest))
+        buffer[:size], self._rest = self._rest[:size], self._rest[size:]
+        return size
+
+
+@contextmanager
+def _source(api: Api, job: TrainingJob, replica: int, deadline: float) -> Iterator[Source]:
+    """Lend a container that sees the run: the trainer while it runs, else one that is made for it."""
+    template = _template(api, job, replica)
+    directory = run_directory(template)
+    running = _running(api, job, replica)
+    if running is not None:
+        yield Source(namespace=job.metadata.namespace, pod=running, container=TRAINER, directory=directory)
+        return
+    if job.spec.storage.ephemeral:
+        raise NotFetched(
+            f"job {job.metadata.name}: spec.storage.ephemeral: the run went with its pod; "
+            "fetch while it runs, or make the next job without it"
+        )
+    with _reader(api, job, replica, template, deadline) as pod:
+        yield Source(namespace=job.metadata.namespace, pod=pod, container=CONTAINER, directory=directory)
+
+
+def _template(api: Api, job: TrainingJob, replica: int) -> Object:
+    name = f"{job.metadata.name}-{replica}"
+    try:
+        template: Object = api.get(JOBS, job.metadata.namespace, name)["spec"]["template"]
+    except NotFound:
+        raise NotFetched(
+            f"job {job.metadata.name}: replica {replica} was not planned, so it has no run; "
+            f"the job has {job.spec.replicas}, and `palaestra describe` tells why one is not begun"
+        ) from None
+    return template
+
+
+def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
+    """Return the name of the replica's pod if it runs, None if it has ended.
+
+    Raises:
+        NotFetched: it is about to start, so its volume must be left to it, or is just ending.
+    """
+    known = next((each for each in job.status.replicas if each.index == replica), None)
+    name = known.pod.name if known is not None and known.pod is not None else None
+    status = _status(api, job.metadata.namespace, name) if name is not None else {}
+    phase = status.get("phase")
+    if phase == "Pending":
+        raise NotFetched(
+            f"pod {name}: is about to start, and its volume may not be held by another; "
+            "type the same command when it runs"
+        )
+    if phase == "Running" and _trainer_ended(status):  # and the pod's simulators are stopped
+        raise NotFetched(f"pod {name}: its trainer has just ended; type the same command in a minute")
+    if phase == "Running":
+        return name
+    if phase != "Succeeded" and known is not None and known.phase in GOES_ON:
+        again = " again" if name is not None else ""
+        raise NotFetched(
+            f"job {job.metadata.name}: replica {replica} is about to be started{again}, and its volume may "
+            "not be held by another; type the same command when it runs"
+        )
+    return None
+
+
+def _status(api: Api, namespace: str, name: str) -> Object:
+    """Return the status of a pod; of one that is gone, nothing."""
+    try:
+        status: Object = api.get(PODS, namespace, name)["status"]
+    except NotFound:
+        return {}
+    return status
+
+
+def _trainer_ended(status: Object) -> bool:
+    containers = status.get("containerStatuses", ())
+    return any(each["name"] == TRAINER and "terminated" in (each.get("state") or {}) for each in containers)
+
+
+@contextmanager
+def _reader(api: Api, job: TrainingJob, replica: int, template: Object, deadline: float) -> Iterator[str]:
+    """Lend a pod that reads the volume; it is deleted however this ends, and ends by itself if we do not."""
+    name = f"{job.metadata.name}-{replica}-fetch-{secrets.token_hex(3)}"
+    lives_s = max(round(deadline - time.monotonic()), 1)
+    made = api.create(PODS, reading_pod(job, template, name, lives_s))
+    try:
+        _await(api, made, deadline)
+        yield name
+    finally:
+        with suppress(NotFound):
+            api.delete(PODS, job.metadata.namespace, name, uid=made["metadata"]["uid"])
+
+
+def _await(api: Api, pod: Object, deadline: float) -> None:
+    """Wait until a pod runs."""
+    namespace, name = pod["metadata"]["namespace"], pod["metadata"]["name"]
+    why = ""
+    try:
+        for each in changes(api, PODS, namespace, name, deadline=deadline):
+            phase = each["status"].get("phase")
+            if phase == "Running":
+                return
+            if phase in {"Succeeded", "Failed"}:
+                break
+            why = hindrance(each) or why
+    except TookTooLong:
+        raise TookTooLong(
+            f"pod {name}: did not start in time ({why or 'nothing is told of it'}); "
+            "remove what hinders it, or allow more time with --timeout"
+        ) from None
+    raise NotFetched(f"pod {name}: was deleted or ended before it was used; type the same command again")
+
+
+def hindrance(pod: Object) -> str:
+    """Return what keeps a pod from running, in the cluster's words; empty: nothing is told."""
+    status = pod["status"]
+    waiting = [(each.get("state") or {}).get("waiting") for each in status.get("containerStatuses", ())]
+    unmet = [each for each in status.get("conditions", ()) if each.get("status") == "False"]
+    told = [each for each in (*waiting, *unmet) if each and each.get("message")]
+    return f"{told[0].get('reason')}: {told[0]['message']}" if told else ""

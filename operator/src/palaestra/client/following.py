@@ -1,0 +1,85 @@
+"""One object as it is and as it changes, until it is deleted or a deadline passes.
+
+A watch that ends, breaks or is forgotten is begun again from what is there; what was told is not told twice.
+"""
+
+import threading
+import time
+from collections.abc import Iterator
+
+from palaestra.client.errors import TookTooLong
+from palaestra.cluster import Api, ApiError, Resource
+from palaestra.cluster.api import Object
+
+LONGEST_WATCH_S = 300.0
+DELETED, BOOKMARK = "DELETED", "BOOKMARK"
+
+
+class _Gone(Exception):
+    """The object is not there."""
+
+
+def changes(api: Api, resource: Resource, namespace: str, name: str, *, deadline: float) -> Iterator[Object]:
+    """Yield the object as it is now, then after each change; ends where there is none, or none any more.
+
+    Another object that has taken its name since is not it.
+
+    Args:
+        api: the cluster.
+        resource: its kind.
+        namespace: where it is.
+        name: which one.
+        deadline: on the monotonic clock.
+
+    Raises:
+        TookTooLong: the deadline passed.
+        ApiError: the API server refuses; what may pass is tried again once the object was seen.
+    """
+    uid, told, failures = "", "", 0
+    while True:
+        try:
+            for found in _until_the_watch_ends(api, resource, namespace, name, deadline):
+                failures = 0
+                uid = uid or found["metadata"]["uid"]
+                if found["metadata"]["uid"] != uid:
+                    return
+                if _version(found) != told:
+                    told = _version(found)
+                    yield found
+        except _Gone:
+            return
+        except ApiError as error:
+            if not (error.retryable and told):
+                raise
+        failures += 1
+        threading.Event().wait(min(api.limits.again.wait_s(failures), _left(deadline)))
+        if not _left(deadline):
+            raise TookTooLong(
+                f"{resource.kind} {name}: did not come to what was waited for in time; "
+                f"wait longer, or look at it with `kubectl describe {resource.plural} {name}`"
+            )
+
+
+def _until_the_watch_ends(
+    api: Api, resource: Resource, namespace: str, name: str, deadline: float
+) -> Iterator[Object]:
+    """Yield the object as it is, then after each change; raises _Gone."""
+    only = f"metadata.name={name}"
+    [page] = api.pages(resource, namespace, fields=only)
+    if not page.items:
+        raise _Gone
+    yield page.items[0]
+    seconds = min(_left(deadline), LONGEST_WATCH_S)
+    for event in api.watch(resource, namespace, version=page.version, fields=only, seconds=seconds):
+        if event["type"] == DELETED:
+            raise _Gone
+        if event["type"] != BOOKMARK:
+            yield event["object"]
+
+
+def _version(found: Object) -> str:
+    return str(found["metadata"]["resourceVersion"])
+
+
+def _left(deadline: float) -> float:
+    return max(deadline - time.monotonic(), 0.0)

@@ -1,0 +1,69 @@
+"""The events about a TrainingJob and about what was made for it, oldest first."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from palaestra.api import TrainingJob
+from palaestra.api.job import KIND
+from palaestra.cluster import Api
+from palaestra.cluster.resources import EVENTS
+
+MADE_FOR_REPLICAS = {"Job", "Pod", "PersistentVolumeClaim", "ConfigMap"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Happening:
+    """One event.
+
+    Attributes:
+        time: when it happened last.
+        warning: whether it is more than news.
+        about: kind and name: `Pod/job-0-x7k2p`.
+        reason: what, in one word; for those about the TrainingJob see docs/operations.md.
+        message: what, in a sentence.
+        count: how often.
+    """
+
+    time: datetime
+    warning: bool
+    about: str
+    reason: str
+    message: str
+    count: int
+
+
+def happenings(api: Api, job: TrainingJob) -> tuple[Happening, ...]:
+    """Return what is known of a job's past; a cluster forgets events after an hour.
+
+    Raises:
+        ApiError: the API server refuses.
+    """
+    events = api.list(EVENTS, job.metadata.namespace)
+    return tuple(sorted((_read(each) for each in events if concerns(each, job)), key=lambda each: each.time))
+
+
+def concerns(event: Mapping[str, Any], job: TrainingJob) -> bool:
+    """Return whether an event is about this job, or about a child, pod or claim of a replica of it."""
+    about = event["involvedObject"]
+    kind, name, uid = about.get("kind"), about.get("name", ""), about.get("uid")
+    if kind == KIND:
+        return name == job.metadata.name and uid in {None, job.metadata.uid}
+    # The pods of a Job end in five characters of Kubernetes' choice, claims and ConfigMaps in a uid.
+    replica = rf"{re.escape(job.metadata.name)}-[0-9]+(-[a-z0-9]{{5}}|-{re.escape(job.metadata.uid or '')})?"
+    return kind in MADE_FOR_REPLICAS and re.fullmatch(replica, name) is not None
+
+
+def _read(event: Mapping[str, Any]) -> Happening:
+    about = event["involvedObject"]
+    times = (event.get("lastTimestamp"), event.get("eventTime"), event["metadata"]["creationTimestamp"])
+    return Happening(
+        time=datetime.fromisoformat(next(each for each in times if each)),
+        warning=event.get("type") == "Warning",
+        about=f"{about.get('kind')}/{about.get('name')}",
+        reason=str(event.get("reason") or ""),
+        message=str(event.get("message") or ""),
+        count=int(event.get("count") or 1),
+    )

@@ -1,0 +1,74 @@
+"""The pod with which the volume of a run is read when its own pod has ended.
+
+Pure. It is made from the template of the replica's Job, as that stands in the cluster: so it is secured,
+scheduled and pulled as the pods of the run were, with the trainer's image that the job has kept. It can
+only read the volume, holds no token, and ends by itself though nobody deletes it.
+"""
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+from palaestra.api import TrainingJob
+from palaestra.plan.replica import TRAINER, owner
+
+CONTAINER = "reader"
+VOLUME = "run"
+FETCH_LABEL = "palaestra.dev/fetch"
+RUN_VARIABLE = "PALAESTRA_RUN"
+GRACE_S = 1
+RESOURCES = {"requests": {"cpu": "10m", "memory": "32Mi"}, "limits": {"memory": "96Mi"}}
+
+
+def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_s: int) -> dict[str, Any]:
+    """Return the pod; it goes with the TrainingJob.
+
+    Args:
+        job: whose run is read.
+        template: the pod template of the replica's Job.
+        name: of the pod, different each time.
+        lives_s: whole seconds after which it ends by itself.
+    """
+    spec = copy.deepcopy(dict(template["spec"]))
+    trainer = trainer_of(template)
+    spec.pop("initContainers", None)
+    spec |= {
+        "activeDeadlineSeconds": lives_s,
+        "terminationGracePeriodSeconds": GRACE_S,
+        "volumes": [each for each in spec["volumes"] if each["name"] == VOLUME],
+        "containers": [
+            {
+                "name": CONTAINER,
+                "image": trainer["image"],
+                "imagePullPolicy": trainer["imagePullPolicy"],
+                "command": ["sleep", str(lives_s)],
+                "securityContext": trainer["securityContext"],
+                "resources": RESOURCES,
+                "volumeMounts": [
+                    {**each, "readOnly": True} for each in trainer["volumeMounts"] if each["name"] == VOLUME
+                ],
+            }
+        ],
+    }
+    labels = {"app.kubernetes.io/managed-by": "palaestra", FETCH_LABEL: job.metadata.name}
+    return {
+        "apiVersion": "v1",
+        "kind": "Pod",
+        "metadata": {
+            "name": name,
+            "namespace": job.metadata.namespace,
+            "labels": labels,
+            "ownerReferences": [{**owner(job), "controller": False, "blockOwnerDeletion": False}],
+        },
+        "spec": spec,
+    }
+
+
+def trainer_of(template: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the trainer's container."""
+    return next(each for each in template["spec"]["containers"] if each["name"] == TRAINER)
+
+
+def run_directory(template: Mapping[str, Any]) -> str:
+    """Return where the run lies for the trainer, and for the reading pod."""
+    return next(str(each["value"]) for each in trainer_of(template)["env"] if each["name"] == RUN_VARIABLE)

@@ -1,0 +1,135 @@
+"""A command in a container: what it writes, byte for byte, and how it ended.
+
+A websocket whose messages carry the number of a stream in their first byte. The API server tells at the end,
+on a stream of its own, whether the command succeeded: output without that word is not whole.
+"""
+
+import json
+import ssl
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+from urllib.parse import urlsplit
+
+import websocket
+from kubernetes.client.configuration import Configuration
+
+from palaestra.cluster.errors import SERVER_ERROR, ApiError, CommandFailed, Unreachable, from_status
+
+PROTOCOLS = ["v5.channel.k8s.io", "v4.channel.k8s.io"]
+STDOUT, STDERR, STATUS = 1, 2, 3
+MOST_STDERR = 4096  # bytes kept of it, the first ones: they name the cause
+EXIT_CODE = "ExitCode"
+UNKNOWN_CODE = -1
+
+
+def open_socket(
+    configuration: Configuration, url: str, headers: Mapping[str, str], wait_s: float
+) -> websocket.WebSocket:
+    """Return the socket on which a command runs, to be closed by the caller; a read waits `wait_s` at most.
+
+    Raises:
+        ApiError: the API server refuses, or cannot be reached.
+    """
+    try:
+        return websocket.create_connection(
+            url.replace("http", "ws", 1),
+            timeout=wait_s,
+            header=[f"{name}: {value}" for name, value in headers.items()],
+            subprotocols=PROTOCOLS,
+            sslopt=_tls(configuration),
+            suppress_origin=True,
+            skip_utf8_validation=True,
+            **_proxy(configuration),
+        )
+    except websocket.WebSocketBadStatusException as error:
+        raise from_status(error.status_code, _decoded(error.resp_body)) from error
+    except (websocket.WebSocketException, OSError) as error:
+        raise Unreachable(0, "Unreachable", f"{url.partition('?')[0]}: no answer ({error})") from error
+
+
+def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
+    """Yield what the command writes to its standard output, until it has succeeded.
+
+    Args:
+        socket: from `open_socket`; closed at the end.
+        deadline: on the monotonic clock, for all of it.
+
+    Raises:
+        CommandFailed: it ended with another code than 0.
+        ApiError: it could not be started.
+        Unreachable: the connection broke, or the command did not end in time.
+    """
+    said = bytearray()
+    try:
+        while True:
+            stream, content = _message(socket, deadline)
+            if stream == STDOUT:
+                yield content
+            elif stream == STDERR:
+                said += content[: MOST_STDERR - len(said)]
+            elif stream == STATUS:
+                if failure := _failure(_decoded(content), said.decode(errors="replace")):
+                    raise failure
+                return
+    finally:
+        # At once: a peer that is gone would not answer a farewell.
+        socket.shutdown()  # type: ignore[no-untyped-call]  # the library is half typed
+
+
+def _message(socket: websocket.WebSocket, deadline: float) -> tuple[int, bytes]:
+    left_s = deadline - time.monotonic()
+    if left_s <= 0:
+        raise Unreachable(0, "Timeout", "the command did not end in time")
+    socket.settimeout(left_s)
+    try:
+        opcode, frame = socket.recv_data_frame(control_frame=True)
+    except websocket.WebSocketTimeoutException as error:
+        raise Unreachable(0, "Timeout", "the command did not end in time") from error
+    except (websocket.WebSocketException, OSError) as error:
+        raise Unreachable(0, "Unreachable", f"the command's output broke off ({error})") from error
+    if opcode == websocket.ABNF.OPCODE_CLOSE:
+        raise Unreachable(0, "Unreachable", "the command's output broke off (the connection was closed)")
+    if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
+        return -1, b""  # a ping, which was answered, or nothing
+    return frame.data[0], frame.data[1:]
+
+
+def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError | None:
+    """Return why the command failed, None when it did not."""
+    if status.get("status") == "Success":
+        return None
+    causes = (status.get("details") or {}).get("causes") or ()
+    codes = [str(each.get("message")) for each in causes if each.get("reason") == EXIT_CODE]
+    if not codes:
+        return from_status(SERVER_ERROR, status)
+    return CommandFailed(int(codes[0]) if codes[0].isdecimal() else UNKNOWN_CODE, said.strip())
+
+
+def _decoded(body: bytes | str | None) -> dict[str, Any]:
+    try:
+        found = json.loads(body or b"")
+    except ValueError:  # a proxy in between speaks HTML
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _tls(configuration: Configuration) -> dict[str, Any]:
+    """Return what the client's configuration says of TLS, as the websocket library takes it."""
+    verified = configuration.verify_ssl
+    options = {
+        "cert_reqs": ssl.CERT_REQUIRED if verified else ssl.CERT_NONE,
+        "check_hostname": verified and configuration.assert_hostname is not False,
+        "ca_certs": configuration.ssl_ca_cert,
+        "certfile": configuration.cert_file,
+        "keyfile": configuration.key_file,
+        "server_hostname": configuration.tls_server_name,
+    }
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _proxy(configuration: Configuration) -> dict[str, Any]:
+    if not configuration.proxy:
+        return {}
+    address = urlsplit(configuration.proxy)
+    return {"http_proxy_host": address.hostname, "http_proxy_port": address.port, "proxy_type": "http"}

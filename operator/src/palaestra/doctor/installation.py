@@ -1,0 +1,124 @@
+"""The operator: is it there, does one lead, may it do its work, can it be measured?"""
+
+import time
+from collections.abc import Iterator
+
+from palaestra.client.errors import TookTooLong
+from palaestra.client.following import changes
+from palaestra.cluster import ApiError, Forbidden, NotFound
+from palaestra.cluster.api import Object
+from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS
+from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
+from palaestra.doctor.rights import OPERATOR, Account, allowed
+from palaestra.operator.options import NAME
+from palaestra.plan.network_policy import OPERATOR_LABEL
+
+LOGS = "`kubectl logs -n {namespace} deploy/{name}` says why"
+NOT_ELECTED = "--no-leader-elect"
+PORT_NAME = "metrics"
+RENEWED_WITHIN_S = 20.0  # a Lease lasts 15
+
+
+def runs(site: Site) -> Iterator[Finding]:
+    """Tell whether the operator is installed and ready."""
+    deployment = _deployment(site)
+    if deployment is None:
+        yield wrong(
+            "operator",
+            f"there is none in {site.operator_namespace}",
+            "install Palaestra, or name its namespace with --operator-namespace",
+        )
+        return
+    image = _container(deployment)["image"]
+    wanted = deployment["spec"].get("replicas", 1)
+    ready = deployment.get("status", {}).get("readyReplicas", 0)
+    fact = f"{ready} of {wanted} are ready in {site.operator_namespace}, image {image}"
+    yield right("operator", fact) if ready else wrong("operator", fact, _logs(site))
+
+
+def leads(site: Site) -> Iterator[Finding]:
+    """Tell whether one operator leads, by seeing it renew its Lease: no two clocks are compared."""
+    deployment = _deployment(site)
+    if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
+        yield right("leader", "there is no election")
+        return
+    deadline = time.monotonic() + RENEWED_WITHIN_S
+    seen = False
+    try:
+        for lease in changes(site.api, LEASES, site.operator_namespace, NAME, deadline=deadline):
+            holder = lease["spec"].get("holderIdentity")  # empty: its last leader gave it back
+            if seen and holder:
+                yield right("leader", f"is {holder}")
+                return
+            seen = True
+    except TookTooLong:
+        yield wrong("leader", f"the Lease {NAME} was not renewed for {RENEWED_WITHIN_S:.0f} s", _logs(site))
+        return
+    yield wrong("leader", f"there is no Lease {NAME} in {site.operator_namespace}", _logs(site))
+
+
+def operator_rights(site: Site) -> Iterator[Finding]:
+    """Tell what the operator's account may not do in the namespace of the person who asks."""
+    what, deployment = "operator's rights", _deployment(site)
+    name = deployment["spec"]["template"]["spec"]["serviceAccountName"] if deployment else NAME
+    account = Account(namespace=site.operator_namespace, name=name)
+    missing = [
+        said
+        for each in OPERATOR
+        for said, attributes in each.asked(site.namespace)
+        if not allowed(site, attributes, account=account)
+    ]
+    if missing:
+        yield wrong(
+            what,
+            f"service account {name} may not {', '.join(missing)} in {site.namespace}",
+            "install the roles of this release, for this namespace too",
+        )
+    else:
+        yield right(what, f"suffice in {site.namespace}")
+
+
+def metrics(site: Site) -> Iterator[Finding]:
+    """Tell whether an operator answers with its metrics, asked by way of the API server."""
+    pods = site.api.list(PODS, site.operator_namespace, labels=f"{OPERATOR_LABEL}=true")
+    running = [each for each in pods if each["status"].get("phase") == "Running"]
+    if not running:
+        yield wrong("metrics", f"no operator runs in {site.operator_namespace}", _logs(site))
+        return
+    name, port = running[0]["metadata"]["name"], _port(running[0])
+    try:
+        text = site.api.proxied(site.operator_namespace, name, port, "metrics")
+    except Forbidden:
+        raise
+    except ApiError as error:
+        yield unknown(
+            "metrics",
+            f"port {port} of pod {name} does not answer the API server: {error}",
+            "a NetworkPolicy may let Prometheus in alone: look at its targets; else " + _logs(site),
+        )
+        return
+    if "palaestra_" in text:
+        yield right("metrics", f"are at port {port} of pod {name}")
+    else:
+        yield wrong("metrics", f"port {port} of pod {name} serves something else", _logs(site))
+
+
+def _deployment(site: Site) -> Object | None:
+    try:
+        return site.api.get(DEPLOYMENTS, site.operator_namespace, NAME)
+    except NotFound:
+        return None
+
+
+def _container(deployment: Object) -> Object:
+    container: Object = deployment["spec"]["template"]["spec"]["containers"][0]
+    return container
+
+
+def _port(pod: Object) -> int:
+    ports = [port for each in pod["spec"]["containers"] for port in each.get("ports", ())]
+    return next(int(port["containerPort"]) for port in ports if port.get("name") == PORT_NAME)
+
+
+def _logs(site: Site) -> str:
+    return LOGS.format(namespace=site.operator_namespace, name=NAME)

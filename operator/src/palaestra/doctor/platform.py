@@ -1,0 +1,157 @@
+"""The cluster itself: is it new enough, does it leave sidecars as they are, can it keep runs?"""
+
+import re
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from typing import Any
+
+from palaestra.api.crd import crd
+from palaestra.api.job import API_VERSION
+from palaestra.client.reading_pod import RESOURCES
+from palaestra.cluster import Forbidden, Invalid
+from palaestra.cluster.resources import DEFINITIONS, NODES, PODS, STORAGE_CLASSES
+from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
+from palaestra.plan import Images
+from palaestra.plan.containers import SECURITY
+from palaestra.plan.pod import USER
+
+FIRST = (1, 33)
+DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"
+NO_ROOM = "exceeded quota"
+
+Object = dict[str, Any]
+
+
+def answers(site: Site) -> Iterator[Finding]:
+    """Tell whether the API server answers, and knows sidecar containers."""
+    yield judged_version("API server", site.api.version())
+
+
+def nodes(site: Site) -> Iterator[Finding]:
+    """Tell whether the oldest kubelet knows sidecar containers."""
+    versions = [each["status"]["nodeInfo"]["kubeletVersion"] for each in site.api.list(NODES)]
+    if not versions:
+        yield wrong("nodes", "there is none", "add a node, so that pods can run")
+        return
+    yield judged_version("nodes", min(versions, key=release))
+
+
+def judged_version(what: str, text: str) -> Finding:
+    """Return what a version such as `v1.33.2+k3s1` means for sidecar containers."""
+    if release(text) < FIRST:
+        fact = f"{text} is older than 1.33, from which on sidecar containers are there for good"
+        return wrong(what, fact, "update to 1.33 or newer")
+    return right(what, f"{text} knows sidecar containers")
+
+
+def release(text: str) -> tuple[int, int]:
+    """Return major and minor of a version, (0, 0) for what is none."""
+    found = re.match(r"v?(\d+)\.(\d+)", text)
+    return (int(found[1]), int(found[2])) if found else (0, 0)
+
+
+def definition(site: Site) -> Iterator[Finding]:
+    """Tell whether the cluster knows TrainingJobs, and as this release does."""
+    what, remedy = "TrainingJobs", "`palaestra crd | kubectl apply --server-side -f -`"
+    if not site.api.serves(API_VERSION):
+        yield wrong(what, f"the cluster does not know {API_VERSION}", remedy)
+        return
+    ours = crd()
+    found = site.api.get(DEFINITIONS, None, ours["metadata"]["name"])
+    place = difference(ours["spec"], found["spec"], "spec")
+    if place:
+        yield wrong(
+            what,
+            f"their CustomResourceDefinition is not that of {version('palaestra')}: {place} differs",
+            f"{remedy}, or use the command line of the installed release",
+        )
+    else:
+        yield right(what, f"are known as {version('palaestra')} knows them")
+
+
+def difference(ours: Any, found: Any, path: str) -> str | None:
+    """Return the path of the first part of `ours` that is not so in `found`, which may hold more."""
+    if isinstance(ours, Mapping) and isinstance(found, Mapping):
+        pairs = [(f"{path}.{key}", value, found.get(key)) for key, value in ours.items()]
+    elif isinstance(ours, list) and isinstance(found, list) and len(ours) == len(found):
+        pairs = [(f"{path}[{i}]", *pair) for i, pair in enumerate(zip(ours, found, strict=True))]
+    else:
+        return None if ours == found else path
+    return next((place for name, one, other in pairs if (place := difference(one, other, name))), None)
+
+
+def sidecars(site: Site) -> Iterator[Finding]:
+    """Tell whether everything that pods pass through leaves their sidecars sidecars: by a dry run."""
+    what = "sidecars"
+    try:
+        made = site.api.create(PODS, trial_pod(site.namespace), dry_run=True)
+    except Forbidden as error:
+        if error.lacks_right:
+            raise
+        if NO_ROOM in error.message:
+            yield unknown(what, f"could not be tried: {error.message}", "try again when there is room")
+            return
+        yield wrong(
+            what,
+            f"a pod as jobs have them is refused in {site.namespace}: {error.message}",
+            "allow what it names",
+        )
+    except Invalid as error:  # a webhook with side effects takes part in no dry run
+        yield unknown(what, f"could not be tried: {error.message}", "start a job; its status would tell")
+    else:
+        yield judged_pod(made)
+
+
+def judged_pod(made: Object) -> Finding:
+    """Return what came of the trial pod's sidecar."""
+    found = {each["name"]: each.get("restartPolicy") for each in made["spec"].get("initContainers", ())}
+    if found.get("sidecar") == "Always":
+        return right("sidecars", "stay as they are on their way to the nodes")
+    return wrong(
+        "sidecars",
+        "something on the way drops restartPolicy of init containers: no pod of a job would get ready",
+        "update or remove the mutating webhook: `kubectl get mutatingwebhookconfigurations`",
+    )
+
+
+def trial_pod(namespace: str) -> Object:
+    """Return a pod that is never made: restricted, with one sidecar."""
+    image = Images.of_release(version("palaestra")).trainer
+    common = {"image": image, "command": ["true"], "securityContext": SECURITY, "resources": RESOURCES}
+    security = {
+        "runAsNonRoot": True,
+        "runAsUser": USER,
+        "runAsGroup": USER,
+        "seccompProfile": {"type": "RuntimeDefault"},
+    }
+    return {
+        "apiVersion": "v1",
+        "kind": "Pod",
+        "metadata": {"name": "palaestra-doctor", "namespace": namespace},
+        "spec": {
+            "restartPolicy": "Never",
+            "automountServiceAccountToken": False,
+            "securityContext": security,
+            "initContainers": [{"name": "sidecar", "restartPolicy": "Always", **common}],
+            "containers": [{"name": "trainer", **common}],
+        },
+    }
+
+
+def storage(site: Site) -> Iterator[Finding]:
+    """Tell whether a claim that names no class gets a volume."""
+    classes = site.api.list(STORAGE_CLASSES)
+    default = [
+        each["metadata"]["name"]
+        for each in classes
+        if (each["metadata"].get("annotations") or {}).get(DEFAULT_CLASS) == "true"
+    ]
+    if default:
+        yield right("storage class", f"{default[0]} is the default")
+        return
+    names = ", ".join(each["metadata"]["name"] for each in classes)
+    yield wrong(
+        "storage class",
+        f"none is the default; there is {names}" if names else "there is none",
+        f"annotate one with {DEFAULT_CLASS}=true, or name one in spec.storage.storageClassName of each job",
+    )

@@ -1,0 +1,23 @@
+"""How long, in the two largest units: `45s`, `3m12s`, `2h5m`, `3d4h`."""
+
+from datetime import datetime
+
+MINUTE, HOUR, DAY = 60, 3600, 86_400
+UNITS = (("d", DAY), ("h", HOUR), ("m", MINUTE), ("s", 1))
+
+
+def short(seconds: float) -> str:
+    """Return a duration as people read it; 0s for what is less than a second, or lies ahead."""
+    left = max(int(seconds), 0)
+    parts: list[tuple[int, str]] = []
+    for unit, size in UNITS:
+        if left >= size or parts:
+            parts.append((left // size, unit))
+            left %= size
+    told = [f"{count}{unit}" for count, unit in parts[:2] if count]
+    return "".join(told) or "0s"
+
+
+def ago(moment: datetime | None, now: datetime) -> str:
+    """Return how long ago a moment was; empty where there is none."""
+    return "" if moment is None else f"{short((now - moment).total_seconds())} ago"

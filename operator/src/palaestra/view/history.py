@@ -1,0 +1,49 @@
+"""What a job's figures were, as far back as somebody has watched."""
+
+from collections import defaultdict, deque
+from dataclasses import dataclass
+
+from palaestra.api import Status
+from palaestra.api.status import ReplicaStatus
+
+MOST = 40  # of each figure: as many as fit into a line beside the others
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """The figures of a replica at one step; None: not known then."""
+
+    step: int
+    steps_per_second: float | None
+    success_rate: float | None
+    mean_return: float | None
+
+    @classmethod
+    def of(cls, replica: ReplicaStatus) -> "Figures | None":
+        """Return the figures of a replica, None before its first step."""
+        if replica.step is None:
+            return None
+        return cls(
+            step=replica.step,
+            steps_per_second=replica.steps_per_second,
+            success_rate=replica.success_rate,
+            mean_return=replica.mean_return,
+        )
+
+
+class History:
+    """The last figures of each replica of one job."""
+
+    def __init__(self) -> None:
+        self._figures: defaultdict[int, deque[Figures]] = defaultdict(lambda: deque(maxlen=MOST))
+
+    def add(self, status: Status) -> None:
+        """Take notice of a status; what did not move since the last one is left out."""
+        for replica in status.replicas:
+            figures, known = Figures.of(replica), self._figures[replica.index]
+            if figures is not None and (not known or known[-1] != figures):
+                known.append(figures)
+
+    def of(self, replica: int) -> tuple[Figures, ...]:
+        """Return the figures of a replica, oldest first."""
+        return tuple(self._figures[replica])

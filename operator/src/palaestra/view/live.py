@@ -1,0 +1,91 @@
+"""A job as it moves: what `palaestra watch` draws again each second."""
+
+from datetime import datetime
+
+from rich.console import Group, RenderableType
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from palaestra.api import TrainingJob
+from palaestra.api.status import Phase, ReplicaStatus
+from palaestra.client import why
+from palaestra.view.describe import progress
+from palaestra.view.durations import ago
+from palaestra.view.history import Figures, History
+from palaestra.view.sparkline import sparkline
+
+COLOURS = {
+    Phase.PENDING: "yellow",
+    Phase.RUNNING: "cyan",
+    Phase.SUSPENDED: "yellow",
+    Phase.SUCCEEDED: "green",
+    Phase.FAILED: "red",
+}
+BAR = 60
+
+
+def live(job: TrainingJob, history: History, now: datetime) -> Group:
+    """Return what is drawn of a job; figures are as old as its status, ages are of `now`."""
+    status = job.status
+    phase = str(status.phase or "not seen by an operator yet")
+    heading = Text.assemble((job.metadata.name, "bold"), "  ", (phase, _colour(status.phase)))
+    heading.append(f"  {status.running} replicas" if status.running else "")
+    heading.append(f"  began {ago(status.start_time, now)}" if status.start_time else "")
+    parts: list[RenderableType] = [heading, Text(why(status), style="dim")]
+    for replica in status.replicas:
+        parts += [Text(), *_replica(replica, history.of(replica.index), now)]
+    return Group(*parts)
+
+
+def _replica(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> list[RenderableType]:
+    heading = Text.assemble(f"replica {replica.index}  ", (replica.phase, _colour(replica.phase)))
+    heading.append(f"  attempt {replica.attempt}" if replica.attempt else "")
+    told = ": ".join(each for each in (replica.reason, replica.message) if each)
+    parts: list[RenderableType] = [heading]
+    if told:
+        parts.append(Text(told, style="dim"))
+    if replica.step is not None:
+        parts += [_bar(replica.step, replica.target), Text(progress(replica))]
+    return [*parts, _figures(replica, figures, now)]
+
+
+def _bar(step: int, target: int | None) -> Table:
+    """Return the bar as a line of its own, empty where there is no target."""
+    line = Table.grid()
+    if target:
+        line.add_row(ProgressBar(total=target, completed=step, width=BAR, complete_style="cyan"))
+    return line
+
+
+def _figures(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> Table:
+    grid = Table.grid(padding=(0, 2))
+    rates = sparkline([each.steps_per_second for each in figures], lowest=0.0)
+    success = sparkline([each.success_rate for each in figures], lowest=0.0, highest=1.0)
+    returns = sparkline([each.mean_return for each in figures])
+    rows = (
+        ("success", _shown(replica.success_rate, "{:.0%}"), success),
+        ("return", _shown(replica.mean_return, "{:.4g}"), returns),
+        ("steps/s", _shown(replica.steps_per_second, "{:.0f}"), rates),
+    )
+    for name, told, line in rows:
+        if told:
+            grid.add_row(name, told, Text(line, style="cyan"))
+    if replica.last_checkpoint:
+        grid.add_row("checkpoint", ago(replica.last_checkpoint.time, now))
+    if replica.simulators:
+        grid.add_row("simulators", _simulators(replica))
+    return grid
+
+
+def _shown(value: float | None, form: str) -> str:
+    return "" if value is None else form.format(value)
+
+
+def _simulators(replica: ReplicaStatus) -> str:
+    ready = sum(each.state == "ready" and not each.given_up for each in replica.simulators)
+    return f"{ready}/{len(replica.simulators)}, {replica.restarts.simulator} restarts"
+
+
+def _colour(phase: Phase | None) -> str:
+    return COLOURS[phase] if phase else "dim"

@@ -1,0 +1,40 @@
+"""Rows under headings, as wide as they need to be."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+GAP = "   "
+NOTHING = "-"
+
+
+def lines_of(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return one line a row, its cells below each other; the last column is as long as it is."""
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    return [
+        GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+
+
+def server_table(table: Mapping[str, Any], *, wide: bool = False, namespaces: bool = False) -> list[str]:
+    """Return the lines of a `Table` that an API server made: the columns that the CRD names.
+
+    Args:
+        table: its answer.
+        wide: with the columns that are left out where there is little room.
+        namespaces: with a first column for the namespace.
+    """
+    shown = [
+        place
+        for place, column in enumerate(table["columnDefinitions"])
+        if wide or not column.get("priority", 0)
+    ]
+    headings = [table["columnDefinitions"][place]["name"].upper() for place in shown]
+    rows = [headings] + [[_cell(row["cells"][place]) for place in shown] for row in table.get("rows") or ()]
+    if namespaces:
+        spaces = [row["object"]["metadata"]["namespace"] for row in table.get("rows") or ()]
+        rows = [[first, *row] for first, row in zip(["NAMESPACE", *spaces], rows, strict=True)]
+    return lines_of(rows)
+
+
+def _cell(value: object) -> str:
+    return NOTHING if value is None or value == "" else str(value)

@@ -1,0 +1,124 @@
+"""Logs and commands in containers: whole, or an error; a kubelet is played by a server that we script."""
+
+import json
+import time
+
+import pytest
+
+from palaestra.cluster import CommandFailed, Forbidden, Unreachable
+from tests.integration.apiserver.server import command, raw, refusal, stream
+
+SUCCESS = b"\x03" + json.dumps({"status": "Success"}).encode()
+FAILURE = (
+    b"\x03"
+    + json.dumps(
+        {
+            "status": "Failure",
+            "reason": "NonZeroExitCode",
+            "details": {"causes": [{"reason": "ExitCode", "message": "7"}]},
+        }
+    ).encode()
+)
+NOT_STARTED = (
+    b"\x03"
+    + json.dumps({"status": "Failure", "reason": "InternalError", "message": "no such program"}).encode()
+)
+
+
+def run(api, within_s=5.0):
+    """Return all that a command writes to standard output."""
+    return b"".join(api.execute("lab", "pod", "trainer", ["cat", "a b"], within_s=within_s))
+
+
+def test_output_arrives_byte_for_byte_without_what_was_said(rude):
+    """A tar is no text, and warnings are no part of it."""
+    rude.script.calls = [command(b"\x01\x00\xff\r\n", b"\x02warning", b"\x01\x01", SUCCESS)]
+
+    assert run(rude.api) == b"\x00\xff\r\n\x01"
+
+
+def test_a_command_is_asked_for_as_this_identity(rude):
+    """The right is `create pods/exec`."""
+    rude.script.calls = [command(SUCCESS)]
+
+    run(rude.api)
+
+    [asked] = rude.script.of(watches=False)
+    assert asked.path == "/api/v1/namespaces/lab/pods/pod/exec"
+    assert asked.query["container"] == "trainer"
+    assert asked.query["command"] == "a b"
+    assert asked.headers["Authorization"] == "Bearer my-token"
+
+
+def test_an_exit_code_comes_with_what_the_command_said(rude):
+    """What it wrote to standard error names the cause."""
+    rude.script.calls = [command(b"\x01half", b"\x02No such file", FAILURE)]
+
+    with pytest.raises(CommandFailed, match="exit code 7: No such file") as failed:
+        run(rude.api)
+    assert failed.value.code == 7
+
+
+def test_a_program_that_is_not_there_is_told_in_the_runtimes_words(rude):
+    """It has no exit code."""
+    rude.script.calls = [command(NOT_STARTED)]
+
+    with pytest.raises(OSError, match="no such program"):
+        run(rude.api)
+
+
+@pytest.mark.parametrize("ends", ["properly", "broken"])
+def test_output_without_the_word_about_success_is_not_whole(rude, ends):
+    """A node that dies closes connections properly, too."""
+    rude.script.calls = [command(b"\x01half", ends=ends)]
+
+    with pytest.raises(Unreachable, match="broke off"):
+        run(rude.api)
+
+
+def test_a_command_that_says_nothing_ends_at_its_deadline(rude):
+    """No connection is waited on for ever."""
+    rude.script.calls = [command(b"\x01half", ends="silent")]
+    began = time.monotonic()
+
+    with pytest.raises(Unreachable, match="did not end in time"):
+        run(rude.api, within_s=0.5)
+    assert time.monotonic() - began < 5
+
+
+def test_a_command_that_is_not_allowed_is_forbidden(rude):
+    """In the API server's words, though a websocket was asked for."""
+    rude.script.calls = [refusal(403, "Forbidden")]
+
+    with pytest.raises(Forbidden):
+        run(rude.api)
+
+
+def test_a_server_that_is_not_there_is_unreachable(rude):
+    """The command's text, which may be long, is left out of the line."""
+    rude.script.calls = [raw(b"", code=502)]
+
+    with pytest.raises(OSError, match="502"):
+        run(rude.api)
+
+
+def test_lines_of_a_log_come_one_by_one(rude):
+    """Also where a line comes in two pieces, and the last one has no end."""
+    rude.script.calls = [stream(b"one\ntw", b"o\nthr\xffee")]
+
+    lines = list(rude.api.logs("lab", "pod", "trainer", tail=3, within_s=5))
+
+    [asked] = rude.script.of(watches=False)
+    assert lines == ["one", "two", "thr\ufffdee"]
+    assert asked.path == "/api/v1/namespaces/lab/pods/pod/log"
+    assert asked.query == {"container": "trainer", "tailLines": "3"}
+
+
+def test_a_log_that_is_followed_ends_at_its_deadline(rude):
+    """What came before is not lost."""
+    rude.script.calls = [stream(b"one\n", ends="silent")]
+    lines = rude.api.logs("lab", "pod", "trainer", follow=True, within_s=0.5)
+
+    assert next(lines) == "one"
+    with pytest.raises(Unreachable):
+        next(lines)

@@ -1,0 +1,118 @@
+"""What commands make of answers that a real API server gives seldom; a scripted one gives them here."""
+
+import json
+
+import pytest
+
+from palaestra.cli import main
+from palaestra.cluster import connect
+from palaestra.doctor import Site
+from palaestra.doctor.installation import leads
+from tests.integration.apiserver.server import refusal, reply, serving, stream
+
+JOB = "apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: trial}\nspec: {}\n"
+NAMED = {"name": "trial-x7k2p", "namespace": "robots", "uid": "0d1f"}
+NO_RIGHT = 'trainingjobs.palaestra.dev is forbidden: User "me" cannot list resource "trainingjobs" in ...'
+NO_ROOM = "trainingjobs.palaestra.dev is forbidden: exceeded quota: few, requested: 1, used: 1, limited: 1"
+
+
+@pytest.fixture
+def server(tmp_path):
+    """The script of the server, and a kubeconfig whose context is in the namespace `robots`."""
+    with serving() as (address, script):
+        context = {"cluster": "c", "user": "u", "namespace": "robots"}
+        content = {
+            "current-context": "a",
+            "contexts": [{"name": "a", "context": context}],
+            "clusters": [{"name": "c", "cluster": {"server": address}}],
+            "users": [{"name": "u", "user": {}}],
+        }
+        kubeconfig = tmp_path / "kubeconfig"
+        kubeconfig.write_text(json.dumps(content))
+        yield script, str(kubeconfig)
+
+
+@pytest.fixture
+def tried(server, tmp_path):
+    """Try a job that comes to a phase, or is gone, and whose deletion is answered so; return the code."""
+    script, kubeconfig = server
+    file = tmp_path / "job.yaml"
+    file.write_text(JOB)
+
+    def carry_out(phase, deletion):
+        condition = {"reason": "Because", "message": "so", "lastTransitionTime": "2026-01-31T12:00:00Z"}
+        seen = reply(obj={"status": {"phase": phase, "conditions": [condition]}})
+        script.calls = [
+            reply(201, {"metadata": NAMED}),
+            seen if phase else refusal(404, "NotFound"),
+            deletion,
+        ]
+        return main(["try", str(file), f"--kubeconfig={kubeconfig}"])
+
+    return carry_out
+
+
+@pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1), ("", 1)])
+def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, phase, code):
+    """Its time to live may be over, or somebody has deleted it; it was in the namespace of the context."""
+    assert tried(phase, refusal(404, "NotFound")) == code
+
+    made, *_, deleted = server[0].of(watches=False)
+    assert made.path.startswith("/apis/palaestra.dev/v1alpha1/namespaces/robots/")
+    assert (deleted.method, deleted.body["preconditions"]) == ("DELETE", {"uid": "0d1f"})
+
+
+@pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
+def test_a_trial_that_cannot_be_deleted_for_now_is_told_beside_its_verdict(tried, capsys, phase, code):
+    """An API server that restarts says nothing about the installation."""
+    assert tried(phase, refusal(503, "ServiceUnavailable")) == code
+
+    assert "delete it by hand: `kubectl delete trainingjob -n robots trial-x7k2p`" in capsys.readouterr().out
+
+
+def test_a_trial_that_may_not_be_deleted_fails(tried, capsys):
+    """A right is missing, so every trial would leave a job."""
+    assert tried("Succeeded", refusal(403, "Forbidden")) == 1
+
+    assert capsys.readouterr().err == "Forbidden (403): no\n"
+
+
+@pytest.mark.parametrize(("message", "hint"), [(NO_RIGHT, True), (NO_ROOM, False)])
+def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, message, hint):
+    """It knows nothing of quotas and policies."""
+    script, kubeconfig = server
+    answer = {"kind": "Status", "code": 403, "reason": "Forbidden", "message": message}
+    script.calls = [reply(403, answer)]
+
+    assert main(["get", "-o", "name", f"--kubeconfig={kubeconfig}"]) == 1
+
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"Forbidden (403): {message}")
+    assert line.endswith("; `palaestra doctor` tells which rights are missing") is hint
+
+
+def test_a_lease_that_is_given_back_has_no_leader(server):
+    """The next change, by who takes it, is what shows that somebody leads."""
+    script, kubeconfig = server
+
+    def lease(version, holder):
+        metadata = {"name": "palaestra-operator", "uid": "u", "resourceVersion": version}
+        return {"metadata": metadata, "spec": {"holderIdentity": holder}}
+
+    script.calls = [
+        refusal(404, "NotFound"),
+        reply(obj={"metadata": {"resourceVersion": "1"}, "items": [lease("1", "first")]}),
+    ]
+    script.watches = [
+        stream(
+            {"type": "MODIFIED", "object": lease("2", "")},
+            {"type": "MODIFIED", "object": lease("3", "second")},
+            ends="silent",
+        )
+    ]
+    api = connect(kubeconfig)
+
+    [found] = leads(Site(api=api, namespace="robots", operator_namespace="palaestra-system"))
+
+    api.close()
+    assert found.fact == "is second"

@@ -1,0 +1,242 @@
+"""The commands as they are typed, against a real API server."""
+
+import json
+import os
+import subprocess
+import sys
+from contextlib import suppress
+
+import pytest
+import yaml
+
+from palaestra.cluster.resources import TRAINING_JOBS
+
+TRIAL = """\
+apiVersion: palaestra.dev/v1alpha1
+kind: TrainingJob
+metadata: {name: trial}
+spec:
+  backoffLimit: 0
+"""
+REPLICA = {
+    "index": 0,
+    "phase": "Running",
+    "step": 12000,
+    "target": 50000,
+    "reason": "Training",
+    "message": "the trainer runs",
+}
+
+
+def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
+    """The same as `kubectl get tj`."""
+    place.train("a")
+    place.train("b")
+    tell("b", "Running", step=12000)
+
+    code, [headings, *rows], _ = typed("get")
+
+    assert code == 0
+    assert headings.split()[:5] == ["NAME", "STATUS", "REPLICAS", "STEP", "SUCCESS"]
+    assert [row.split()[:4] for row in rows] == [["a", "-", "-", "-"], ["b", "Running", "-", "12000"]]
+    assert "ALGORITHM" in typed("get", "-o", "wide")[1][0]
+
+
+def test_get_of_all_namespaces_names_them(typed, place):
+    """As kubectl does."""
+    place.train("a")
+
+    _, [headings, *rows], _ = typed("get", "-A")
+
+    assert headings.startswith("NAMESPACE")
+    assert [row.split()[1] for row in rows if row.startswith(f"{place.name} ")] == ["a"]
+
+
+@pytest.mark.parametrize("name", [(), ("a",)])
+def test_get_for_programs_is_what_the_api_server_has(typed, place, name):
+    """One object where one was asked for, so that it can be applied elsewhere."""
+    place.train("a", seed=7)
+
+    names = typed("get", *name, "-o", "name")[1]
+    from_json = json.loads("\n".join(typed("get", *name, "-o", "json")[1]))
+    [from_yaml] = yaml.safe_load_all("\n".join(typed("get", *name, "-o", "yaml")[1]))
+
+    assert names == ["trainingjob.palaestra.dev/a"]
+    assert (from_json if name else from_json["items"][0])["spec"]["seed"] == 7
+    assert from_yaml["metadata"]["name"] == "a"
+
+
+@pytest.mark.parametrize(
+    "command", ["get", "describe", "events", "logs", "watch", "suspend", "delete", "fetch"]
+)
+def test_a_job_that_is_not_there_is_one_line_and_1(typed, command):
+    """For people and for scripts."""
+    code, out, [line] = typed(command, "none")
+
+    assert code == 1
+    assert out == []
+    assert line.startswith("job none: there is none in namespace ")
+
+
+def test_options_that_exclude_each_other_are_2(typed):
+    """Nothing is asked."""
+    code, _, [line] = typed("get", "a", "-A")
+
+    assert code == 2
+    assert line == "NAME: excludes -A and -l; leave it out, or them"
+
+
+def test_describe_tells_status_and_events(typed, place, tell):
+    """One command for the whole story."""
+    place.train("a")
+    tell("a", "Running", replicas=[REPLICA])
+    place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
+
+    code, out, _ = typed("describe", "a")
+
+    assert code == 0
+    assert "Step:   12,000 of 50,000 (24%)" in " ".join(out)
+    assert "no such image" in out[-1]
+
+
+@pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
+def test_watch_ends_with_the_job_and_says_how(typed, place, tell, phase, code):
+    """A script may go by its exit code."""
+    place.train("a")
+    tell("a", phase, replicas=[REPLICA | {"phase": phase}])
+
+    ended, out, _ = typed("watch", "a")
+
+    assert ended == code
+    assert out == [f"{phase}; 0: {phase} 12,000 of 50,000 (24%)", f"a: {phase}; Because: so it is"]
+
+
+@pytest.mark.parametrize("phase", [None, "Running"])
+def test_watch_of_a_job_that_is_deleted_says_so_and_ends_with_1(control_plane, place, tell, phase):
+    """How it would have ended nobody knows, and a script must not take it for a success."""
+    place.train("a")
+    if phase:
+        tell("a", phase, replicas=[REPLICA])
+
+    with started(control_plane, place, "watch", "a", "--timeout=30") as process:
+        process.stdout.readline()  # it has seen the job
+        place.api.delete(TRAINING_JOBS, place.name, "a")
+        out, _ = process.communicate(timeout=30)
+
+    assert process.returncode == 1
+    assert out == "a: was deleted\n"
+
+
+def test_a_trial_that_is_stopped_leaves_nothing(control_plane, place, tmp_path):
+    """Kubelets and helm end a pod with SIGTERM; it comes to the namespace that was named."""
+    file = tmp_path / "job.yaml"
+    file.write_text(TRIAL)
+
+    with started(control_plane, place, "try", str(file)) as process:
+        line = process.stdout.readline()
+        [job] = place.all(TRAINING_JOBS)
+        process.terminate()
+        process.communicate(timeout=30)
+
+    assert line == f"{place.name}/{job['metadata']['name']}: Pending\n"
+    assert process.returncode == 130
+    assert place.all(TRAINING_JOBS) == []
+
+
+def test_a_trial_of_a_wrong_file_asks_nothing(typed, place, tmp_path):
+    """2, as for every mistake in what is typed."""
+    file = tmp_path / "job.yaml"
+    file.write_text(TRIAL + "  seed: -1\n")
+
+    code, out, [line] = typed("try", str(file))
+
+    assert (code, out) == (2, [])
+    assert line.startswith("spec.seed: ")
+    assert place.all(TRAINING_JOBS) == []
+
+
+def started(control_plane, place, *arguments):
+    """Start a command in a process of its own, whose output is read as it comes."""
+    return subprocess.Popen(
+        [
+            *(sys.executable, "-c", "import sys; from palaestra.cli import main; sys.exit(main())"),
+            *(*arguments, f"--kubeconfig={control_plane.kubeconfig}", f"--namespace={place.name}"),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_watch_draws_where_there_is_a_terminal(control_plane, place, tell):
+    """And leaves the last picture, with the line that says how it ended."""
+    place.train("a")
+    tell("a", "Succeeded", replicas=[REPLICA | {"successRate": 0.5}])
+    ours, theirs = os.openpty()
+
+    with subprocess.Popen(
+        [
+            *(sys.executable, "-c", "import sys; from palaestra.cli import main; sys.exit(main())"),
+            *("watch", "a", f"--kubeconfig={control_plane.kubeconfig}", f"--namespace={place.name}"),
+        ],
+        stdout=theirs,
+        stderr=theirs,
+        env={"TERM": "xterm", "COLUMNS": "80", "LINES": "24"},
+    ) as process:
+        os.close(theirs)
+        seen = b""
+        with suppress(OSError):  # EIO: the other end is closed
+            while part := os.read(ours, 4096):
+                seen += part
+        code = process.wait(30)
+    os.close(ours)
+
+    text = seen.decode()
+    assert code == 0, text
+    assert "12,000 of 50,000 (24%)" in text
+    assert "success" in text
+    assert text.rstrip().endswith("a: Succeeded; Because: so it is")
+
+
+def test_suspend_and_resume_change_the_spec(typed, place):
+    """Several jobs at once, as kubectl does."""
+    for name in ("a", "b"):
+        place.train(name)
+
+    assert typed("suspend", "a", "b")[0] == 0
+    suspended = [place.get(TRAINING_JOBS, name)["spec"]["suspend"] for name in ("a", "b")]
+    assert typed("resume", "a")[0] == 0
+
+    assert suspended == [True, True]
+    assert place.get(TRAINING_JOBS, "a")["spec"]["suspend"] is False
+
+
+def test_delete_says_what_stays(typed, place):
+    """A run may be worth more than the job."""
+    uid = place.train("a")["metadata"]["uid"]
+    place.train("b", storage={"ephemeral": True})
+
+    code, [of_a, of_b], _ = typed("delete", "a", "b")
+
+    assert code == 0
+    assert of_a.endswith(f"`kubectl delete pvc -n {place.name} -l palaestra.dev/job-uid={uid}` removes them")
+    assert of_b == "b: deleted"
+    assert place.all(TRAINING_JOBS) == []
+
+
+def test_kubectl_finds_the_plugin_and_hands_it_its_options(control_plane, place, tmp_path):
+    """`kubectl palaestra get` is `palaestra get`."""
+    place.train("a")
+    plugin = tmp_path / "kubectl-palaestra"
+    plugin.write_text(f"#!{sys.executable}\nimport sys\nfrom palaestra.cli import main\nsys.exit(main())\n")
+    plugin.chmod(0o755)
+
+    done = subprocess.run(
+        [control_plane.binaries / "kubectl", "palaestra", "get", "-o", "name", f"--namespace={place.name}"],
+        env={"KUBECONFIG": str(control_plane.kubeconfig), "PATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+    assert (done.returncode, done.stdout) == (0, "trainingjob.palaestra.dev/a\n"), done.stderr

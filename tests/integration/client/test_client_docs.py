@@ -1,0 +1,40 @@
+"""What docs/tools.md shows can be typed."""
+
+import re
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import yaml
+
+from palaestra.cluster.resources import TRAINING_JOBS
+from tests.integration.operator.cluster import eventually
+from tests.unit.cli.test_cli_cluster import COMMANDS
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs/tools.md").read_text()
+
+
+def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monkeypatch, capsys):
+    """From apply to delete, in the namespace of the context; the operator's word is the test's."""
+    [script] = re.findall(r"^```python with-a-cluster\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+    kubeconfig = yaml.safe_load(control_plane.kubeconfig.read_text())
+    kubeconfig["contexts"][0]["context"]["namespace"] = place.name
+    (tmp_path / "kubeconfig").write_text(yaml.safe_dump(kubeconfig))
+    monkeypatch.setenv("KUBECONFIG", str(tmp_path / "kubeconfig"))
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "manifests/examples/minimal.yaml", "job.yaml")
+
+    with ThreadPoolExecutor(1) as pool:
+        ended = pool.submit(exec, compile(script, "docs/tools.md", "exec"), {})
+        eventually(lambda: place.get(TRAINING_JOBS, "minimal") or ended.done())
+        tell("minimal", "Succeeded", step=20_000, successRate=1.0)
+        ended.result(30)
+
+    assert "Succeeded 20000 1.0" in capsys.readouterr().out
+    assert place.get(TRAINING_JOBS, "minimal") is None
+
+
+def test_every_command_of_the_page_exists_and_every_command_is_on_it():
+    """Each has a row."""
+    assert set(re.findall(r"^\| `palaestra (\w+)", PAGE, re.MULTILINE)) == set(COMMANDS)

@@ -1,0 +1,222 @@
+"""The doctor before a real API server: what is not right there is told, with the remedy."""
+
+import pytest
+
+from palaestra.cli import main
+from palaestra.cluster import Leadership, Resource, connect
+from palaestra.cluster.resources import DEPLOYMENTS, NODES, STORAGE_CLASSES
+from palaestra.doctor import Site, Verdict, examine
+from palaestra.operator.options import NAME
+from tests.integration.operator.cluster import eventually
+
+POLICIES = Resource(
+    api_version="admissionregistration.k8s.io/v1",
+    kind="MutatingAdmissionPolicy",
+    plural="mutatingadmissionpolicies",
+    namespaced=False,
+)
+BINDINGS = Resource(
+    api_version=POLICIES.api_version,
+    kind="MutatingAdmissionPolicyBinding",
+    plural="mutatingadmissionpolicybindings",
+    namespaced=False,
+)
+
+QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
+
+
+@pytest.fixture
+def found(place):
+    """Return what the doctor finds of each thing; the operator's namespace is the test's."""
+
+    def look(api=None):
+        site = Site(api=api or place.api, namespace=place.name, operator_namespace=place.name)
+        return {each.what: each for each in examine(site)}
+
+    return look
+
+
+def verdicts(findings):
+    """Return how each thing is."""
+    return {what: each.verdict.value for what, each in findings.items()}
+
+
+def test_a_cluster_without_nodes_storage_and_operator_is_told_so(found):
+    """Each with its remedy; what is right there is right."""
+    findings = found()
+
+    assert verdicts(findings) == {
+        "API server": "ok",
+        "nodes": "wrong",
+        "TrainingJobs": "ok",
+        "to look at jobs": "ok",
+        "to author jobs": "ok",
+        "to read logs": "ok",
+        "to fetch runs": "ok",
+        "sidecars": "ok",
+        "storage class": "wrong",
+        "operator": "wrong",
+        "leader": "wrong",
+        "operator's rights": "wrong",
+        "metrics": "wrong",
+    }
+    assert all(each.remedy for each in findings.values() if each.verdict is not Verdict.RIGHT)
+    assert "get trainingjobs" in findings["operator's rights"].fact
+
+
+def test_the_command_ends_with_1_if_anything_is_wrong(typed, place):
+    """For scripts; each remedy on a line of its own."""
+    code, out, _ = typed("doctor", f"--operator-namespace={place.name}")
+
+    assert code == 1
+    assert len([line for line in out if line.startswith("wrong")]) >= 5
+    assert any(line.strip().startswith("-> install Palaestra") for line in out)
+
+
+def test_an_api_server_that_does_not_answer_is_all_that_is_told(tmp_path, capsys):
+    """Everything else would be the same line again."""
+    kubeconfig = tmp_path / "kubeconfig"
+    kubeconfig.write_text(
+        "{current-context: a, contexts: [{name: a, context: {cluster: c, user: u}}],"
+        " clusters: [{name: c, cluster: {server: 'http://127.0.0.1:1'}}], users: [{name: u, user: {}}]}"
+    )
+
+    assert main(["doctor", f"--kubeconfig={kubeconfig}"]) == 1
+    [line, remedy] = capsys.readouterr().out.splitlines()
+    assert line.startswith("wrong    API server")
+    assert "->" in remedy
+
+
+def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
+    """A leader is one that is seen to renew its Lease."""
+    node = {"metadata": {"name": f"node-{place.name}"}, "apiVersion": "v1", "kind": "Node"}
+    place.api.create(NODES, node)
+    place.api.merge(
+        NODES,
+        None,
+        node["metadata"]["name"],
+        {"status": {"nodeInfo": {"kubeletVersion": "v1.36.0"}}},
+        subresource="status",
+    )
+    annotations = {"storageclass.kubernetes.io/is-default-class": "true"}
+    place.api.create(
+        STORAGE_CLASSES,
+        {
+            "apiVersion": "storage.k8s.io/v1",
+            "kind": "StorageClass",
+            "metadata": {"name": "usual", "annotations": annotations},
+            "provisioner": "nobody.example.com",
+        },
+    )
+    leadership = Leadership(place.api, place.name, NAME, "me")
+    leadership.start()
+    eventually(leadership.leads)
+
+    findings = found()
+
+    leadership.stop(5.0)
+    place.api.delete(NODES, None, node["metadata"]["name"])
+    place.api.delete(STORAGE_CLASSES, None, "usual")
+    assert findings["nodes"].fact == "v1.36.0 knows sidecar containers"
+    assert findings["storage class"].fact == "usual is the default"
+    assert findings["leader"].fact == "is me"
+
+
+def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
+    """Its log says why."""
+    container = {"name": "operator", "image": "palaestra-operator:0.0.0"}
+    labels = {"a": "b"}
+    template = {
+        "metadata": {"labels": labels},
+        "spec": {"containers": [container], "serviceAccountName": "chosen"},
+    }
+    place.create(
+        DEPLOYMENTS,
+        {
+            "apiVersion": "apps/v1",
+            "kind": "Deployment",
+            "metadata": {"name": NAME},
+            "spec": {"selector": {"matchLabels": labels}, "template": template},
+        },
+    )
+
+    findings = found()
+
+    assert findings["operator"].verdict is Verdict.WRONG
+    assert "0 of 1 are ready" in findings["operator"].fact
+    assert "palaestra-operator:0.0.0" in findings["operator"].fact
+    assert "service account chosen may not" in findings["operator's rights"].fact
+
+
+def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(found, control_plane, place):
+    """RBAC itself is asked, so that roles, groups and other authorizers all count."""
+    nobody = connect(str(control_plane.kubeconfig_of("nobody")))
+
+    findings = found(nobody)
+
+    nobody.close()
+    assert findings["to look at jobs"].verdict is Verdict.WRONG
+    assert "get trainingjobs, list trainingjobs, watch trainingjobs" in findings["to look at jobs"].fact
+    assert findings["to author jobs"].verdict is Verdict.WRONG
+    assert findings["to read logs"].verdict is Verdict.UNKNOWN  # not everybody has to
+    assert findings["to fetch runs"].verdict is Verdict.UNKNOWN
+    assert "create pods/exec" in findings["to fetch runs"].fact
+    assert findings["storage class"].verdict is Verdict.UNKNOWN
+    assert findings["sidecars"].verdict is Verdict.UNKNOWN
+    assert place.name in findings["to look at jobs"].fact
+
+
+def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(found, place):
+    """The pod that is tried says what it needs, as a quota on requests and limits demands of every pod."""
+    quota = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
+    room = {"requests.cpu": "1", "requests.memory": "1Gi", "limits.memory": "1Gi", "pods": "1"}
+    place.create(QUOTAS, quota | {"spec": {"hard": room}})
+    eventually(lambda: place.get(QUOTAS, "few")["status"].get("hard") == room)
+    with_room = found()["sidecars"]
+
+    place.api.merge(QUOTAS, place.name, "few", {"spec": {"hard": {"pods": "0"}}})
+    spent = eventually(lambda: (each := found()["sidecars"]).verdict is not Verdict.RIGHT and each)
+
+    assert with_room.fact == "stay as they are on their way to the nodes"
+    assert spent.verdict is Verdict.UNKNOWN
+    assert "exceeded quota: few" in spent.fact
+    assert spent.remedy == "try again when there is room"
+
+
+def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place):
+    """An old mutating webhook knows pods without the field; a policy stands for it here."""
+    expression = 'JSONPatch{op: "remove", path: "/spec/initContainers/0/restartPolicy"}'
+    rule = {"apiGroups": [""], "apiVersions": ["v1"], "operations": ["CREATE"], "resources": ["pods"]}
+    only_here = {"matchLabels": {"kubernetes.io/metadata.name": place.name}}
+    place.api.create(
+        POLICIES,
+        {
+            "apiVersion": POLICIES.api_version,
+            "kind": POLICIES.kind,
+            "metadata": {"name": "old"},
+            "spec": {
+                "matchConstraints": {"resourceRules": [rule], "namespaceSelector": only_here},
+                "reinvocationPolicy": "Never",
+                "failurePolicy": "Fail",
+                "mutations": [{"patchType": "JSONPatch", "jsonPatch": {"expression": f"[{expression}]"}}],
+            },
+        },
+    )
+    place.api.create(
+        BINDINGS,
+        {
+            "apiVersion": BINDINGS.api_version,
+            "kind": BINDINGS.kind,
+            "metadata": {"name": "old"},
+            "spec": {"policyName": "old"},
+        },
+    )
+
+    found_out = eventually(
+        lambda: (each := found()["sidecars"]).verdict is Verdict.WRONG and each
+    )  # the API server learns of a policy a moment later
+
+    place.api.delete(BINDINGS, None, "old")
+    place.api.delete(POLICIES, None, "old")
+    assert "drops restartPolicy" in found_out.fact
+    assert "mutatingwebhookconfigurations" in found_out.remedy

@@ -1,0 +1,270 @@
+"""Fetching a run: whole or not at all, and no pod is left behind; a scripted server plays the cluster."""
+
+import io
+import json
+import tarfile
+from functools import partial
+from urllib.parse import urlsplit
+
+import pytest
+
+from palaestra import Client
+from palaestra.client import NotFetched, TookTooLong
+from palaestra.cluster import Unreachable
+from palaestra.plan import ClusterLayout, Images, identified, plan
+from tests.integration.apiserver.server import command, refusal, reply, serving, stream
+from tests.unit.view.jobs import make_job
+
+SUCCESS = b"\x03" + json.dumps({"status": "Success"}).encode()
+FAILURE = (
+    b"\x03"
+    + json.dumps(
+        {"status": "Failure", "details": {"causes": [{"reason": "ExitCode", "message": "1"}]}}
+    ).encode()
+)
+FILES = {"model.zip": b"weights" * 10_000, "tensorboard/events": b"curves"}
+RUN_POD = "job-0-x7k2p"
+WAITING = {"reason": "ErrImagePull", "message": "no such image"}
+
+
+def tar(files):
+    """Return the messages with which a tar of these files comes."""
+    file = io.BytesIO()
+    with tarfile.open(fileobj=file, mode="w") as archive:
+        for name, content in files.items():
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    whole = file.getvalue()
+    return [b"\x01" + whole[i : i + 30_000] for i in range(0, len(whole), 30_000)]
+
+
+class Scene:
+    """A job with one replica in a scripted cluster.
+
+    Attributes:
+        phase: of the run's pod; None: it is gone.
+        trainer: state of the trainer's container in it.
+        replica: fields of the replica's status.
+        reader: status of the pod that is made to read the volume.
+        execution: how a command in a container goes.
+    """
+
+    def __init__(self, address, script, tmp_path):
+        self.phase = "Succeeded"
+        self.trainer = {"running": {}}
+        self.replica = {"phase": "Succeeded"}
+        self.reader = {"phase": "Running"}
+        self.execution = command(*tar(FILES), SUCCESS)
+        self.ephemeral = False
+        self.into = tmp_path / "fetched"
+        self._script = script
+        script.calls, script.watches = [self._answer], [stream()]
+        kubeconfig = tmp_path / "kubeconfig"
+        kubeconfig.write_text(
+            json.dumps(
+                {
+                    "current-context": "a",
+                    "contexts": [{"name": "a", "context": {"cluster": "c", "user": "u", "namespace": "lab"}}],
+                    "clusters": [{"name": "c", "cluster": {"server": address}}],
+                    "users": [{"name": "u", "user": {}}],
+                }
+            )
+        )
+        self.client = Client(kubeconfig=str(kubeconfig))
+
+    def fetch(self, deadline_s=30.0):
+        """Fetch the run."""
+        return self.client.fetch("job", into=self.into, deadline_s=deadline_s)
+
+    def left(self):
+        """Return the files that lie below the target."""
+        return {
+            str(each.relative_to(self.into)): each.read_bytes()
+            for each in self.into.rglob("*")
+            if each.is_file()
+        }
+
+    def asked(self, method, end):
+        """Return the requests of a method whose path ends so."""
+        return [
+            each
+            for each in self._script.of(watches=False)
+            if each.method == method and each.path.endswith(end)
+        ]
+
+    def _answer(self, exchange):
+        path, method = urlsplit(exchange.path).path, exchange.command
+        pods = "/api/v1/namespaces/lab/pods"
+        made = {"metadata": {"name": "r", "namespace": "lab", "uid": "reader", "resourceVersion": "1"}}
+        answers = {
+            ("GET", "/apis/palaestra.dev/v1alpha1/namespaces/lab/trainingjobs/job"): partial(
+                reply, obj=self._job()
+            ),
+            ("GET", "/apis/batch/v1/namespaces/lab/jobs/job-0"): partial(reply, obj=self._replica()),
+            ("GET", f"{pods}/{RUN_POD}"): partial(reply, obj={"status": self._pod_status()}),
+            ("POST", pods): partial(reply, obj=made),
+            ("GET", pods): partial(
+                reply, obj={"metadata": {"resourceVersion": "1"}, "items": [made | {"status": self.reader}]}
+            ),
+        }
+        if path.endswith("/exec"):
+            self.execution(exchange)
+        elif method == "DELETE":
+            reply(200)(exchange)
+        elif path.endswith(RUN_POD) and self.phase is None:
+            refusal(404, "NotFound")(exchange)
+        else:
+            answers[method, path]()(exchange)
+
+    def _pod_status(self):
+        containers = [{"name": "trainer", "state": self.trainer}]
+        return {"phase": self.phase, "containerStatuses": containers}
+
+    def _job(self):
+        pod = {"name": RUN_POD, "uid": "u", "created": "2026-01-31T12:00:00Z"}
+        spec = {"storage": {"ephemeral": self.ephemeral}}
+        job = make_job(spec=spec, pod=pod).model_dump(mode="json", by_alias=True, exclude_none=True)
+        job["status"]["replicas"][0] |= self.replica
+        return job
+
+    def _replica(self):
+        images = Images(trainer="trainer:1", stub="stub:1", webots="webots:1")
+        return dict(plan(identified(make_job(), "0d1f"), ClusterLayout(images=images)).replicas[0].job)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """The scene."""
+    with serving() as (address, script):
+        made = Scene(address, script, tmp_path)
+        yield made
+        made.client.close()
+
+
+def test_a_run_that_goes_on_is_read_in_its_own_pod(scene):
+    """Its volume can be mounted by one node only, and the pod is there."""
+    scene.phase, scene.replica = "Running", {"phase": "Running"}
+
+    folder = scene.fetch()
+
+    assert folder == scene.into / "job" / "0"
+    assert scene.left() == {f"job/0/{name}": content for name, content in FILES.items()}
+    assert scene.asked("POST", "/pods") == []
+    assert len(scene.asked("GET", f"/{RUN_POD}/exec")) == 1
+
+
+@pytest.mark.parametrize(
+    ("phase", "replica"),
+    [
+        ("Succeeded", "Succeeded"),
+        ("Succeeded", "Running"),  # what the operator is about to see
+        ("Failed", "Failed"),
+        ("Failed", "Suspended"),
+        (None, "Succeeded"),
+        (None, "Suspended"),
+    ],
+)
+def test_a_run_that_has_ended_is_read_with_a_pod_that_is_deleted_again(scene, phase, replica):
+    """This very pod, and no other of its name."""
+    scene.phase, scene.replica = phase, {"phase": replica}
+
+    scene.fetch()
+
+    [made] = scene.asked("POST", "/pods")
+    name = made.body["metadata"]["name"]
+    [gone] = scene.asked("DELETE", name)
+    assert scene.left().keys() == {f"job/0/{each}" for each in FILES}
+    assert len(scene.asked("GET", f"/{name}/exec")) == 1
+    assert gone.body["preconditions"] == {"uid": "reader"}
+
+
+@pytest.mark.parametrize(
+    ("execution", "error"),
+    [
+        (command(*tar(FILES), FAILURE), NotFetched),
+        (command(*tar(FILES)), Unreachable),
+        (command(tar(FILES)[0], ends="broken"), Unreachable),
+        (command(*tar({}), SUCCESS), NotFetched),
+        (refusal(403, "Forbidden"), OSError),
+    ],
+    ids=["it fails", "its end is not told", "it breaks off", "nothing is there", "it is not allowed"],
+)
+def test_what_is_not_whole_is_not_written_and_the_pod_is_deleted(scene, execution, error):
+    """Half a policy would look like a policy."""
+    scene.execution = execution
+
+    with pytest.raises(error):
+        scene.fetch()
+
+    assert scene.left() == {}
+    assert list(scene.into.rglob(".fetch-*")) == []
+    assert len(scene.asked("DELETE", scene.asked("POST", "/pods")[0].body["metadata"]["name"])) == 1
+
+
+def test_a_folder_that_is_there_is_left_as_it_is(scene):
+    """Nothing is asked of the cluster's pods for it."""
+    there = scene.into / "job" / "0"
+    there.mkdir(parents=True)
+
+    with pytest.raises(NotFetched, match="is there already; move it away"):
+        scene.fetch()
+    assert scene.asked("POST", "/pods") == []
+
+
+def test_a_pod_that_is_about_to_start_is_not_robbed_of_its_volume(scene):
+    """A claim that another node holds would keep it from starting."""
+    scene.phase = "Pending"
+
+    with pytest.raises(NotFetched, match=f"pod {RUN_POD}: is about to start"):
+        scene.fetch()
+    assert scene.asked("POST", "/pods") == []
+
+
+def test_a_pod_whose_trainer_has_just_ended_is_not_entered(scene):
+    """It is said to run until its simulators are stopped, and what runs in it then goes with it."""
+    scene.phase, scene.trainer = "Running", {"terminated": {"exitCode": 0}}
+
+    with pytest.raises(NotFetched, match=f"pod {RUN_POD}: its trainer has just ended; .* in a minute"):
+        scene.fetch()
+    assert scene.asked("GET", "/exec") == []
+    assert scene.asked("POST", "/pods") == []
+
+
+@pytest.mark.parametrize("replica", ["Pending", "Running"])
+@pytest.mark.parametrize("phase", ["Failed", None])
+def test_a_pod_that_will_come_again_is_not_robbed_of_its_volume(scene, phase, replica):
+    """Its Job waits before it makes the next one."""
+    scene.phase, scene.replica = phase, {"phase": replica}
+
+    with pytest.raises(NotFetched, match="job job: replica 0 is about to be started again"):
+        scene.fetch()
+    assert scene.asked("POST", "/pods") == []
+
+
+def test_the_first_pod_is_not_robbed_of_its_volume_either(scene):
+    """Its Job is there before it."""
+    scene.replica = {"phase": "Pending", "pod": None}
+
+    with pytest.raises(NotFetched, match="job job: replica 0 is about to be started, "):
+        scene.fetch()
+    assert scene.asked("POST", "/pods") == []
+
+
+def test_a_run_that_went_with_its_pod_is_told_so(scene):
+    """There is no claim to mount."""
+    scene.ephemeral = True
+
+    with pytest.raises(NotFetched, match=r"spec\.storage\.ephemeral"):
+        scene.fetch()
+
+
+def test_a_pod_that_does_not_start_is_told_with_the_reason_and_deleted(scene):
+    """The words are the kubelet's."""
+    scene.reader = {"phase": "Pending", "containerStatuses": [{"state": {"waiting": WAITING}}]}
+
+    with pytest.raises(TookTooLong, match="ErrImagePull: no such image"):
+        scene.fetch(deadline_s=1.0)
+
+    [made] = scene.asked("POST", "/pods")
+    assert len(scene.asked("DELETE", made.body["metadata"]["name"])) == 1

@@ -1,0 +1,199 @@
+"""The client against a real API server; the operator's word is the test's."""
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from palaestra.api import validate
+from palaestra.client import EndedOtherwise, NoPod, NoSuchJob, TookTooLong
+from palaestra.cluster import Invalid
+from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
+from palaestra.errors import SpecErrors
+from tests.integration.operator.cluster import eventually, training_job
+
+SOON_S = 30.0
+
+
+@pytest.fixture
+def later():
+    """Call something in a thread; return its future."""
+    with ThreadPoolExecutor(2) as pool:
+        yield pool.submit
+
+
+def test_what_is_applied_is_stored_in_the_clients_namespace(client, place):
+    """As plain data, as kubectl would."""
+    stored = client.apply(training_job("a", seed=7))
+
+    assert stored.spec.seed == 7
+    assert place.get(TRAINING_JOBS, "a")["metadata"]["uid"] == stored.metadata.uid
+
+
+def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
+    """What they leave out is left to the cluster, so that the same job applied twice changes nothing."""
+    file = tmp_path / "job.yaml"
+    file.write_text("apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: a}\nspec: {}\n")
+    from_file = client.apply(file)
+
+    from_model = client.apply(validate(training_job("a")))
+
+    assert from_model.metadata.uid == from_file.metadata.uid
+    assert from_model.metadata.generation == 1
+
+
+def test_a_wrong_job_is_refused_before_anything_is_sent(client):
+    """With every mistake, as `palaestra run` tells them."""
+    with pytest.raises(SpecErrors) as refused:
+        client.apply(training_job("a", seed=-1, replica=2))
+
+    assert len(refused.value.problems) == 2
+    assert client.list() == ()
+
+
+def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
+    """The API server's word, which names the field."""
+    client.apply(training_job("a", seed=1))
+
+    with pytest.raises(Invalid, match="seed"):
+        client.apply(training_job("a", seed=2))
+
+
+def test_a_job_that_is_not_there_is_told_with_the_way_to_find_it(client):
+    """A wrong namespace is the usual cause."""
+    for ask in (client.get, client.suspend, client.delete, client.events):
+        with pytest.raises(
+            NoSuchJob, match=f"job none: there is none in namespace {client.namespace}; .* -A"
+        ):
+            ask("none")
+    with pytest.raises(NoSuchJob):
+        client.wait("none", deadline_s=SOON_S)
+
+
+def test_a_wait_ends_with_the_job(client, tell, later):
+    """Whatever becomes of it: `ended` is both."""
+    client.apply(training_job("a"))
+    waited = later(client.wait, "a", deadline_s=SOON_S)
+
+    tell("a", "Running")
+    tell("a", "Failed")
+
+    assert waited.result(SOON_S).status.phase == "Failed"
+
+
+def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
+    """The reason is told: it is what the next command would ask for."""
+    client.apply(training_job("a"))
+    tell("a", "Failed")
+
+    with pytest.raises(EndedOtherwise, match="job a: is Failed, not Succeeded: Because: so it is"):
+        client.wait("a", until="Succeeded", deadline_s=SOON_S)
+
+
+def test_a_wait_has_a_deadline(client):
+    """Nobody looks after this job."""
+    client.apply(training_job("a"))
+    began = time.monotonic()
+
+    with pytest.raises(TookTooLong, match="TrainingJob a"):
+        client.wait("a", deadline_s=1.0)
+    assert 1.0 <= time.monotonic() - began < SOON_S
+
+
+def test_a_job_that_is_deleted_is_not_waited_for(client, later):
+    """It will not come back."""
+    client.apply(training_job("a"))
+    waited = later(client.wait, "a", deadline_s=SOON_S)
+
+    client.delete("a")
+
+    with pytest.raises(NoSuchJob):
+        waited.result(SOON_S)
+
+
+def test_a_status_of_an_older_spec_is_not_believed(client, tell, later):
+    """Right after `resume` the status still says Suspended."""
+    client.apply(training_job("a"))
+    client.suspend("a")
+    tell("a", "Suspended", generation=2)
+    client.resume("a")
+    waited = later(client.wait, "a", until="Suspended", deadline_s=SOON_S)
+
+    tell("a", "Running", generation=3)
+    client.suspend("a")
+    tell("a", "Suspended", generation=4)
+
+    assert waited.result(SOON_S).metadata.generation == 4
+
+
+def test_statuses_come_until_the_end(client, tell, later):
+    """The last one is how it ended; the iterator ends by itself."""
+    client.apply(training_job("a"))
+    seen = []
+
+    def collect():
+        seen.extend(status.phase for status in client.statuses("a", deadline_s=SOON_S))
+
+    collected = later(collect)
+    for phase in ("Running", "Suspended", "Succeeded"):
+        tell("a", phase)
+        eventually(lambda phase=phase: phase in seen)
+
+    collected.result(SOON_S)
+    assert seen[-3:] == ["Running", "Suspended", "Succeeded"]
+
+
+def test_a_job_in_a_queue_is_not_suspended(client):
+    """Its queue decides; the API server says so."""
+    client.apply(training_job("a", scheduling={"queueName": "robots"}))
+
+    with pytest.raises(Invalid, match="Kueue suspends a job that has a queueName"):
+        client.suspend("a")
+
+
+def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):
+    """A job of the same name can be made right afterwards."""
+    job = client.apply(training_job("a"))
+    owner = {
+        "apiVersion": job.api_version,
+        "kind": job.kind,
+        "name": "a",
+        "uid": job.metadata.uid,
+        "blockOwnerDeletion": True,
+    }
+    metadata = {"name": "child", "ownerReferences": [owner]}
+    place.create(CONFIG_MAPS, {"apiVersion": "v1", "kind": "ConfigMap", "metadata": metadata})
+
+    client.delete("a", deadline_s=SOON_S)
+
+    assert place.get(CONFIG_MAPS, "child") is None
+    assert place.get(TRAINING_JOBS, "a") is None
+
+
+def test_events_of_pods_are_the_jobs(client, place):
+    """What a kubelet warns of is why a job stands still."""
+    client.apply(training_job("a"))
+    place.complain({"metadata": {"name": "a-0-x7k2p", "uid": "u"}}, "BackOff", "no such image")
+    place.complain({"metadata": {"name": "other-0-x7k2p", "uid": "v"}}, "BackOff", "another's")
+
+    [found] = client.events("a")
+
+    assert (found.about, found.reason, found.warning) == ("Pod/a-0-x7k2p", "BackOff", True)
+
+
+def test_a_replica_without_a_pod_has_no_log(client):
+    """And the remedy is another command."""
+    client.apply(training_job("a"))
+
+    with pytest.raises(NoPod, match=r"replica 0 has no pod; .*palaestra describe a"):
+        list(client.logs("a", deadline_s=SOON_S))
+
+
+def test_a_log_that_is_gone_with_its_pod_is_told(client, tell):
+    """Its last lines are kept in the status."""
+    client.apply(training_job("a"))
+    pod = {"name": "a-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
+    tell("a", "Running", replicas=[{"index": 0, "phase": "Running", "pod": pod}])
+
+    with pytest.raises(NoPod, match=r"pod a-0-x7k2p: is gone, .*last lines"):
+        list(client.logs("a", deadline_s=SOON_S))

@@ -1,0 +1,62 @@
+"""The commands on a cluster, as far as they go without one."""
+
+import pytest
+
+from palaestra.cli import main
+
+COMMANDS = [
+    *("get", "describe", "watch", "logs", "events"),
+    *("suspend", "resume", "delete", "fetch", "try", "doctor"),
+]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_says_what_is_read_and_how_it_ends(name, capsys):
+    """Every command takes kubectl's options for which cluster."""
+    with pytest.raises(SystemExit) as ended:
+        main([name, "--help"])
+
+    out = " ".join(capsys.readouterr().out.split())
+    assert ended.value.code == 0
+    assert "--context" in out
+    assert "--kubeconfig" in out
+    assert "1 the cluster has no such job" in out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_without_a_cluster_a_line_says_how_to_name_one(name, tmp_path, capsys):
+    """Not a traceback of a library, and nothing is written."""
+    job = [] if name in {"get", "doctor"} else ["job"]
+
+    code = main([name, *job, f"--kubeconfig={tmp_path}/none"])
+
+    assert code == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{tmp_path}/none: ")
+    assert "--kubeconfig" in line
+
+
+def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
+    """With the file in which it was looked for."""
+    kubeconfig = tmp_path / "kubeconfig"
+    kubeconfig.write_text(
+        "{current-context: a, contexts: [{name: a, context: {cluster: c, user: u}}],"
+        " clusters: [{name: c, cluster: {server: 'http://127.0.0.1:1'}}], users: [{name: u, user: {}}]}"
+    )
+
+    assert main(["get", f"--kubeconfig={kubeconfig}", "--context=b"]) == 2
+    assert "b" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("program", "shown"),
+    [("kubectl-palaestra", "usage: kubectl palaestra"), ("palaestra", "usage: palaestra")],
+)
+def test_help_is_typed_as_it_was_called(program, shown, monkeypatch, capsys):
+    """As kubectl's plugin its examples can be pasted."""
+    monkeypatch.setattr("sys.argv", [f"/usr/bin/{program}"])
+
+    with pytest.raises(SystemExit):
+        main(["--help"])
+
+    assert capsys.readouterr().out.startswith(shown)

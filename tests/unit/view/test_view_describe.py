@@ -1,0 +1,71 @@
+"""What `palaestra describe` tells of a job, line by line."""
+
+from datetime import timedelta
+
+from palaestra.client import Happening
+from palaestra.view import describe, happened
+from tests.unit.view.jobs import CREATED, NOW, make_job
+
+
+def told(job):
+    """Return the lines about a job, without their indents."""
+    return [line.strip() for line in describe(job, CREATED, NOW)]
+
+
+def test_a_running_job_is_told_from_spec_to_last_attempt():
+    """In the order in which a person asks."""
+    lines = told(make_job())
+
+    assert "Algorithm:     DQN, 50,000 steps, seed 1" in lines
+    assert "Step:           12,000 of 50,000 (24%), 50 a second, about 12m40s to go" in lines
+    assert "Checkpoint:     step 11,000, 2m ago" in lines
+    assert "Restarts:       trainer 1, simulator 3" in lines
+    assert "Time spent:     stepping 75%, learning 25%" in lines
+    assert "Running   True     1m      Because   so it is" in lines
+    assert lines[-3:] == ["its last lines:", "first", "last"]
+
+
+def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
+    """Given up is more than its last state."""
+    lines = told(make_job())
+
+    assert "collect-0    Collect    ready      3          -         did not answer" in lines
+    assert "evaluate-0   Evaluate   given up   0          -         -" in lines
+
+
+def test_what_is_not_known_is_left_out():
+    """A job that nobody has looked at yet has a name and no progress."""
+    lines = told(make_job(phase="Pending", step=None, target=None, goodput=None, lastAttempt=None))
+
+    assert not [line for line in lines if line.startswith(("Step", "Time spent", "Last attempt"))]
+    assert "none yet" in lines
+
+
+def test_a_time_ledger_of_no_seconds_is_left_out():
+    """The first poll of a trainer comes before its first whole second."""
+    assert not [line for line in told(make_job(goodput={})) if line.startswith("Time spent")]
+
+
+def test_where_the_run_lies_is_told():
+    """It decides what is left when the job is deleted."""
+    assert "Storage:       in the pod, and gone with it" in told(
+        make_job(spec={"storage": {"ephemeral": True}})
+    )
+    assert "Storage:       claim mine" in told(make_job(spec={"storage": {"existingClaim": "mine"}}))
+
+
+def test_events_have_an_age_and_a_count():
+    """A message that the API server broke into lines is one."""
+    event = Happening(
+        time=NOW - timedelta(minutes=3),
+        warning=True,
+        about="Pod/job-0-x7k2p",
+        reason="BackOff",
+        message="back-off\nrestarting",
+        count=4,
+    )
+
+    lines = happened([event], NOW)
+
+    assert " ".join(lines[1].split()) == "3m (x4) Warning BackOff Pod/job-0-x7k2p back-off restarting"
+    assert happened([], NOW) == ["none that the cluster remembers"]

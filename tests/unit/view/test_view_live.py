@@ -1,0 +1,82 @@
+"""What `palaestra watch` draws."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from palaestra.view import History, live
+from palaestra.view.history import MOST
+from tests.unit.view.jobs import NOW, make_job
+
+
+@pytest.fixture
+def draw():
+    """Return what a terminal of 80 columns shows of a job that came to these steps."""
+
+    def drawn(job, *before):
+        history = History()
+        for each in (*before, job):
+            history.add(each.status)
+        console = Console(file=io.StringIO(), width=80)
+        console.print(live(job, history, NOW))
+        return console.file.getvalue()
+
+    return drawn
+
+
+def test_a_line_rises_as_training_goes_on(draw):
+    """Success from 0 to 1 is the whole height."""
+    before = [make_job(step=step, successRate=rate) for step, rate in ((1000, 0.0), (2000, 0.5))]
+
+    text = draw(make_job(step=3000, successRate=1.0), *before)
+
+    assert "▁▅█" in text
+    assert "100%" in text
+
+
+def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
+    """A figure that is cut off at its newest end would be the wrong one."""
+    before = [make_job(step=step, successRate=0.0) for step in range(MOST)]
+
+    text = draw(make_job(step=MOST, successRate=1.0), *before)
+
+    assert "▁" * (MOST - 1) + "█" in text
+    assert all(len(line) <= 80 for line in text.splitlines())
+
+
+def test_the_phase_its_reason_and_the_simulators_are_told(draw):
+    """Why a job stands where it does is seen without another command."""
+    text = draw(make_job())
+
+    assert "job  Running" in text
+    assert "Because: so it is" in text
+    assert "Training: the trainer runs" in text
+    assert "1/2, 3 restarts" in text
+
+
+def test_a_job_that_nobody_has_seen_is_drawn(draw):
+    """The command is typed right after `kubectl apply`."""
+    job = make_job(step=None, target=None, simulators=[], lastCheckpoint=None)
+    unseen = job.model_copy(update={"status": type(job.status)()})
+
+    assert "not seen by an operator yet" in draw(unseen)
+
+
+def test_a_status_without_news_adds_nothing_to_the_history():
+    """Ages change each second, figures do not."""
+    history = History()
+    history.add(make_job().status)
+    history.add(make_job().status)
+
+    assert len(history.of(0)) == 1
+
+
+def test_the_history_forgets_what_no_line_has_room_for():
+    """A week of watching must not fill the memory."""
+    history = History()
+    for step in range(MOST + 5):
+        history.add(make_job(step=step).status)
+
+    assert len(history.of(0)) == MOST
+    assert history.of(0)[0].step == 5
