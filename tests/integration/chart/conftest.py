@@ -20,6 +20,7 @@ MODULES = {
     "github.com/prometheus-operator/prometheus-operator@v0.85.0": "example/prometheus-operator-crd",
     "sigs.k8s.io/kueue@v0.19.1": "config/components/crd/bases",
 }
+DEFINITION = "trainingjobs.palaestra.dev"  # left by tests that need no more of Palaestra
 DOWNLOAD_S = 300
 NAMESPACES = (NAMESPACE, "robots", "drones")
 Kubectl = Callable[..., str]

@@ -8,6 +8,7 @@ import pytest
 
 from tests.chart.helm import NAMESPACE, ROOT
 from tests.control_plane.programs import programs
+from tests.integration.chart.conftest import DEFINITION
 
 PAGE = (ROOT / "docs" / "install.md").read_text()
 BLOCKS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
@@ -24,6 +25,7 @@ TYPED_S = 120
 @pytest.fixture
 def typed(cluster, kubectl, tmp_path):
     """Type some commands in a checkout, and return what they say."""
+    kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
     for name in (NAMESPACE, "robots", "drones"):
         kubectl("delete", "namespace", name, "--ignore-not-found", "--wait")
     for name in ("charts", "manifests"):

@@ -11,15 +11,15 @@ from palaestra.trial import TrialFailed, attempt
 from tests.chart import installation
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
 from tests.chart.modes import MODES
+from tests.integration.chart.conftest import DEFINITION
 from tests.integration.operator.cluster import eventually, training_job
 from tests.integration.operator.operators import RunningOperator
-
-DEFINITION = "trainingjobs.palaestra.dev"
 
 
 @pytest.fixture
 def release(cluster, places, kubectl):  # noqa: ARG001 - are installed into
-    """Run Helm on the cluster; everything that it installed is gone at the end."""
+    """Run Helm on the cluster, which has no release; everything that it installed is gone at the end."""
+    kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
 
     def run(verb, name, *options, chart=CHART, namespace=NAMESPACE, values=None):
         of = () if verb == "uninstall" else (str(chart), "--values=-")
