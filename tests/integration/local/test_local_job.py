@@ -210,11 +210,12 @@ def test_a_run_that_was_done_when_it_was_interrupted_stays_done(play, eventually
 def test_a_killed_sidecar_takes_its_simulator_with_it_and_comes_back(play, eventually):
     """As in a container, where the end of the first process is the end of all."""
     fork = FORK.format(pids=shlex.quote(str(play.pids)))
-    runner = play.start("while :; do sleep 0.02; done", sidecar=f"{fork}\nwait")
+    sidecar = f"echo $$ > $FOLDER/sidecar\n{fork}\nwait"
+    runner = play.start("while :; do sleep 0.02; done", sidecar=sidecar)
     eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 3)
     first = play.running()
 
-    os.kill(first[0], signal.SIGKILL)
+    os.kill(int((play.folder / "sidecar").read_text()), signal.SIGKILL)
     eventually(lambda: len(play.pids.read_text().split()) == 5)
 
     still = set(first) & set(play.running())

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from palaestra_sim.stub.obstacles import Block, Disc, Neighbourhood
 
 places = st.floats(-3, 3)
+nearby = st.floats(-1.5, 1.5)  # from the middle of an obstacle, so that most touch it
 angles = st.floats(-math.pi, math.pi)
 sizes = st.floats(0.05, 2)
 discs = st.builds(Disc, places, places, sizes)
@@ -24,9 +25,14 @@ def cast(obstacle, x, y, heading, reach=10.0):
     return distances[0]
 
 
-@given(obstacle=obstacles, x=places, y=places, radius=st.floats(0.05, 1))
-def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(obstacle, x, y, radius):
+@given(
+    place=st.tuples(places, places), away=st.tuples(nearby, nearby), heading=angles, radius=st.floats(0.05, 1)
+)
+@pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
+def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
     """The push is the shortest way out that the contact tells."""
+    obstacle = Block(*place, heading, (1.0, 2.0)) if block else Disc(*place, 1.0)
+    x, y = place[0] + away[0], place[1] + away[1]
     contact = obstacle.contact(x, y, radius)
     assume(contact is not None)
     nx, ny, depth = contact
