@@ -175,6 +175,60 @@ def test_a_new_attempt_does_not_show_step_0(training, last_word):
     assert (scene.replica().step, scene.replica().furthest_step) == (40, 50)
 
 
+def tell_suspension(scene, status):
+    """Let the Job controller tell since when the Job is suspended, or is no more."""
+    turned = {"type": "Suspended", "status": status, "lastTransitionTime": scene.stamp()}
+    scene.job().setdefault("status", {})["conditions"] = [turned]
+
+
+def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
+    """The Job controller makes the pod, then takes the time; a second can begin between the two."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.pass_(15)
+    scene.running_pod()
+    scene.pass_(1)
+    tell_suspension(scene, "False")
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 0, 1)
+
+
+def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
+    """The two come by two watches; what is told later is not counted again for the pod after that one."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.pass_(15)
+    tell_suspension(scene, "True")
+    scene.pass_(15)
+    scene.running_pod()
+    scene.settle(1)
+    assert restarts(scene) == (2, 0, 0, 1)
+
+    scene.objects["pods"].clear()
+    tell_suspension(scene, "False")
+    scene.pass_(15)
+    scene.running_pod()
+    scene.settle()
+
+    assert restarts(scene) == (3, 0, 1, 1)
+
+
+def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training):
+    """The newest pod was there when the Job was suspended."""
+    scene, _ = training()
+    scene.objects["pods"].clear()
+    scene.pass_(15)
+    scene.running_pod()
+    scene.pass_(15)
+    tell_suspension(scene, "True")
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 1, 0)
+
+
 ENDS = ("failure", "taken", "deleted", "suspended")
 
 
@@ -219,7 +273,5 @@ def _end(scene, pod, end, failures):
     scene.objects["pods"].remove(pod)
     if end == "suspended":
         scene.pass_(5)
-        status = scene.job().setdefault("status", {})
-        resumed = {"type": "Suspended", "status": "False", "lastTransitionTime": scene.stamp()}
-        status["conditions"] = [resumed]
+        tell_suspension(scene, "False")
     return 0

@@ -6,7 +6,7 @@ in the run directory (`attempt` in /status and in the last word) adds those that
 replaced has one of three causes, and 1 + trainer + disruption + suspension is the attempt's number:
 
     trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
-    suspension  the Job was resumed between the two pods
+    suspension  the Job was suspended between the two pods
     disruption  all others: the cluster or a person took the pod, or it exited with 75
 
 A failed pod that was not replaced yet is no restart. Restarts of simulators are counted within an attempt
@@ -16,6 +16,7 @@ is added. All of it is written at once, on the status that was read, so nothing 
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from datetime import timedelta
 
 from palaestra.api.status import PodReference, ReplicaStatus, Restarts
 from palaestra.observe.reading import MOST_COUNT
@@ -23,6 +24,8 @@ from palaestra.observe.views import PodView, ReplicaObserved
 from palaestra_sim.protocol.status import ExitCode
 
 MOST_UNSEEN = 100  # pods that a trainer's record may have and nobody saw: a record is not to be trusted
+# The Job controller makes the pod first and takes the time of the resumption then; both are whole seconds.
+_DATED_LATE = timedelta(seconds=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +96,7 @@ def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
     explained = before.trainer + before.disruption + before.suspension
     replaced = max(attempt - 1 - explained, 0)
     trainer = min(max(_by_evidence(old, seen, newer), _by_the_job(old, seen)), replaced)
-    suspension = min(_resumed(old, seen, newer), replaced - trainer)
+    suspension = min(_suspended(old, seen, newer), replaced - trainer)
     return before.model_copy(
         update={
             "trainer": before.trainer + trainer,
@@ -118,11 +121,15 @@ def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
     return max(seen.job.failures - last - old.restarts.trainer, 0)
 
 
-def _resumed(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return 1 if the Job was resumed after the named pod was made and before the newest was."""
-    if old.pod is None or not newer or seen.job is None or seen.job.resumed is None:
+def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    """Return 1 if the Job was suspended after the named pod was made, and resumed for the newest."""
+    if old.pod is None or not newer or seen.job is None:
         return 0
-    return int(old.pod.created <= seen.job.resumed <= newer[-1].created)
+    named, newest = old.pod.created, newer[-1].created
+    if (paused := seen.job.paused) is not None:  # the pod is seen before the Job tells that it was resumed
+        return int(named <= paused < newest)
+    resumed = seen.job.resumed
+    return int(resumed is not None and named + _DATED_LATE < resumed <= newest + _DATED_LATE)
 
 
 def _within_attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:

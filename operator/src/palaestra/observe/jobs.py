@@ -20,11 +20,13 @@ def job_view(raw: Raw) -> JobView:
     named, end = next(((kind, end) for kind, end in _ENDS if holds(raw, kind)), ("", None))
     ending = condition(raw, named)
     suspension = condition(raw, "Suspended")
+    turned = {suspension.get("status"): time(suspension, "lastTransitionTime")}
     return JobView(
         name=text(metadata, "name", 253),
         uid=text(metadata, "uid", 253),
         suspended=part(raw, "spec").get("suspend") is True,
-        resumed=time(suspension, "lastTransitionTime") if suspension.get("status") == "False" else None,
+        paused=turned.get("True"),
+        resumed=turned.get("False"),
         stopped=_stopped(part(metadata, "annotations")),
         failures=_failures(status),
         end=end,

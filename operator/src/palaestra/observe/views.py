@@ -174,7 +174,8 @@ class JobView:
 
     Attributes:
         suspended: as its spec says.
-        resumed: when it last was, None: it never was suspended or still is.
+        paused: since when it is, by its controller's word; None: it is not.
+        resumed: when it last was, by its controller's word; None: it never was suspended or still is.
         stopped: reason and message of our stop mark; None: it has none.
         failures: pods that failed and count against backoffLimit.
         end, end_reason, end_message, ended: what its conditions say; None and "" while it goes on.
@@ -185,6 +186,7 @@ class JobView:
     name: str
     uid: str
     suspended: bool = False
+    paused: datetime | None = None
     resumed: datetime | None = None
     stopped: tuple[str, str] | None = None
     failures: int = 0
