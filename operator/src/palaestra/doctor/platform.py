@@ -13,7 +13,7 @@ from palaestra.cluster.resources import DEFINITIONS, NODES, PODS, STORAGE_CLASSE
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
 from palaestra.plan import Images
 from palaestra.plan.containers import SECURITY
-from palaestra.plan.pod import USER
+from palaestra.plan.pod import UNPRIVILEGED
 
 FIRST = (1, 33)
 DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"
@@ -118,12 +118,6 @@ def trial_pod(namespace: str) -> Object:
     """Return a pod that is never made: restricted, with one sidecar."""
     image = Images.of_release(version("palaestra")).trainer
     common = {"image": image, "command": ["true"], "securityContext": SECURITY, "resources": RESOURCES}
-    security = {
-        "runAsNonRoot": True,
-        "runAsUser": USER,
-        "runAsGroup": USER,
-        "seccompProfile": {"type": "RuntimeDefault"},
-    }
     return {
         "apiVersion": "v1",
         "kind": "Pod",
@@ -131,7 +125,7 @@ def trial_pod(namespace: str) -> Object:
         "spec": {
             "restartPolicy": "Never",
             "automountServiceAccountToken": False,
-            "securityContext": security,
+            "securityContext": UNPRIVILEGED,
             "initContainers": [{"name": "sidecar", "restartPolicy": "Always", **common}],
             "containers": [{"name": "trainer", **common}],
         },

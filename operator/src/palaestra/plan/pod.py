@@ -10,6 +10,12 @@ from palaestra.plan.replica import Replica
 from palaestra.plan.resources import twice
 
 USER = 65532  # uid, gid and fsGroup of everything in the pod
+UNPRIVILEGED: Mapping[str, Any] = {
+    "runAsNonRoot": True,
+    "runAsUser": USER,
+    "runAsGroup": USER,
+    "seccompProfile": {"type": "RuntimeDefault"},
+}
 GRACE_S = 60  # for the last checkpoint and the shutdown of the simulators, within a spot notice
 SCRATCH_SIZE = "1Gi"
 MEMORY_SIZE = "128Mi"
@@ -38,12 +44,9 @@ def pod_template(
             "enableServiceLinks": False,
             "terminationGracePeriodSeconds": GRACE_S,
             "securityContext": {
-                "runAsNonRoot": True,
-                "runAsUser": USER,
-                "runAsGroup": USER,
+                **UNPRIVILEGED,
                 "fsGroup": USER,
                 "fsGroupChangePolicy": "OnRootMismatch",
-                "seccompProfile": {"type": "RuntimeDefault"},
             },
             **_scheduling(replica),
             "initContainers": init,
