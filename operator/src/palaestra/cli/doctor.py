@@ -1,7 +1,7 @@
 """`palaestra doctor`: what keeps jobs from running in a cluster."""
 
 import argparse
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from palaestra.cli.cluster import REFUSED, cluster_command, say
 from palaestra.cli.parsing import Commands
@@ -34,13 +34,12 @@ def _doctor(client: Client, options: argparse.Namespace) -> int:
     found = []
     for each in examine(site):
         found.append(each)
-        say(shown([each]))
+        say(shown(each))
     return REFUSED if any(each.verdict is Verdict.WRONG for each in found) else 0
 
 
-def shown(findings: Iterable[Finding]) -> Iterator[str]:
-    """Yield a line for each finding, and one for its remedy."""
-    for each in findings:
-        yield f"{each.verdict:<8} {each.what:<{WIDTH}} {each.fact}"
-        if each.remedy:
-            yield f"{'':<8} {'':<{WIDTH}} -> {each.remedy}"
+def shown(found: Finding) -> Iterator[str]:
+    """Yield a line for a finding, and one for its remedy."""
+    yield f"{found.verdict:<8} {found.what:<{WIDTH}} {found.fact}"
+    if found.remedy:
+        yield f"{'':<8} {'':<{WIDTH}} -> {found.remedy}"
