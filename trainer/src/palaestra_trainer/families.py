@@ -6,7 +6,7 @@ begin at 0 with each attempt. Which job and which replica is said by whoever scr
 
 from __future__ import annotations
 
-from palaestra_sim.protocol.metrics import Family, Kind, Label
+from palaestra_sim.protocol.metrics import Family, Label, counter, gauge, histogram
 from palaestra_sim.protocol.status import Cause, FaultKind, SimulatorRole
 
 # Returns have no scale that is known beforehand, and are negative as often as not: so the buckets are
@@ -40,139 +40,125 @@ KIND = Label(name="kind", values=tuple(FaultKind))
 CAUSE = Label(name="cause", values=(*(kind for kind in FaultKind if kind is not FaultKind.SLOW), RECYCLED))
 
 
-def _counter(name: str, meaning: str, *labels: Label) -> Family:
-    return Family(name=name, kind=Kind.COUNTER, meaning=meaning, labels=labels)
-
-
-def _gauge(name: str, meaning: str, *labels: Label) -> Family:
-    return Family(name=name, kind=Kind.GAUGE, meaning=meaning, labels=labels)
-
-
-def _histogram(name: str, meaning: str, buckets: tuple[float, ...], *labels: Label) -> Family:
-    return Family(name=name, kind=Kind.HISTOGRAM, meaning=meaning, buckets=buckets, labels=labels)
-
-
-STEPS = _counter("palaestra_trainer_steps_total", "Valid environment steps so far.")
-TARGET_STEPS = _gauge("palaestra_trainer_target_steps", "Steps at which the run ends.")
-STEPS_PER_SECOND = _gauge("palaestra_trainer_steps_per_second", "Speed of the last half minute.")
-STEPS_LOST = _counter(
+STEPS = counter("palaestra_trainer_steps_total", "Valid environment steps so far.")
+TARGET_STEPS = gauge("palaestra_trainer_target_steps", "Steps at which the run ends.")
+STEPS_PER_SECOND = gauge("palaestra_trainer_steps_per_second", "Speed of the last half minute.")
+STEPS_LOST = counter(
     "palaestra_trainer_steps_lost_total",
     "Valid steps played in vain: in episodes that a fault cut, or played again after an interruption.",
 )
-EXTRA_STEPS = _counter(
+EXTRA_STEPS = counter(
     "palaestra_trainer_extra_steps_total", "Simulation steps taken because a message had not come."
 )
-IDLE = _gauge("palaestra_trainer_idle_seconds", "Since the last environment step of any simulator.")
-STALL_DEADLINE = _gauge(
+IDLE = gauge("palaestra_trainer_idle_seconds", "Since the last environment step of any simulator.")
+STALL_DEADLINE = gauge(
     "palaestra_trainer_stall_deadline_seconds", "After so many idle seconds the trainer ends itself."
 )
-SECONDS = _counter(
+SECONDS = counter(
     "palaestra_trainer_seconds_total",
     "Wall clock by what it was spent on.",
     Label(name="cause", values=tuple(Cause)),
 )
 
-EPISODES = _counter("palaestra_trainer_episodes_total", "Training episodes that ended without a fault.")
-RETURN = _histogram(
+EPISODES = counter("palaestra_trainer_episodes_total", "Training episodes that ended without a fault.")
+RETURN = histogram(
     "palaestra_trainer_episode_return",
     "Return of each training episode of this attempt; no sum and count, as returns may be negative.",
     RETURNS,
 )
-RETURN_MEAN = _gauge(
+RETURN_MEAN = gauge(
     "palaestra_trainer_episode_return_mean",
     "Mean return of the last 100 training episodes, as rollout/ep_rew_mean in TensorBoard.",
 )
-RETURN_QUANTILE = _gauge(
+RETURN_QUANTILE = gauge(
     "palaestra_trainer_episode_return_quantile",
     "Returns of the last 100 training episodes in order: the least, the median, the greatest.",
     Label(name="rank", values=tuple(f"{each:g}" for each in QUANTILES)),
 )
-LENGTH = _histogram(
+LENGTH = histogram(
     "palaestra_trainer_episode_length_steps", "Steps of each training episode of this attempt.", LENGTHS
 )
-SUCCESS = _gauge(
+SUCCESS = gauge(
     "palaestra_trainer_episode_success_ratio",
     "Share of the last 100 training episodes of this attempt that succeeded.",
 )
 
-EVALUATIONS = _counter("palaestra_trainer_evaluations_total", "Evaluations in this attempt.")
-EVALUATION_SUCCESS = _gauge(
+EVALUATIONS = counter("palaestra_trainer_evaluations_total", "Evaluations in this attempt.")
+EVALUATION_SUCCESS = gauge(
     "palaestra_trainer_evaluation_success_ratio", "Share of successful episodes in the last evaluation."
 )
-EVALUATION_RETURN = _gauge(
+EVALUATION_RETURN = gauge(
     "palaestra_trainer_evaluation_return_mean", "Mean return of the episodes of the last evaluation."
 )
-EVALUATION_LENGTH = _gauge(
+EVALUATION_LENGTH = gauge(
     "palaestra_trainer_evaluation_length_mean_steps", "Mean length of the episodes of the last evaluation."
 )
 
-LOSS = _gauge(
+LOSS = gauge(
     "palaestra_trainer_loss",
     "Losses of the last update, as train/* in TensorBoard.",
     Label(name="loss", values=LOSSES),
 )
-EXPLORATION = _gauge(
+EXPLORATION = gauge(
     "palaestra_trainer_exploration",
     "How much is tried at random: DQN's exploration_rate, SAC's ent_coef, the std of actions that are drawn.",
     Label(name="measure", values=MEASURES),
 )
-LEARNING_RATE = _gauge("palaestra_trainer_learning_rate", "Learning rate of the last update.")
+LEARNING_RATE = gauge("palaestra_trainer_learning_rate", "Learning rate of the last update.")
 
-CHECKPOINT_STEPS = _gauge("palaestra_trainer_checkpoint_steps", "Step of the newest checkpoint.")
-CHECKPOINT_INTERVAL = _gauge(
+CHECKPOINT_STEPS = gauge("palaestra_trainer_checkpoint_steps", "Step of the newest checkpoint.")
+CHECKPOINT_INTERVAL = gauge(
     "palaestra_trainer_checkpoint_interval_steps", "Steps after which a checkpoint is due."
 )
-CHECKPOINT_TIME = _gauge(
+CHECKPOINT_TIME = gauge(
     "palaestra_trainer_checkpoint_timestamp_seconds",
     "Unix time at which this attempt wrote its newest checkpoint.",
 )
-CHECKPOINT_DURATION = _histogram(
+CHECKPOINT_DURATION = histogram(
     "palaestra_trainer_checkpoint_duration_seconds", "Time that writing a checkpoint took.", CHECKPOINT_S
 )
-CHECKPOINT_SIZE = _gauge(
+CHECKPOINT_SIZE = gauge(
     "palaestra_trainer_checkpoint_size_bytes",
     "Files of the newest checkpoint of this attempt, those that it shares with older ones too.",
 )
-CHECKPOINT_FAILURES = _counter(
+CHECKPOINT_FAILURES = counter(
     "palaestra_trainer_checkpoint_failures_total", "Checkpoints of this attempt that a full disk refused."
 )
 
-SIMULATORS = _gauge(
+SIMULATORS = gauge(
     "palaestra_trainer_simulators", "Simulators by how they stand, as the trainer sees them.", ROLE, STATE
 )
-BUILD = _gauge(
+BUILD = gauge(
     "palaestra_trainer_build_info",
     "Always 1; the label tells the release.",
     Label(name="version", bound="release"),
 )
 
-FAULTS = _counter(
+FAULTS = counter(
     "palaestra_simulator_faults_total",
     "Faults that the trainer met; slow is a step that took too long, and breaks nothing.",
     SIMULATOR,
     KIND,
 )
-RESTARTS = _counter(
+RESTARTS = counter(
     "palaestra_simulator_restarts_total",
     "Restarts by the fault that they mended; recycled: a healthy one, for its wear.",
     SIMULATOR,
     CAUSE,
 )
-BUDGET = _gauge(
+BUDGET = gauge(
     "palaestra_simulator_restart_budget_spent_ratio",
     "Share of restart.limit that was spent within restart.withinSeconds; 1: the next fault is the last.",
     SIMULATOR,
 )
-RESETS = _counter(
-    "palaestra_simulator_resets_total", "Episodes begun, in training and evaluation.", SIMULATOR
-)
-STEP_DURATION = _histogram(
+RESETS = counter("palaestra_simulator_resets_total", "Episodes begun, in training and evaluation.", SIMULATOR)
+STEP_DURATION = histogram(
     "palaestra_simulator_step_duration_seconds",
     "Time from asking for an environment step to having it, without what was done for other simulators.",
     STEP_S,
     SIMULATOR,
 )
-SIMULATED = _counter(
+SIMULATED = counter(
     "palaestra_simulator_simulated_seconds_total",
     "Simulated time; its rate is the real-time factor.",
     SIMULATOR,

@@ -6,7 +6,7 @@ pods.
 
 from palaestra.api.reasons import ROWS, Reason
 from palaestra.api.status import Phase, Restarts
-from palaestra_sim.protocol.metrics import Family, Kind, Label
+from palaestra_sim.protocol.metrics import Family, Label, counter, gauge, histogram
 
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
 # From a node that has all images to a queue that takes the night.
@@ -17,74 +17,55 @@ ENDS = tuple(reason for reason in Reason if reason is Reason.SUCCEEDED or ROWS[r
 
 VERB = Label(name="verb", values=("get", "list", "watch", "create", "patch", "apply", "delete"))
 
-JOBS = Family(
-    name="palaestra_jobs",
-    kind=Kind.GAUGE,
-    meaning="TrainingJobs by the namespace that they are in, and phase; told by the operator that leads.",
-    labels=(
-        Label(name="job_namespace", bound="namespace with jobs"),
-        Label(name="phase", values=tuple(Phase)),
-    ),
+JOBS = gauge(
+    "palaestra_jobs",
+    "TrainingJobs by the namespace that they are in, and phase; told by the operator that leads.",
+    Label(name="job_namespace", bound="namespace with jobs"),
+    Label(name="phase", values=tuple(Phase)),
 )
-TIME_TO_RUNNING = Family(
-    name="palaestra_job_time_to_running_seconds",
-    kind=Kind.HISTOGRAM,
-    meaning="Time from a TrainingJob's creation until it first ran, with the queue and the images.",
-    buckets=WAITS,
+TIME_TO_RUNNING = histogram(
+    "palaestra_job_time_to_running_seconds",
+    "Time from a TrainingJob's creation until it first ran, with the queue and the images.",
+    WAITS,
 )
-RESTARTS = Family(
-    name="palaestra_replica_restarts_total",
-    kind=Kind.COUNTER,
-    meaning="What was started again in replicas: pods by why they were replaced, and simulators.",
-    labels=(Label(name="cause", values=tuple(Restarts.model_fields)),),
+RESTARTS = counter(
+    "palaestra_replica_restarts_total",
+    "What was started again in replicas: pods by why they were replaced, and simulators.",
+    Label(name="cause", values=tuple(Restarts.model_fields)),
 )
-REPLICA_ENDS = Family(
-    name="palaestra_replica_ends_total",
-    kind=Kind.COUNTER,
-    meaning="Replicas that ended, by the reason that their status gives.",
-    labels=(Label(name="reason", values=ENDS),),
+REPLICA_ENDS = counter(
+    "palaestra_replica_ends_total",
+    "Replicas that ended, by the reason that their status gives.",
+    Label(name="reason", values=ENDS),
 )
-RECONCILED = Family(
-    name="palaestra_operator_reconcile_duration_seconds",
-    kind=Kind.HISTOGRAM,
-    meaning="Time that one look at a TrainingJob took; conflict is harmless, error is not.",
-    labels=(Label(name="result", values=RESULTS),),
-    buckets=SECONDS,
+RECONCILED = histogram(
+    "palaestra_operator_reconcile_duration_seconds",
+    "Time that one look at a TrainingJob took; conflict is harmless, error is not.",
+    SECONDS,
+    Label(name="result", values=RESULTS),
 )
-QUEUE_DEPTH = Family(
-    name="palaestra_operator_queue_depth",
-    kind=Kind.GAUGE,
-    meaning="TrainingJobs that wait for a worker.",
+QUEUE_DEPTH = gauge("palaestra_operator_queue_depth", "TrainingJobs that wait for a worker.")
+QUEUE_WAIT = histogram(
+    "palaestra_operator_queue_wait_seconds", "Time that a TrainingJob waited for a worker.", SECONDS
 )
-QUEUE_WAIT = Family(
-    name="palaestra_operator_queue_wait_seconds",
-    kind=Kind.HISTOGRAM,
-    meaning="Time that a TrainingJob waited for a worker.",
-    buckets=SECONDS,
+REQUESTS = counter(
+    "palaestra_operator_requests_total",
+    "Requests to the API server; code 0: no answer.",
+    VERB,
+    Label(name="resource", bound="kind of object"),
+    Label(name="code", bound="HTTP status that occurred"),
 )
-REQUESTS = Family(
-    name="palaestra_operator_requests_total",
-    kind=Kind.COUNTER,
-    meaning="Requests to the API server; code 0: no answer.",
-    labels=(
-        VERB,
-        Label(name="resource", bound="kind of object"),
-        Label(name="code", bound="HTTP status that occurred"),
-    ),
+REQUEST_DURATION = histogram(
+    "palaestra_operator_request_duration_seconds",
+    "Time that a request to the API server took, watches aside.",
+    SECONDS,
+    VERB,
 )
-REQUEST_DURATION = Family(
-    name="palaestra_operator_request_duration_seconds",
-    kind=Kind.HISTOGRAM,
-    meaning="Time that a request to the API server took, watches aside.",
-    labels=(VERB,),
-    buckets=SECONDS,
-)
-LEADER = Family(name="palaestra_operator_leader", kind=Kind.GAUGE, meaning="1 while this operator leads.")
-BUILD = Family(
-    name="palaestra_operator_build_info",
-    kind=Kind.GAUGE,
-    meaning="Always 1; the label tells the release.",
-    labels=(Label(name="version", bound="release"),),
+LEADER = gauge("palaestra_operator_leader", "1 while this operator leads.")
+BUILD = gauge(
+    "palaestra_operator_build_info",
+    "Always 1; the label tells the release.",
+    Label(name="version", bound="release"),
 )
 
 FAMILIES: tuple[Family, ...] = (

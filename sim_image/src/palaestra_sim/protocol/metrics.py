@@ -92,6 +92,21 @@ class Family:
         return made
 
 
+def counter(name: str, meaning: str, *labels: Label) -> Family:
+    """Return a family whose values only rise."""
+    return Family(name=name, kind=Kind.COUNTER, meaning=meaning, labels=labels)
+
+
+def gauge(name: str, meaning: str, *labels: Label) -> Family:
+    """Return a family whose values rise and fall."""
+    return Family(name=name, kind=Kind.GAUGE, meaning=meaning, labels=labels)
+
+
+def histogram(name: str, meaning: str, buckets: tuple[float, ...], *labels: Label) -> Family:
+    """Return a family that tells how many values were how large."""
+    return Family(name=name, kind=Kind.HISTOGRAM, meaning=meaning, labels=labels, buckets=buckets)
+
+
 class Tally:
     """How many of the observed values fell into each bucket; written by one thread, read by any.
 
