@@ -8,13 +8,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from palaestra.api.status import Phase
+from palaestra.api.status import TERMINAL, Phase
 from palaestra.cluster import Api, ApiError, NotFound
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 
 PERIOD_S = 2.0
-ENDS = (Phase.SUCCEEDED.value, Phase.FAILED.value)
 
 Object = dict[str, Any]
 Tell = Callable[[str], None]
@@ -63,7 +62,7 @@ def _take_away(api: Api, made: Object, tell: Tell) -> None:
 def _wait(api: Api, namespace: str, name: str, within_s: float, tell: Tell) -> None:
     ends = time.monotonic() + within_s
     phase, status = "", Object()
-    while phase not in ENDS:
+    while phase not in TERMINAL:
         if time.monotonic() > ends:
             raise TrialFailed(f"{namespace}/{name}: {phase} after {within_s:g} s; {_why(status)}")
         if phase:

@@ -26,6 +26,9 @@ class Phase(StrEnum):
     FAILED = "Failed"
 
 
+TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})  # a job or a replica that came there stays there
+
+
 class SimulatorPhase(StrEnum):
     """Where a simulator stands, as its sidecar tells it."""
 

@@ -8,11 +8,11 @@ from rich.console import Console
 from rich.live import Live
 
 from palaestra.api import TrainingJob
-from palaestra.api.status import Phase
+from palaestra.api.status import TERMINAL, Phase
 from palaestra.cli.cluster import REFUSED, cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client, why
-from palaestra.client.reading import ENDS, current
+from palaestra.client.reading import current
 from palaestra.view import History, live, progress
 
 WATCH = """\
@@ -36,7 +36,7 @@ def add(commands: Commands) -> None:
 def _watch(client: Client, options: argparse.Namespace) -> int:
     show = _drawn if sys.stdout.isatty() else _printed
     last = show(client, options)
-    if not current(last) or last.status.phase not in ENDS:
+    if not current(last) or last.status.phase not in TERMINAL:
         say([f"{options.name}: was deleted"])
         return REFUSED
     say([f"{options.name}: {last.status.phase}; {why(last.status)}".rstrip("; ")])

@@ -7,12 +7,13 @@ from typing import Any, Literal, Self
 
 from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.job import API_VERSION, KIND
+from palaestra.api.status import TERMINAL
 from palaestra.api.yaml_text import NotYaml, read
 from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob
 from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
 from palaestra.client.happenings import Happening, happenings
-from palaestra.client.reading import ENDS, current, why
+from palaestra.client.reading import current, why
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
 from palaestra.cluster.api import Object
 from palaestra.cluster.resources import TRAINING_JOBS
@@ -115,7 +116,7 @@ class Client:
         for each in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
             found = _job(each)
             yield found
-            if current(found) and found.status.phase in ENDS:
+            if current(found) and found.status.phase in TERMINAL:
                 return
         if found is None:
             raise self._none(name)
@@ -137,9 +138,9 @@ class Client:
             phase = job.status.phase
             if not current(job) or phase is None:
                 continue
-            if phase == until or (until == "ended" and phase in ENDS):
+            if phase == until or (until == "ended" and phase in TERMINAL):
                 return job
-            if phase in ENDS:
+            if phase in TERMINAL:
                 raise EndedOtherwise(f"job {name}: is {phase}, not {until}: {why(job.status)}")
         raise self._none(name)
 

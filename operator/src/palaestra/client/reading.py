@@ -1,9 +1,7 @@
 """What a job's status says, and whether it speaks of the job as it is."""
 
 from palaestra.api import Status, TrainingJob
-from palaestra.api.status import ConditionStatus, Phase
-
-ENDS = frozenset({Phase.SUCCEEDED, Phase.FAILED})
+from palaestra.api.status import ConditionStatus
 
 
 def current(job: TrainingJob) -> bool:

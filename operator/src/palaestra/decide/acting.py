@@ -3,9 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from palaestra.api import TrainingJob
-from palaestra.api.status import ReplicaStatus
+from palaestra.api.status import TERMINAL, ReplicaStatus
 from palaestra.decide.decision import Action, Create, SetSuspend, Stop
-from palaestra.decide.ending import TERMINAL
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.replicas import Decided
 from palaestra.observe.views import Observed, ReplicaObserved

@@ -5,12 +5,12 @@ from datetime import datetime
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
-from palaestra.api.status import Phase, Release, ReplicaStatus, Status
+from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.acting import actions
 from palaestra.decide.conditions import Claim, Told, claims, conditions
 from palaestra.decide.counting import counted
 from palaestra.decide.decision import Decision
-from palaestra.decide.ending import TERMINAL, expired, expires
+from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import of_actions, of_change
 from palaestra.decide.moments import after, next_of, whole
 from palaestra.decide.preparing import Prepared

@@ -2,11 +2,9 @@
 
 from datetime import datetime
 
-from palaestra.api.status import Phase, Status
+from palaestra.api.status import TERMINAL, Status
 from palaestra.decide.decision import Delete
 from palaestra.decide.moments import after, seconds_between
-
-TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})
 
 
 def expires(status: Status, ttl_s: int | None) -> datetime | None:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
+from palaestra.api.status import TERMINAL
 from palaestra.decide.conditions import Told
-from palaestra.decide.ending import TERMINAL
 from palaestra.observe.reading import part
 from palaestra.observe.sources import open_to_jobs, references
 from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKind

@@ -8,8 +8,7 @@ from datetime import datetime
 from palaestra.api import Role
 from palaestra.api.history import Faults, Goodput
 from palaestra.api.lines import one_line
-from palaestra.api.status import LastCheckpoint, Phase, SimulatorPhase, SimulatorStatus
-from palaestra.decide.ending import TERMINAL
+from palaestra.api.status import TERMINAL, LastCheckpoint, Phase, SimulatorPhase, SimulatorStatus
 from palaestra.decide.situation import Situation
 from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra_sim.protocol.status import CheckpointStatus, Termination, TrainerStatus

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from palaestra.api.reasons import Reason
-from palaestra.api.status import Phase, ReplicaStatus
+from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
 from palaestra.decide.attempts import paused
 from palaestra.decide.conditions import Told
 from palaestra.decide.deadlines import DEADLINES
-from palaestra.decide.ending import TERMINAL
 from palaestra.decide.memory import memory_kills
 from palaestra.decide.outcomes import ended, last_word_by
 from palaestra.decide.preparing import Hold

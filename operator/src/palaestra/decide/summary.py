@@ -7,9 +7,8 @@ from typing import Any
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
-from palaestra.api.status import Phase, ReplicaStatus, Status
+from palaestra.api.status import TERMINAL, Phase, ReplicaStatus, Status
 from palaestra.decide.conditions import Told
-from palaestra.decide.ending import TERMINAL
 from palaestra.decide.moments import seconds_between
 from palaestra.decide.situation import Verdict
 from palaestra.observe.reading import MOST_COUNT

@@ -18,11 +18,9 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from palaestra.api.reasons import Reason
-from palaestra.api.status import ConditionType, Phase
+from palaestra.api.status import TERMINAL, ConditionType, Phase
 from palaestra.operator import families
 from palaestra_sim.protocol.metrics import Family, Values
-
-TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})
 
 Object = Mapping[str, Any]
 Counted = TypeVar("Counted", Counter, Histogram)
