@@ -10,6 +10,12 @@ WAIT = "trap exit TERM; sleep 3600 & wait"
 LITTLE = {"requests": {"cpu": "5m", "memory": "48Mi"}}
 
 
+def make_claim(name: str, **metadata: Any) -> Object:
+    """Return a claim that is no job's own."""
+    spec = {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "64Mi"}}}
+    return {"metadata": {"name": name, **metadata}, "spec": spec}
+
+
 def make_job(name: str = "tiny", *, script: str = "", simulator: Object | None = None, **spec: Any) -> Object:
     """Return manifests/examples/tiny.yaml with another `name` and these fields of its spec.
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.e2e.jobs import make_claim
 from tests.e2e.namespace import LONG_S, SHORT_S, named
 
 pytestmark = [pytest.mark.trains, pytest.mark.timeout(600)]
@@ -56,3 +57,20 @@ def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace, 
     assert replica["attempt"] == 2
     assert replica["restarts"] == {"trainer": 0, "simulator": 0, "disruption": 0, "suspension": 0, counted: 1}
     assert [named(pod) for pod in namespace.pods("amid", live=False)] == [second]
+
+
+def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace, job):
+    """Both name one claim; the second goes on to a total of its own."""
+    namespace.create("persistentvolumeclaims", make_claim("runs", labels={"palaestra.dev/for-jobs": "true"}))
+    training = {"checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
+    storage = {"existingClaim": "runs"}
+    namespace.apply(job("first", trainer=training | {"steps": 300}, storage=storage))
+    assert namespace.wait_for_end("first", LONG_S) == "Succeeded"
+
+    uid = namespace.get("trainingjobs", "first")["metadata"]["uid"]
+    namespace.apply(job("longer", trainer=training | {"steps": 500}, storage=storage | {"resumeFrom": uid}))
+
+    assert namespace.wait_for_end("longer", LONG_S) == "Succeeded"
+    assert namespace.replica("longer")["step"] == 500
+    (pod,) = namespace.pods("longer", live=False)
+    assert "resumed at step 300" in namespace.cluster.kubectl("logs", "-n", namespace.name, named(pod))

@@ -2,16 +2,13 @@
 
 import pytest
 
+from tests.e2e.jobs import make_claim
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 
 pytestmark = pytest.mark.timeout(400)
 
 SECRETS_ROLE = "palaestra-job-secrets"
 FOR_JOBS = {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}}
-CLAIM = {
-    "metadata": {"name": "kept"},
-    "spec": {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "64Mi"}}},
-}
 
 
 @pytest.fixture
@@ -28,7 +25,7 @@ def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
     namespace.apply(job("writes", script="touch /var/lib/palaestra/mark", storage={"existingClaim": "kept"}))
     namespace.wait(lambda: namespace.condition("writes", "Accepted").get("reason") == "ClaimMissing")
 
-    namespace.create("persistentvolumeclaims", CLAIM)
+    namespace.create("persistentvolumeclaims", make_claim("kept"))
     namespace.wait(lambda: namespace.condition("writes", "Accepted").get("reason") == "ClaimNotForJobs")
     assert namespace.select("jobs", "writes") == []
 

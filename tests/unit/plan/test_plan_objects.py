@@ -120,12 +120,22 @@ def test_a_job_without_a_uid_has_no_plan(make_job):
         plan(nobody, LAYOUT)
 
 
-@pytest.mark.parametrize("layout", [LAYOUT, LocalLayout(images=LAYOUT.images, job_directory="/runs/job")])
-def test_going_on_from_another_jobs_run_is_refused(make_job, layout):
-    """No trainer carries it out yet, and training that begins anew instead would be found out late."""
-    job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
+def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(make_job):
+    """Both lie on the same claim, each job in a folder of its own."""
+    job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"}, replicas=2)
 
-    with pytest.raises(PlanError, match=r"^spec\.storage\.resumeFrom: is not carried out .*; start .*$"):
+    planned = plan(job, LAYOUT)
+
+    told = [yaml.safe_load(each.config_map["data"]["training.yaml"]) for each in planned.replicas]
+    assert [each["resumeFrom"] for each in told] == [f"/var/lib/palaestra/5a0c/{index}" for index in (0, 1)]
+
+
+def test_going_on_from_another_jobs_run_is_refused_without_a_cluster(make_job):
+    """There is no claim, and training that begins anew instead would be found out late."""
+    job = make_job(storage={"existingClaim": "runs", "resumeFrom": "5a0c"})
+    layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
+
+    with pytest.raises(PlanError, match=r"^spec\.storage\.resumeFrom: names a run on a claim .*; remove it"):
         plan(job, layout)
 
 

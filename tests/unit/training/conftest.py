@@ -250,10 +250,13 @@ def job(make_configuration):
 def play(directory, make_member):
     """Train; return the exit code and the members by name. Faults are given by a member's name.
 
-    `on_step` is called after each step of one member, by default of `collect-0`.
+    `on_step` is called after each step of one member, by default of `collect-0`; the run is kept `into`
+    a run directory, by default that of the test.
     """
 
-    def run(configuration, faults=(), on_step=None, step_reward=-0.1, of="collect-0", **options):
+    def run(
+        configuration, faults=(), on_step=None, step_reward=-0.1, of="collect-0", into=directory, **options
+    ):
         members = {}
 
         def make_members(given):
@@ -265,6 +268,6 @@ def play(directory, make_member):
                 member.take_step = lambda take=member.take_step: (take(), on_step())
             return list(members.values())
 
-        return training.run(configuration, directory, make_members, **options), members
+        return training.run(configuration, into, make_members, **options), members
 
     return run

@@ -444,6 +444,8 @@ def test_a_draft_is_never_taken_for_a_checkpoint(trained):
     model.save(20)
     model.path(20).rename(model.folder / ".20.draft")
 
+    checkpoint.tidy(model.folder)
+
     assert checkpoint.newest(model.folder).manifest.step == 10
     assert [path.name for path in model.folder.iterdir()] == ["10"]
 
@@ -456,6 +458,8 @@ def test_a_kill_while_a_step_is_saved_again_loses_nothing(trained, there):
     shutil.copytree(model.path(40), model.folder / ".40.replaced")
     if not there:
         shutil.rmtree(model.path(40))
+
+    checkpoint.tidy(model.folder)
 
     assert checkpoint.newest(model.folder).manifest.step == 40
     assert [path.name for path in model.folder.iterdir()] == ["40"]

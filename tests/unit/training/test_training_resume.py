@@ -9,7 +9,7 @@ import signal
 import pytest
 
 from palaestra_trainer import checkpoint
-from palaestra_trainer.run_directory import read_lines
+from palaestra_trainer.run_directory import RunDirectory, read_lines
 
 
 def signal_after(steps, number=signal.SIGTERM):
@@ -54,6 +54,55 @@ def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     assert len(seeds_before & seeds_after) <= (1 if name == "DQN" else 4)
     reasons = [line["reason"] for line in read_lines(directory.attempts)]
     assert reasons == ["new run", f"resumed at step {saved.step}"]
+
+
+def test_a_run_is_prolonged_by_another_job(play, job, directory, tmp_path):
+    """It goes on from the other's last checkpoint to a total of its own, and leaves what it found."""
+    play(job())
+    found = files_of(directory.path)
+    longer = RunDirectory(tmp_path / "longer")
+
+    code, _ = play(job(steps=150, resume_from=str(directory.path)), into=longer)
+
+    assert code == 0
+    assert json.loads(longer.summary.read_text())["steps"] == 150
+    assert [line["reason"] for line in read_lines(longer.attempts)] == ["resumed at step 100"]
+    assert min(line["step"] for line in read_lines(longer.evaluations)) >= 100
+    assert files_of(directory.path) == found
+
+
+def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has_one(
+    play, job, directory, tmp_path
+):
+    """The way from the other's is not gone twice."""
+    play(job())
+    longer = RunDirectory(tmp_path / "longer")
+    prolonging = job(steps=250, resume_from=str(directory.path))
+    play(prolonging, on_step=signal_after(60), into=longer)
+    saved = checkpoint.newest(longer.checkpoints).manifest
+
+    code, _ = play(prolonging, into=longer)
+
+    reasons = [line["reason"] for line in read_lines(longer.attempts)]
+    assert code == 0
+    assert 100 < saved.step < 250
+    assert reasons == ["resumed at step 100", f"resumed at step {saved.step}"]
+
+
+def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_path, last_word):
+    """It would begin anew, which would be found out late; nothing was started."""
+    code, members = play(job(resume_from=str(tmp_path / "nobody")))
+
+    assert code == 2
+    assert "resumeFrom: " in last_word().reason
+    assert "nobody has no checkpoint; name the run of another job" in last_word().reason
+    assert members == {}
+    assert not directory.attempts.exists()
+
+
+def files_of(folder):
+    """Return every file of a folder with its content."""
+    return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def test_the_last_word_has_the_number_of_the_attempt_and_its_restarts(play, job, last_word):

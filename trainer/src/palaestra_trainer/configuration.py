@@ -164,6 +164,8 @@ class Configuration(_Section):
     Attributes:
         seed: the job's seed plus the replica's index; every other seed follows from it.
         steps: valid environment steps that the run lasts, of all simulators together.
+        resume_from: the run directory of another job; a run that has no checkpoint of its own goes on
+            from the newest one there.
         stall_deadline_seconds: without an environment step for this long, the run is given up.
         command: a program of the user's that replaces the built-in loop; not used here.
         status_address: `host:port` of /metrics, /status and /healthz.
@@ -179,6 +181,7 @@ class Configuration(_Section):
     steps: Positive
     evaluation: Evaluation = Field(default_factory=Evaluation)
     checkpoint: Checkpoint = Field(default_factory=Checkpoint)
+    resume_from: Annotated[str, Field(min_length=1)] | None = None
     stall_deadline_seconds: Annotated[float, Field(gt=0)] = 600
     command: tuple[str, ...] | None = None
     status_address: Annotated[str, Field(pattern=r"^[^:\s]+:\d{1,5}$")] = "127.0.0.1:9090"

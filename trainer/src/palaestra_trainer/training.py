@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 import structlog
 import torch
@@ -189,13 +190,24 @@ class Attempt:
         self._progress.resumed(step, journal.regained(step, saved))
 
     def _newest(self) -> Checkpoint | None:
-        found = checkpoint.newest(self._directory.checkpoints)
+        checkpoint.tidy(self._directory.checkpoints)
+        found = checkpoint.newest(self._directory.checkpoints) or self._of_another_run()
         if found is None and self._around.must_resume:
             raise ConfigurationError(
                 f"{self._directory.path}: has no checkpoint to resume from; leave --resume out"
             )
         if found:
             checkpoint.refuse_another_run(found, self._configuration)
+        return found
+
+    def _of_another_run(self) -> Checkpoint | None:
+        """Return the newest checkpoint of the run that is to be gone on from; None: this one is its own."""
+        another = self._configuration.resume_from
+        if another is None:
+            return None
+        found = checkpoint.newest(RunDirectory(Path(another)).checkpoints)
+        if found is None:
+            raise ConfigurationError(f"resumeFrom: {another} has no checkpoint; name the run of another job")
         return found
 
     def _train(self, run: Run, found: Checkpoint | None, stack: ExitStack) -> None:

@@ -40,8 +40,8 @@ class Storage(ApiModel):
 
     resume_from: Annotated[str, Field(min_length=1, max_length=63, pattern=FOLDER)] | None = None
     """Folder of another job's run on the existing claim, the UID of that job: each replica goes on
-    from the newest checkpoint of the replica with its number. Absent: training starts anew.
-    Not carried out by this release, which refuses a job that has it."""
+    from the newest checkpoint of the replica with its number, up to its own `steps`. Algorithm and
+    environment must be the same. Absent: training starts anew."""
 
     rules = (
         Rule(

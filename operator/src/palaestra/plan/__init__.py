@@ -81,11 +81,6 @@ def plan(job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None
         PlanError: the job cannot be planned in this layout.
         WorldError: one of its worlds is wrong.
     """
-    if job.spec.storage.resume_from is not None:
-        raise PlanError(
-            "spec.storage.resumeFrom: is not carried out by this release; "
-            "start the job without it, or copy the run directory"
-        )
     replicas = (Replica(job=job, index=i, layout=layout) for i in range(job.spec.replicas))
     planned = tuple(_replica_plan(each, config_maps or {}) for each in replicas)
     return Plan(network_policy=network_policy(job, layout), replicas=planned)

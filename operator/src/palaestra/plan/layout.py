@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from palaestra.plan.errors import PlanError
+
 ROS_MASTER_PORT = 11311  # the port that ROS 1 tools expect
 STATUS_PORT = 9090
 CONTROL_PORTS = range(7100, 7200)  # of the k-th simulator of a pod; a pod has 32 at most
@@ -92,6 +94,14 @@ class Layout(Protocol):
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
 
+    def another_run(self, uid: str, replica: int) -> str:
+        """Return the run directory of a replica of the job with `uid`, on the same volume.
+
+        Raises:
+            PlanError: no two jobs share a volume here.
+        """
+        ...
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterLayout:
@@ -108,13 +118,17 @@ class ClusterLayout:
         return Places(
             config="/etc/palaestra",
             volume="/var/lib/palaestra",
-            run=f"/var/lib/palaestra/{uid}/{replica}",
+            run=self.another_run(uid, replica),
             scratch="/tmp",  # noqa: S108 - a volume of the container's own
             termination="/dev/termination-log",
             home="/tmp",  # noqa: S108
             shared_memory="/dev/shm",  # noqa: S108
             sidecar="/palaestra",
         )
+
+    def another_run(self, uid: str, replica: int) -> str:
+        """Return the folder that is the run's own there."""
+        return f"/var/lib/palaestra/{uid}/{replica}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,4 +154,11 @@ class LocalLayout:
             run=run,
             scratch=f"{run}/scratch/{container}",
             termination=f"{run}/termination.json",
+        )
+
+    def another_run(self, uid: str, replica: int) -> str:  # noqa: ARG002 - there is none
+        """Refuse: a laptop has no claims."""
+        raise PlanError(
+            "spec.storage.resumeFrom: names a run on a claim of a cluster, which is not to be had here; "
+            "remove it, as a job that is run again goes on from its own run directory"
         )

@@ -27,6 +27,8 @@ def status_address(replica: Replica) -> str:
 def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
     spec = replica.job.spec
     trainer = spec.trainer.model_dump(mode="json", by_alias=True, exclude_none=True)
+    resume_from = spec.storage.resume_from
+    another = replica.layout.another_run(resume_from, replica.index) if resume_from else None
     training = {
         "job": replica.job.metadata.name,
         "namespace": replica.job.metadata.namespace,
@@ -38,6 +40,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "steps": spec.trainer.steps,
         "evaluation": trainer["evaluation"],
         "checkpoint": trainer["checkpoint"],
+        "resumeFrom": another,
         "stallDeadlineSeconds": spec.stall_deadline_seconds,
         "command": list(spec.trainer.command) or None,
         "statusAddress": status_address(replica),

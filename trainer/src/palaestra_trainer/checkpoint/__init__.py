@@ -9,7 +9,7 @@ rest is JSON and plain arrays. How a resumed run comes to be the same: docs/deci
 
 from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, describe, refuse_another_run
 from palaestra_trainer.checkpoint.state import State
-from palaestra_trainer.checkpoint.store import Saver, newest, restore
+from palaestra_trainer.checkpoint.store import Saver, newest, restore, tidy
 from palaestra_trainer.checkpoint.tensors import Tensors, load_tensors, save_tensors
 
 __all__ = [
@@ -24,4 +24,5 @@ __all__ = [
     "refuse_another_run",
     "restore",
     "save_tensors",
+    "tidy",
 ]

@@ -50,7 +50,7 @@ class Saver:
         draft = self._folder / f".{described.step}.draft"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            _tidy(self._folder)
+            tidy(self._folder)
             draft.mkdir()
             complete = self._write(draft, model, state, described)
             target = _put_in_place(draft)
@@ -105,7 +105,7 @@ class Saver:
 
 
 def newest(folder: Path) -> Checkpoint | None:
-    """Return the newest checkpoint that is undamaged; None if there is none.
+    """Return the newest checkpoint that is undamaged; None if there is none. Nothing is changed.
 
     Where chunks of experience are shared, damage to one may be damage to all: then the
     newest is returned whose other files are whole.
@@ -113,8 +113,6 @@ def newest(folder: Path) -> Checkpoint | None:
     Raises:
         ConfigurationError: it is of a format that this release does not read.
     """
-    if folder.is_dir():
-        _tidy(folder)
     rest = None
     for path in sorted(_steps(folder), key=_step, reverse=True):
         try:
@@ -165,8 +163,8 @@ def _put_in_place(draft: Path) -> Path:
     return target
 
 
-def _tidy(folder: Path) -> None:
-    """Finish or take back what a kill interrupted."""
+def tidy(folder: Path) -> None:
+    """Finish or take back what a kill interrupted; for whoever writes there."""
     for draft in folder.glob(".*.draft"):
         shutil.rmtree(draft, ignore_errors=True)
     for replaced in folder.glob(".*.replaced"):
