@@ -1,12 +1,16 @@
 """The doctor before a real API server: what is not right there is told, with the remedy."""
 
+from importlib.metadata import version
+
 import pytest
 
 from palaestra.cli import main
 from palaestra.cluster import Leadership, Resource, connect
 from palaestra.cluster.resources import DEPLOYMENTS, NODES, STORAGE_CLASSES
 from palaestra.doctor import Site, Verdict, examine
+from palaestra.doctor.installation import trainer_image
 from palaestra.operator.options import NAME
+from palaestra.plan import Images
 from tests.integration.operator.cluster import eventually
 
 POLICIES = Resource(
@@ -23,11 +27,13 @@ BINDINGS = Resource(
 )
 
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
+ACCOUNTS = Resource(api_version="v1", kind="ServiceAccount", plural="serviceaccounts")
 
 
 @pytest.fixture
 def found(place):
     """Return what the doctor finds of each thing; the operator's namespace is the test's."""
+    eventually(lambda: place.get(ACCOUNTS, "default"))  # a pod is refused before it is there
 
     def look(api=None):
         site = Site(api=api or place.api, namespace=place.name, operator_namespace=place.name)
@@ -122,9 +128,9 @@ def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
     assert findings["leader"].fact == "is me"
 
 
-def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
-    """Its log says why."""
-    container = {"name": "operator", "image": "palaestra-operator:0.0.0"}
+def install(place, **container):
+    """Make the operator's Deployment, which nothing carries out."""
+    container = {"name": "operator", "image": "palaestra-operator:0.0.0"} | container
     labels = {"a": "b"}
     template = {
         "metadata": {"labels": labels},
@@ -140,12 +146,28 @@ def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
         },
     )
 
+
+def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
+    """Its log says why."""
+    install(place)
+
     findings = found()
 
     assert findings["operator"].verdict is Verdict.WRONG
     assert "0 of 1 are ready" in findings["operator"].fact
     assert "palaestra-operator:0.0.0" in findings["operator"].fact
     assert "service account chosen may not" in findings["operator's rights"].fact
+
+
+def test_a_pod_is_tried_with_the_image_that_the_operator_gives(place):
+    """Where only a registry of one's own is allowed, another image would be refused, and no job's."""
+    site = Site(api=place.api, namespace=place.name, operator_namespace=place.name)
+    before = trainer_image(site)
+
+    install(place, command=["palaestra", "operator", "--trainer-image=registry.example.com/trainer:1"])
+
+    assert before == Images.of_release(version("palaestra")).trainer
+    assert trainer_image(site) == "registry.example.com/trainer:1"
 
 
 def test_what_a_person_may_not_do_is_named_and_what_cannot_be_seen_is_unknown(found, control_plane, place):

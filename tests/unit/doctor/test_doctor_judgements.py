@@ -39,7 +39,7 @@ def test_the_first_version_is_the_charts():
 
 def test_a_pod_that_came_back_as_it_was_is_right():
     """Webhooks may add what they like."""
-    pod = trial_pod("lab")
+    pod = trial_pod("lab", "trainer:1")
     pod["spec"]["initContainers"].insert(0, {"name": "added-by-a-mesh"})
 
     assert judged_pod(pod).verdict is Verdict.RIGHT
@@ -47,7 +47,7 @@ def test_a_pod_that_came_back_as_it_was_is_right():
 
 def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
     """Everything after it would wait for its end for ever."""
-    pod = trial_pod("lab")
+    pod = trial_pod("lab", "trainer:1")
     del pod["spec"]["initContainers"][0]["restartPolicy"]
 
     found = judged_pod(pod)

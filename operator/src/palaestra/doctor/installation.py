@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from importlib.metadata import version
 
 from palaestra.client.errors import TookTooLong
 from palaestra.client.following import changes
@@ -11,9 +12,11 @@ from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
 from palaestra.doctor.rights import OPERATOR, Account, allowed
 from palaestra.operator.options import NAME
+from palaestra.plan import Images
 from palaestra.plan.network_policy import OPERATOR_LABEL
 
 LOGS = "`kubectl logs -n {namespace} deploy/{name}` says why"
+TRAINER_IMAGE = "--trainer-image="
 NOT_ELECTED = "--no-leader-elect"
 PORT_NAME = "metrics"
 RENEWED_WITHIN_S = 20.0  # a Lease lasts 15
@@ -101,6 +104,17 @@ def metrics(site: Site) -> Iterator[Finding]:
         yield right("metrics", f"are at port {port} of pod {name}")
     else:
         yield wrong("metrics", f"port {port} of pod {name} serves something else", _logs(site))
+
+
+def trainer_image(site: Site) -> str:
+    """Return the trainer's image where a job names none: the operator's choice, else the release's."""
+    try:
+        deployment = _deployment(site)
+    except Forbidden:
+        deployment = None
+    given = _container(deployment).get("command", ()) if deployment else ()
+    chosen = (each.removeprefix(TRAINER_IMAGE) for each in given if each.startswith(TRAINER_IMAGE))
+    return next(chosen, Images.of_release(version("palaestra")).trainer)
 
 
 def _deployment(site: Site) -> Object | None:

@@ -11,7 +11,7 @@ from palaestra.client.reading_pod import RESOURCES
 from palaestra.cluster import Forbidden, Invalid
 from palaestra.cluster.resources import DEFINITIONS, NODES, PODS, STORAGE_CLASSES
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
-from palaestra.plan import Images
+from palaestra.doctor.installation import trainer_image
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
 
@@ -84,7 +84,7 @@ def sidecars(site: Site) -> Iterator[Finding]:
     """Tell whether everything that pods pass through leaves their sidecars sidecars: by a dry run."""
     what = "sidecars"
     try:
-        made = site.api.create(PODS, trial_pod(site.namespace), dry_run=True)
+        made = site.api.create(PODS, trial_pod(site.namespace, trainer_image(site)), dry_run=True)
     except Forbidden as error:
         if error.lacks_right:
             raise
@@ -114,9 +114,8 @@ def judged_pod(made: Object) -> Finding:
     )
 
 
-def trial_pod(namespace: str) -> Object:
+def trial_pod(namespace: str, image: str) -> Object:
     """Return a pod that is never made: restricted, with one sidecar."""
-    image = Images.of_release(version("palaestra")).trainer
     common = {"image": image, "command": ["true"], "securityContext": SECURITY, "resources": RESOURCES}
     return {
         "apiVersion": "v1",
