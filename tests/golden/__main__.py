@@ -53,11 +53,12 @@ def recorded() -> Iterator[tuple[Path, str]]:
 
 def main() -> int:
     """Write every file; plans of examples that are gone are removed."""
-    current = dict(recorded())
-    for stale in set((ROOT / "tests" / "golden").glob("*.yaml")) - current.keys():
-        stale.unlink()
-    for path, text in current.items():
+    current = set()
+    for path, text in recorded():  # one by one: the installation is rendered from what stands before it
         path.write_text(text)
+        current.add(path)
+    for stale in set((ROOT / "tests" / "golden").glob("*.yaml")) - current:
+        stale.unlink()
     return 0
 
 

@@ -162,9 +162,34 @@ BROKEN = {
             "are set by Palaestra; remove them"
         ),
     ),
-    "a toleration of what": (
-        {"scheduling.tolerations": [{"value": "gpu"}]},
-        "spec.scheduling.tolerations[0].key: is missing; name the taint's key, or use operator Exists",
+    "a priority above everybody's": (
+        {"scheduling.priorityClassName": "system-node-critical"},
+        (
+            "spec.scheduling.priorityClassName: classes that begin with system- are for the cluster's own "
+            "parts; choose another"
+        ),
+    ),
+    "a label that others select by": (
+        {"scheduling.podLabels": {"app.kubernetes.io/name": "database"}},
+        (
+            "spec.scheduling.podLabels: others may select pods by such a label; put a domain of yours "
+            "before it, as example.com/team"
+        ),
+    ),
+    "an annotation that confines less": (
+        {
+            "scheduling.podAnnotations": {
+                "container.apparmor.security.beta.kubernetes.io/trainer": "unconfined"
+            }
+        },
+        (
+            "spec.scheduling.podAnnotations: how a pod is confined is not the job's to say; "
+            "remove what is about AppArmor or seccomp"
+        ),
+    ),
+    "a toleration of a control plane": (
+        {"scheduling.tolerations": [{"key": "node-role.kubernetes.io/control-plane", "operator": "Exists"}]},
+        "spec.scheduling.tolerations[0].key: keeps nodes free for the cluster's own parts; remove it",
     ),
     "a toleration of any value and one": (
         {"scheduling.tolerations": [{"key": "gpu", "operator": "Exists", "value": "a100"}]},
@@ -224,7 +249,12 @@ KEPT = {
     },
     "kept nowhere": {"storage.ephemeral": True},
     "another job's run": {"storage": {"existingClaim": "runs", "resumeFrom": "5a0c"}},
-    "any taint": {"scheduling.tolerations": [{"operator": "Exists"}]},
+    "a class of one's own": {"scheduling.priorityClassName": "urgent"},
+    "a label under a domain": {"scheduling.podLabels": {"example.com/team": "robots"}},
+    "a note, and word to an autoscaler": {
+        "scheduling.podAnnotations": {"note": "x", "cluster-autoscaler.kubernetes.io/safe-to-evict": "false"}
+    },
+    "any value of a taint": {"scheduling.tolerations": [{"key": "gpu", "operator": "Exists"}]},
     "a taint for a minute": {
         "scheduling.tolerations": [{"key": "gpu", "effect": "NoExecute", "tolerationSeconds": 60}]
     },

@@ -93,8 +93,8 @@ SENTENCES = [
      'spec.trainer.image: "my image" is not an image; write it as registry/name:tag'),
     ({"managedBy": "me"},
      'spec.managedBy: "me" is not a name with a domain; write it as example.com/name'),
-    ({"scheduling.podLabels": {"team": "a b"}},
-     ('spec.scheduling.podLabels.team: "a b" is not the value of a label; '
+    ({"scheduling.podLabels": {"a.b/team": "a b"}},
+     ('spec.scheduling.podLabels["a.b/team"]: "a b" is not the value of a label; '
      "use letters, digits, '-', '_' and '.'")),
     ({"trainer.env": [{"name": "2FAST", "value": ""}]},
      ('spec.trainer.env[0].name: "2FAST" is not the name of a variable; '

@@ -49,6 +49,17 @@ def test_the_uid_of_the_pod_is_filled_in_for_each_attempt():
     assert read_pod(template(), "pod-7").main.env["PALAESTRA_POD_UID"] == "pod-7"
 
 
+def test_what_an_author_writes_reaches_the_program_as_it_stands():
+    """A kubelet would put variables in the place of some of it, so a plan says what it makes this of."""
+    texts = ("echo $$ $HOME", "$(ROS_HOME)", "$$(ROS_HOME)", "$")
+    written = {"command": list(texts), "env": [{"name": "TEXT", "value": texts[1]}]}
+
+    main = read_pod(template(trainer=written), "pod-1").main
+
+    assert main.command == texts
+    assert main.env["TEXT"] == texts[1]
+
+
 def test_a_value_that_lies_in_a_cluster_is_refused_by_name():
     """Leaving it out would fail later, somewhere in the trainer."""
     secret = {"name": "TOKEN", "secretKeyRef": {"name": "hub", "key": "token"}}

@@ -160,7 +160,7 @@ def test_scheduling_reaches_the_pod(in_cluster):
             "tolerations": [{"key": "gpu", "operator": "Exists"}],
             "runtimeClassName": "nvidia",
             "priorityClassName": "low",
-            "podLabels": {"team": "robots"},
+            "podLabels": {"example.com/team": "robots"},
             "podAnnotations": {"note": "x"},
         },
         imagePullSecrets=[{"name": "pull"}],
@@ -172,7 +172,7 @@ def test_scheduling_reaches_the_pod(in_cluster):
     assert spec["tolerations"] == [{"key": "gpu", "operator": "Exists"}]
     assert spec["runtimeClassName"] == "nvidia"
     assert spec["imagePullSecrets"] == [{"name": "pull"}]
-    assert metadata["labels"]["team"] == "robots"
+    assert metadata["labels"]["example.com/team"] == "robots"
     assert metadata["annotations"] == {"note": "x"}
 
 

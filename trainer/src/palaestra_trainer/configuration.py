@@ -236,7 +236,7 @@ def parse(content: object, *, source: str = "training.yaml") -> Configuration:
 def dump(configuration: Configuration) -> str:
     """Return the YAML text that `load` reads as an equal configuration."""
     content = configuration.model_dump(mode="json", by_alias=True, exclude_none=True)
-    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+    return yaml.safe_dump(content, sort_keys=False)  # ASCII: some characters are line ends to YAML
 
 
 def nearest(word: str, known: Mapping[str, object] | list[str]) -> str:

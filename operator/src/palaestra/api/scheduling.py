@@ -27,8 +27,8 @@ class TaintEffect(StrEnum):
 class Toleration(ApiModel):
     """A taint of nodes that the pods tolerate, as in a pod."""
 
-    key: Annotated[str, Field(max_length=317)] | None = None
-    """Key of the taint; absent: any, with operator `Exists`."""
+    key: Annotated[str, Field(min_length=1, max_length=317)]
+    """Key of the taint."""
 
     operator: TolerationOperator = Field(default=TolerationOperator.EQUAL, strict=False)
     """`Exists`: any value. `Equal`: the value below."""
@@ -45,9 +45,9 @@ class Toleration(ApiModel):
     rules = (
         Rule(
             field="key",
-            holds=lambda it: it.key is not None or it.operator is TolerationOperator.EXISTS,
-            cel="has(self.key) || self.operator == 'Exists'",
-            message="is missing; name the taint's key, or use operator Exists",
+            holds=lambda it: not it.key.startswith("node-role.kubernetes.io/"),
+            cel="!self.key.startsWith('node-role.kubernetes.io/')",
+            message="keeps nodes free for the cluster's own parts; remove it",
         ),
         Rule(
             field="value",
@@ -68,6 +68,21 @@ def _has_none_of_ours(keys: dict[str, str]) -> bool:
     return not any(key.startswith(("palaestra.dev/", "kueue.x-k8s.io/")) for key in keys)
 
 
+def _domain(key: str) -> str:
+    domain, slash, _ = key.partition("/")
+    return domain if slash else ""
+
+
+def _is_selected_by_nobody(key: str) -> bool:
+    """Return whether a label is under a domain, and not under one of Kubernetes'."""
+    return _domain(key) != "" and not _domain(key).endswith(("kubernetes.io", "k8s.io"))
+
+
+def _confines(key: str) -> bool:
+    """Return whether an annotation chooses a profile of seccomp, or of AppArmor, which is still obeyed."""
+    return "security" in _domain(key) and _domain(key).endswith(".kubernetes.io")
+
+
 class Scheduling(ApiModel):
     """Where and when the pods run."""
 
@@ -75,7 +90,7 @@ class Scheduling(ApiModel):
     """Kueue's queue, which then starts and suspends the job; absent: Kubernetes starts it."""
 
     priority_class_name: ObjectName | None = None
-    """Priority class of the pods; absent: the cluster's default."""
+    """Priority class of the pods, none of Kubernetes' own; absent: the cluster's default."""
 
     node_selector: LabelMap = Field(default={})
     """Labels that a node must have."""
@@ -90,12 +105,34 @@ class Scheduling(ApiModel):
     """Runtime class of the pods, such as `nvidia`; absent: the cluster's default."""
 
     pod_labels: LabelMap = Field(default={})
-    """Labels for the pods, beside Palaestra's own."""
+    """Labels for the pods, beside Palaestra's own, under a domain of yours such as `example.com/team`:
+    Services and NetworkPolicies of others select pods by the usual ones."""
 
     pod_annotations: TextMap = Field(default={})
     """Annotations for the pods, beside Palaestra's own."""
 
     rules = (
+        Rule(
+            field="priorityClassName",
+            holds=lambda it: not (it.priority_class_name or "").startswith("system-"),
+            cel="!has(self.priorityClassName) || !self.priorityClassName.startsWith('system-')",
+            message="classes that begin with system- are for the cluster's own parts; choose another",
+        ),
+        Rule(
+            field="podLabels",
+            holds=lambda it: all(_is_selected_by_nobody(key) for key in it.pod_labels),
+            cel="self.podLabels.all(key, key.contains('/') && !key.startsWith('/')"
+            " && !key.split('/')[0].endsWith('kubernetes.io') && !key.split('/')[0].endsWith('k8s.io'))",
+            message="others may select pods by such a label; put a domain of yours before it, "
+            "as example.com/team",
+        ),
+        Rule(
+            field="podAnnotations",
+            holds=lambda it: not any(_confines(key) for key in it.pod_annotations),
+            cel="!self.podAnnotations.exists(key, key.contains('/') && key.split('/')[0].contains('security')"
+            " && key.split('/')[0].endsWith('.kubernetes.io'))",
+            message="how a pod is confined is not the job's to say; remove what is about AppArmor or seccomp",
+        ),
         Rule(
             field="podLabels",
             holds=lambda it: _has_none_of_ours(it.pod_labels),

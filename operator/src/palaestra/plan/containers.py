@@ -8,6 +8,7 @@ from palaestra.api.container import Resources, Variable
 from palaestra.plan import resources as planned
 from palaestra.plan.layout import Places
 from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica, Simulator
+from palaestra.plan.text import literal
 from palaestra.plan.training import FILE, LOOPBACK
 from palaestra.plan.worlds import world_path
 
@@ -82,8 +83,8 @@ def _arguments(replica: Replica, simulator: Simulator, world: str) -> list[str]:
         f"--control={LOOPBACK}:{layout.ports.control[simulator.place]}",
         f"--health={layout.health_host}:{layout.ports.health[simulator.place]}",
         *_identity(simulator),
-        *(f"--option={option}" for option in group.options),
-        *(("--", *group.command) if group.command else ()),
+        *(f"--option={literal(option)}" for option in group.options),
+        *(("--", *map(literal, group.command)) if group.command else ()),
     ]
 
 
@@ -95,7 +96,7 @@ def trainer(replica: Replica) -> Container:
         "name": TRAINER,
         "image": _trainer_image(replica),
         "imagePullPolicy": spec.image_pull_policy.value,
-        "command": list(spec.command) or ["palaestra-train"],
+        "command": [literal(word) for word in spec.command] or ["palaestra-train"],
         "ports": [_port("metrics", port)],
         "terminationMessagePath": places.termination,
         "terminationMessagePolicy": "FallbackToLogsOnError",
@@ -181,7 +182,7 @@ def _mounts(container: str, places: Places) -> list[dict[str, Any]]:
 
 def _variable(variable: Variable) -> dict[str, Any]:
     if variable.secret_key_ref is None:
-        return {"value": variable.value}
+        return {"value": literal(variable.value or "")}
     reference = variable.secret_key_ref
     return {"valueFrom": {"secretKeyRef": {"name": reference.name, "key": reference.key}}}
 
