@@ -24,12 +24,13 @@ SEARCH_PATH = "PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Image:
-    """What goes into an image: full name with tag, program, files by their place, links by their place."""
+    """What goes into an image: full name with tag, program, files and links by place, user and group."""
 
     name: str
     entrypoint: str
     files: Mapping[PurePosixPath, Path]
     links: Mapping[PurePosixPath, str] = field(default_factory=dict)
+    user: str = "0:0"
 
 
 def write_archive(image: Image, target: Path) -> None:
@@ -39,7 +40,7 @@ def write_archive(image: Image, target: Path) -> None:
         {
             "architecture": "amd64",
             "os": "linux",
-            "config": {"Env": [SEARCH_PATH], "Entrypoint": [image.entrypoint]},
+            "config": {"Env": [SEARCH_PATH], "Entrypoint": [image.entrypoint], "User": image.user},
             "rootfs": {"type": "layers", "diff_ids": [_digest(layer)]},
         },
     )

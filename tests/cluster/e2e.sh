@@ -61,7 +61,7 @@ install_palaestra() {
 trap finish EXIT
 trap 'stop 0' INT
 trap 'stop INT' TERM HUP
-programs=$("$HERE/programs.sh" etcd kube-apiserver kube-controller-manager kubectl kind cyclonus helm)
+programs=$("$HERE/programs.sh" kubectl kind cyclonus helm kueue)
 PATH=$programs:$PATH
 bring_up
 say "installing Palaestra"

@@ -13,13 +13,18 @@ from typing import Any, Self
 Object = dict[str, Any]
 
 GROUPS = {
+    "clusterroles": "apis/rbac.authorization.k8s.io/v1",
+    "clusterqueues": "apis/kueue.x-k8s.io/v1beta2",
     "deployments": "apis/apps/v1",
     "events": "api/v1",
     "jobs": "apis/batch/v1",
     "leases": "apis/coordination.k8s.io/v1",
+    "localqueues": "apis/kueue.x-k8s.io/v1beta2",
     "networkpolicies": "apis/networking.k8s.io/v1",
+    "priorityclasses": "apis/scheduling.k8s.io/v1",
     "rolebindings": "apis/rbac.authorization.k8s.io/v1",
     "trainingjobs": "apis/palaestra.dev/v1alpha1",
+    "workloads": "apis/kueue.x-k8s.io/v1beta2",
 }  # every other kind that is used here belongs to the core
 REQUEST_S = 30
 COMMAND_S = 60
@@ -37,10 +42,10 @@ class Refused(Exception):
 
 
 class Cluster:
-    """A cluster that `kubectl` reaches as it is called here, while this is entered."""
+    """A cluster that `kubectl` reaches as it is called here, with `options`, while this is entered."""
 
-    def __init__(self, kubectl: str) -> None:
-        self._kubectl = kubectl
+    def __init__(self, kubectl: str, *options: str) -> None:
+        self._kubectl = (kubectl, *options)
         self._proxy: subprocess.Popen[str] | None = None
         self._address = ""
 
@@ -48,7 +53,7 @@ class Cluster:
         """Begin to serve the API on a port of loopback."""
         # Ended by us alone: Ctrl-C must leave it to what is still to be cleaned up.
         self._proxy = subprocess.Popen(
-            ["setpriv", "--pdeathsig=TERM", self._kubectl, "proxy", "--port=0"],
+            ["setpriv", "--pdeathsig=TERM", *self._kubectl, "proxy", "--port=0"],
             stdout=subprocess.PIPE,
             text=True,
             start_new_session=True,
@@ -66,6 +71,10 @@ class Cluster:
         self._proxy.terminate()
         self._proxy.wait(REQUEST_S)
         self._proxy.stdout.close()
+
+    def acting_as(self, user: str, group: str) -> Self:
+        """Return the cluster as it answers to somebody else, to be entered."""
+        return type(self)(self._kubectl[0], f"--as={user}", f"--as-group={group}")
 
     def get(self, kind: str, namespace: str | None, name: str) -> Object | None:
         """Return an object, None when there is none."""
@@ -128,7 +137,7 @@ class Cluster:
     def kubectl(self, *arguments: str, within_s: float = COMMAND_S) -> str:
         """Run kubectl; return its output, whatever comes of it."""
         ended = subprocess.run(
-            [self._kubectl, *arguments], capture_output=True, text=True, timeout=within_s, check=False
+            [*self._kubectl, *arguments], capture_output=True, text=True, timeout=within_s, check=False
         )
         return ended.stdout + ended.stderr
 
@@ -146,7 +155,7 @@ class Cluster:
             CommandFailed: it ended with another code than 0, or could not be run.
         """
         ended = subprocess.run(
-            [self._kubectl, "exec", "-n", namespace, pod, "-c", container, "--", *command],
+            [*self._kubectl, "exec", "-n", namespace, pod, "-c", container, "--", *command],
             capture_output=True, text=True, timeout=COMMAND_S, check=False,
         )  # fmt: skip
         if ended.returncode:

@@ -82,16 +82,3 @@ def test_a_pod_that_no_node_takes_is_told_in_the_scheduler_s_words(stuck):
 
     assert "node affinity/selector" in stuck.replica("no-node")["message"]
     assert stuck.status("no-node")["phase"] == "Pending"
-
-
-def test_pods_that_a_quota_forbids_are_told_and_made_when_there_is_room(namespace, job):
-    """Only the Job's events tell of it: there is no pod to look at."""
-    quota = {"metadata": {"name": "none"}, "spec": {"hard": {"pods": "0"}}}
-    namespace.create("resourcequotas", quota)
-    namespace.apply(job("no-room", script="exit 0"))
-
-    namespace.wait(lambda: namespace.replica("no-room").get("reason") == "PodsRefused")
-    assert "exceeded quota" in namespace.replica("no-room")["message"]
-
-    namespace.cluster.delete("resourcequotas", namespace.name, "none")
-    assert namespace.wait_for_end("no-room", LONG_S) == "Succeeded"

@@ -91,16 +91,6 @@ def test_the_content_of_a_secret_is_never_asked_for(place, start, control_plane)
     assert place.all(JOBS, "job") == []
 
 
-def test_a_queue_without_kueue_is_told(place, start):
-    """Otherwise the job would be Suspended for ever, and nobody would know why."""
-    start()
-
-    place.train(scheduling={"queueName": "robots"})
-
-    eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")
-    assert place.all(JOBS, "job") == []
-
-
 @pytest.fixture
 def kueue(installed):
     """A cluster that has heard of Kueue; the test plays it."""
@@ -130,6 +120,18 @@ def kueue(installed):
     yield
     installed.delete(DEFINITIONS, None, "localqueues.kueue.x-k8s.io")
     eventually(lambda: not installed.serves("kueue.x-k8s.io"))
+
+
+def test_a_queue_without_kueue_is_told_until_there_is_one(place, start, request):
+    """Otherwise the job would be Suspended for ever, and nobody would know why."""
+    start()
+    place.train(scheduling={"queueName": "robots"})
+    eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")
+    assert place.all(JOBS, "job") == []
+
+    request.getfixturevalue("kueue")
+
+    eventually(lambda: place.get(JOBS, "job-0"), deadline_s=60)
 
 
 @pytest.mark.usefixtures("kueue")

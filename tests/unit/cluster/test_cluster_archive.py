@@ -22,6 +22,7 @@ def image(tmp_path):
         entrypoint="/bin/program",
         files={PurePosixPath("bin/program"): program, PurePosixPath("usr/lib/library.so"): library},
         links={PurePosixPath("bin/other"): "program"},
+        user="65532:65532",
     )
 
 
@@ -57,6 +58,7 @@ def test_the_descriptors_lead_from_the_index_to_the_layer(image, tmp_path):
 
     assert entry["annotations"]["io.containerd.image.name"] == "example.org/tools/program:v1"
     assert configuration["config"]["Entrypoint"] == ["/bin/program"]
+    assert configuration["config"]["User"] == "65532:65532"
     assert configuration["rootfs"]["diff_ids"] == [manifest["layers"][0]["digest"]]
     for descriptor in (entry, manifest["config"], manifest["layers"][0]):
         assert descriptor["size"] == len(blob(files, descriptor))

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.cluster import images
+from tests.cluster.kueue import manager
 
 CLUSTER = Path(images.__file__).parent
 ROWS = [line.split() for line in (CLUSTER / "programs/list").read_text().splitlines() if line[0] != "#"]
@@ -70,6 +71,22 @@ def test_kubeadm_is_told_the_etcd_that_is_brought_along(tmp_path):
     tag = re.search(r"imageTag: ([\w.-]+)\}", (CLUSTER / "node/kind-patches.yaml").read_text())[1]
 
     assert f"registry.k8s.io/etcd:{tag}" in image_names(tmp_path)
+
+
+def test_the_page_about_queues_installs_the_kueue_that_is_tested():
+    """Another one may have other kinds, and nobody has seen it work."""
+    page = (CLUSTER.parents[1] / "docs/queues.md").read_text()
+    version = images.version_of("kueue", "sigs.k8s.io/kueue").removeprefix("v")
+
+    assert re.findall(r"(?:--version|Tested with) (\d+\.\d+\.\d+)", page) == [version, version]
+
+
+def test_kueue_runs_as_nobody(tmp_path):
+    """Its chart refuses an image that would run as root, as that of its project does not."""
+    image = manager(tmp_path / "kueue")
+
+    assert image.name == f"registry.k8s.io/kueue/kueue:{images.version_of('kueue', 'sigs.k8s.io/kueue')}"
+    assert image.user == "65532:65532"
 
 
 def test_every_address_is_from_the_block_kept_for_benchmarks():

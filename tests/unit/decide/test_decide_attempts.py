@@ -253,6 +253,26 @@ def test_a_suspended_attempt_ended_by_suspension(training):
     assert disrupted(decision) == []
 
 
+def test_an_attempt_that_kueue_took_back_says_so(make_scene):
+    """Kueue suspends the Job of whoever has to make room; the trainer has saved."""
+    scene = make_scene(scheduling={"queueName": "robots"})
+    scene.kueue = True
+    scene.settle()
+    scene.job()["spec"]["suspend"] = False
+    pod = scene.running_pod()
+    scene.settle()
+
+    scene.job()["spec"]["suspend"] = True
+    delete(scene, pod)
+    decision = scene.settle(5)
+
+    taken = "waits in queue robots for Kueue, which took it back; it goes on from the last checkpoint"
+    assert last(scene) == (1, 75, "Queued")
+    assert scene.replica().last_attempt.message == scene.replica().message == taken
+    assert [each.message for each in decision.events if each.reason == "Queued"] == [taken]
+    assert disrupted(decision) == []
+
+
 def test_the_last_lines_of_an_attempt_that_we_stopped_come_after_the_end(training, last_word):
     """A replica has failed once its Job is stopped; what its trainer still says is kept all the same."""
     scene, pod = training(activeDeadlineSeconds=60)

@@ -227,6 +227,28 @@ def test_with_a_queue_suspension_is_left_to_kueue(make_scene):
     assert scene.status.phase is Phase.PENDING
 
 
+def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
+    """A namespace may have a default queue: what Kueue suspends then is not resumed, or they would fight."""
+    scene = accepted()
+    scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
+    scene.job()["spec"]["suspend"] = True
+
+    assert scene.settle().actions == ()
+    assert scene.replica().message == "waits in queue default for Kueue"
+
+
+def test_a_suspension_that_kueue_does_not_heed_is_told(training):
+    """It is Kueue's to decide in a queue, whoever chose the queue."""
+    scene, _ = training()
+    scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
+    scene.raw["spec"]["suspend"] = True
+
+    assert scene.settle().actions == ()
+    assert scene.replica().message == (
+        "attempt 1 trains; spec.suspend is not heeded, as queue default starts and stops it"
+    )
+
+
 def test_a_job_is_deleted_when_its_time_to_live_is_over(training, last_word):
     """And woken for it: nothing else may happen until then."""
     scene, pod = training(ttlSecondsAfterFinished=60)

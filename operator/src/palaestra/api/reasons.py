@@ -153,9 +153,9 @@ ROWS: dict[Reason, Row] = {
         "created {objects}", "the objects of a replica were created", "nothing", warning=False
     ),
     Reason.QUEUED: Row(
-        "waits in queue {queue} for Kueue",
+        "waits in queue {queue} for Kueue{again}",
         "Kueue has not admitted the replica yet, or has taken it back",
-        "look at the Workload with `kubectl describe`: it tells what is short",
+        "look at the Workload with `kubectl describe`: it tells what is short ([queues](queues.md))",
         warning=False,
     ),
     Reason.SUSPENDED: Row(
@@ -222,8 +222,10 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.PODS_REFUSED: Row(
         "no pod can be made: {words}",
-        "a quota, LimitRange, Pod Security or webhook refuses a pod or its claim, in the API server's words",
-        "raise the quota, or allow what the message names; it is tried again by itself",
+        "a quota, LimitRange, Pod Security, webhook or a PriorityClass that is missing refuses a pod "
+        "or its claim, in the API server's words",
+        "raise the quota, or allow what the message names ([queues and quotas](queues.md#quotas)); "
+        "it is tried again by itself",
     ),
     Reason.RESTART_POLICY_DROPPED: Row(
         "pod {pod}: {containers} lost restartPolicy: Always, so that the trainer would wait for ever; "

@@ -69,6 +69,7 @@ def _switches(job: TrainingJob, observed: Observed, each: Sequence[Decided]) -> 
     if job.spec.scheduling.queue_name is not None:
         return
     for seen, it in zip(observed.replicas, each, strict=True):
-        going_on = seen.job is not None and seen.job.end is None and it.status.phase not in TERMINAL
+        ours = seen.job is not None and seen.job.end is None and not seen.job.queue
+        going_on = ours and it.status.phase not in TERMINAL
         if seen.job is not None and going_on and seen.job.suspended != job.spec.suspend:
             yield SetSuspend(job=seen.job.name, replica=seen.index, suspend=job.spec.suspend)

@@ -202,8 +202,11 @@ def stop_of(job: JobView) -> Told | None:
 
 def paused(it: Situation) -> Told:
     """Return why a Job is suspended: with a queue that is Kueue's doing."""
-    queue = it.job.spec.scheduling.queue_name
-    return told(Reason.SUSPENDED) if queue is None else told(Reason.QUEUED, queue=queue)
+    queue = (it.seen.job.queue if it.seen.job else "") or it.job.spec.scheduling.queue_name
+    if not queue:
+        return told(Reason.SUSPENDED)
+    again = ", which took it back; it goes on from the last checkpoint" if it.counted.attempt else ""
+    return told(Reason.QUEUED, queue=queue, again=again)
 
 
 def success(word: Termination | None) -> str:

@@ -65,7 +65,15 @@ def _standing(it: Situation, hold: Hold | None) -> Verdict:
 def _running(it: Situation) -> Told:
     if it.seen.polled is not None and not it.trains:
         return told(Reason.STARTING, what="its simulators are on their way")
-    return told(Reason.TRAINING, what=f"attempt {it.counted.attempt} trains")
+    return told(Reason.TRAINING, what=f"attempt {it.counted.attempt} trains{_unheeded(it)}")
+
+
+def _unheeded(it: Situation) -> str:
+    """Return what to say of a suspension that is Kueue's to decide; a namespace may have a default queue."""
+    job = it.seen.job
+    if job is None or not job.queue or not it.job.spec.suspend:
+        return ""
+    return f"; spec.suspend is not heeded, as queue {job.queue} starts and stops it"
 
 
 def _starting(it: Situation) -> Told:

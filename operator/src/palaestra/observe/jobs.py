@@ -2,6 +2,7 @@
 
 from palaestra.observe.reading import condition, count, holds, part, parts, text, time
 from palaestra.observe.views import JobEnd, JobView, Raw
+from palaestra.plan.job import QUEUE_LABEL
 
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
 
@@ -35,6 +36,7 @@ def job_view(raw: Raw) -> JobView:
         ended=time(ending, "lastTransitionTime"),
         deleting="deletionTimestamp" in metadata,
         volumes=_volumes(raw),
+        queue=text(part(metadata, "labels"), QUEUE_LABEL, 63),
     )
 
 

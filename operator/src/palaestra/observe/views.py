@@ -181,6 +181,7 @@ class JobView:
         end, end_reason, end_message, ended: what its conditions say; None and "" while it goes on.
         deleting: somebody deleted it.
         volumes: names of the ConfigMaps and claims that its pods mount.
+        queue: the queue that Kueue knows it by, from the spec or a namespace's default; "": it has none.
     """
 
     name: str
@@ -196,6 +197,7 @@ class JobView:
     ended: datetime | None = None
     deleting: bool = False
     volumes: frozenset[str] = frozenset()
+    queue: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,7 @@ from palaestra.operator.strangers import Strangers
 
 RECHECK_S = 10.0  # while something may be missing
 KUEUE = "kueue.x-k8s.io"
-KUEUE_S = 60.0  # for which an answer about Kueue is believed
+KUEUE_S = 10.0  # for which an answer about Kueue is believed
 
 _READ = {
     SourceKind.CONFIG_MAP: CONFIG_MAPS,
@@ -88,7 +88,7 @@ class Looking:
             kueue=job.spec.scheduling.queue_name is not None and self._has_kueue(),
         )
         sources = self._sources(job, objects)
-        recheck_s = RECHECK_S if sources or strangers else None
+        recheck_s = RECHECK_S if sources or strangers or _lacks_kueue(job, objects) else None
         return Seen(objects=replace(objects, sources=sources), again_s=earliest(refused_s, recheck_s))
 
     def forget(self, key: Key) -> None:
@@ -119,6 +119,12 @@ class Looking:
             found = self._api.serves(KUEUE)
             self._kueue = (time.monotonic(), found)
         return found
+
+
+def _lacks_kueue(job: TrainingJob, objects: Objects) -> bool:
+    """Return whether a job waits until somebody installs Kueue."""
+    queued = job.spec.scheduling.queue_name is not None
+    return queued and not objects.kueue and not complete(job, observe(job, objects))
 
 
 def earliest(*seconds: float | None) -> float | None:

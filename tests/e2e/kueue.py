@@ -1,0 +1,143 @@
+"""Kueue in the cluster, as docs/queues.md tells: its commands are typed, and taken back at the end.
+
+What the page has from a registry comes from Kueue's Go module here (tests/cluster/kueue.sh): the chart as it
+is, and the image under its own name, so that a cluster which reaches the registry can pull it all the same.
+"""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tests.cluster.images import version_of
+from tests.cluster.kueue import REPOSITORY
+from tests.e2e.cluster import Cluster, Object
+from tests.e2e.namespace import Namespace
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "queues.md").read_text()
+DOING, UNDOING = PAGE.split("## Take it away")
+GROUP = "kueue.x-k8s.io"
+VERSION = f"{GROUP}/v1beta2"
+QUEUE = "trainings"
+NAMESPACE = "robots"
+TYPED_S = 300
+MADE_S = 120
+
+_IMAGE = "controllerManager.manager.image"
+_SETTINGS = {
+    f"{_IMAGE}.repository": REPOSITORY,
+    f"{_IMAGE}.tag": version_of("kueue", "sigs.k8s.io/kueue"),
+    f"{_IMAGE}.pullPolicy": "IfNotPresent",
+    "controllerManager.manager.resources.requests.cpu": "50m",  # beside a training on two cores
+}
+_FROM_THE_MODULE = """
+helm() {
+  [[ $1 == install ]] || { command helm "$@"; return; }
+  command helm "${@/#oci:*/$CHART}" --set "$SETTINGS"
+}
+"""
+
+
+class Kueue:
+    """Kueue, its queue and the namespace of the page; `folder` is where the commands are typed."""
+
+    def __init__(self, cluster: Cluster, folder: Path) -> None:
+        self._cluster = cluster
+        self._folder = folder
+        self._chart = ""
+
+    def taken(self) -> str:
+        """Return what is in the way: a Kueue or a namespace that somebody else has made; "": nothing."""
+        if self._kinds():
+            return "this cluster has a Kueue of its own"
+        there = self._cluster.get("namespaces", None, NAMESPACE) is not None
+        return f"this cluster has a namespace {NAMESPACE} of its own" if there else ""
+
+    def install(self) -> Namespace:
+        """Type the page down to its last section; return the namespace that has the queue."""
+        (self._folder / "manifests").symlink_to(ROOT / "manifests")
+        made = _said("kueue.sh")
+        _said("load.sh", f"{made}/image.tar")
+        self._chart = f"{made}/chart"
+        for block in _blocks(DOING, "sh"):
+            typed = self._type("-euc", block)
+            assert typed.returncode == 0, typed.stdout + typed.stderr
+        return Namespace(self._cluster, NAMESPACE, there=True)
+
+    def remove(self) -> None:
+        """Type the last section, whatever there is to take away; nothing may be left."""
+        said = [self._type("-uc", block) for block in _blocks(UNDOING, "sh")]
+        assert self.taken() == "", "".join(each.stdout + each.stderr for each in said)
+
+    def _kinds(self) -> str:
+        return self._cluster.kubectl("api-resources", f"--api-group={GROUP}", "--no-headers")
+
+    def _type(self, how: str, text: str) -> subprocess.CompletedProcess[str]:
+        settings = ",".join(f"{name}={value}" for name, value in _SETTINGS.items())
+        return subprocess.run(
+            ["bash", how, _FROM_THE_MODULE + text],
+            cwd=self._folder, env={**os.environ, "CHART": self._chart, "SETTINGS": settings},
+            capture_output=True, text=True, timeout=TYPED_S, check=False,
+        )  # fmt: skip
+
+
+def scheduling(priority: str | None = None) -> Object:
+    """Return the `scheduling` that the page gives a job, of a priority class or of none."""
+    found: list[Object] = [yaml.safe_load(block)["spec"]["scheduling"] for block in _blocks(DOING, "yaml")]
+    return next(each for each in found if each.get("priorityClassName") == priority)
+
+
+def workload(space: Namespace, job: str) -> Object:
+    """Return what Kueue made of the first replica of a TrainingJob, empty before it has."""
+    found = space.cluster.select("workloads", space.name)
+    owners = {each["metadata"]["ownerReferences"][0]["name"]: each for each in found}
+    return owners.get(f"{job}-0", {})
+
+
+def words(found: Object, kind: str) -> str:
+    """Return what a condition of a Workload says, "" where it has none."""
+    conditions = found.get("status", {}).get("conditions", [])
+    return next((each["message"] for each in conditions if each["type"] == kind), "")
+
+
+def leave_room_for_one(space: Namespace, job: str) -> None:
+    """Lower the quota of the queue to what a TrainingJob takes, once that is admitted."""
+    admission = space.wait(lambda: workload(space, job).get("status", {}).get("admission"))
+    (pods,) = admission["podSetAssignments"]
+    queue = space.cluster.get("clusterqueues", None, QUEUE)
+    assert queue
+    groups = queue["spec"]["resourceGroups"]
+    for resource in groups[0]["flavors"][0]["resources"]:
+        resource["nominalQuota"] = pods["resourceUsage"][resource["name"]]
+    change_queue(space, resourceGroups=groups)
+
+
+def change_queue(space: Namespace, **spec: Any) -> None:
+    """Change fields of the ClusterQueue, and wait until Kueue goes by them."""
+    changed = space.cluster.patch("clusterqueues", None, QUEUE, {"spec": spec})
+    generation = changed["metadata"]["generation"]
+    space.wait(lambda: _looked_at(space.cluster.get("clusterqueues", None, QUEUE)) == generation)
+
+
+def _looked_at(queue: Object | None) -> int | None:
+    """Return the generation of a ClusterQueue that Kueue has taken in."""
+    conditions = queue["status"].get("conditions", []) if queue else []
+    return next((each["observedGeneration"] for each in conditions if each["type"] == "Active"), None)
+
+
+def _blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def _said(script: str, *arguments: str) -> str:
+    """Run a script of tests/cluster; return its last line."""
+    done = subprocess.run(
+        [str(ROOT / "tests" / "cluster" / script), *arguments],
+        capture_output=True, text=True, timeout=MADE_S, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip().rpartition("\n")[2]

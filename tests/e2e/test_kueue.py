@@ -1,0 +1,161 @@
+"""docs/queues.md on the real cluster, with a real Kueue: admitted, preempted, admitted again."""
+
+import os
+from dataclasses import dataclass
+
+import pytest
+
+from tests.e2e.cluster import Object
+from tests.e2e.jobs import make_job
+from tests.e2e.kueue import (
+    QUEUE,
+    VERSION,
+    Kueue,
+    change_queue,
+    leave_room_for_one,
+    scheduling,
+    words,
+    workload,
+)
+from tests.e2e.namespace import LONG_S, SHORT_S
+
+pytestmark = [pytest.mark.trains, pytest.mark.timeout(900), pytest.mark.usefixtures("robots")]
+
+EVERY_STEPS = 100
+AMID = 150
+TRAINING = {"steps": 2000, "checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
+# As large as a training, and over at once.
+ENDS = {"command": ["bash", "-c", "exit 0"], "evaluation": {"everySteps": 0}}
+# Why a job is never admitted, and Kueue's words for it.
+NEVER = {
+    "nowhere": ({}, "nowhere", "LocalQueue nowhere doesn't exist"),
+    "device": (
+        {"example.com/device": "1"},
+        "trainings",
+        "resource example.com/device unavailable in ClusterQueue",
+    ),
+    "large": ({"memory": "17Gi"}, "trainings", "resources didn't satisfy LimitRange constraints"),
+}
+
+
+@dataclass(frozen=True)
+class Story:
+    """What was seen of three jobs in a queue that has room for one.
+
+    Attributes:
+        waited: the replica of `patient` while `everyday` had the place.
+        short: Kueue's words then.
+        at: the step of `everyday` when `urgent` came.
+        preempted: the replica of `everyday` after that.
+        why: Kueue's words then.
+        attempts: the lines of the run's attempts.jsonl, when `everyday` was back.
+        ends: the replicas at their ends, by job.
+    """
+
+    waited: Object
+    short: str
+    at: int
+    preempted: Object
+    why: str
+    attempts: list[Object]
+    ends: dict[str, Object]
+
+
+@pytest.fixture(scope="module")
+def robots(cluster, tmp_path_factory):
+    """The namespace of the page, with Kueue and the queue; all of it goes again."""
+    kueue = Kueue(cluster, tmp_path_factory.mktemp("queues"))
+    if taken := kueue.taken():
+        (pytest.skip if os.environ.get("PALAESTRA_CLUSTER") == "existing" else pytest.fail)(taken)
+    try:
+        yield kueue.install()
+    finally:
+        kueue.remove()
+
+
+@pytest.fixture(scope="module")
+def story(robots):
+    """`everyday` trains, `patient` waits behind it, `urgent` takes its place, and all of them end."""
+    robots.apply(make_job("everyday", trainer=TRAINING, backoffLimit=0, scheduling=scheduling()))
+    leave_room_for_one(robots, "everyday")
+    robots.apply(make_job("patient", trainer=ENDS, scheduling=scheduling()))
+    short = robots.wait(lambda: words(workload(robots, "patient"), "QuotaReserved"))
+    robots.wait(lambda: robots.replica("patient").get("reason") == "Queued")
+    waited, first = robots.replica("patient"), robots.wait_for_step("everyday", AMID)
+    at = robots.trainer_status(first)["step"]
+
+    robots.apply(make_job("urgent", trainer=ENDS, scheduling=scheduling("urgent")))
+    robots.wait(lambda: "lastAttempt" in robots.replica("everyday"), SHORT_S)
+    preempted, why = robots.replica("everyday"), words(workload(robots, "everyday"), "Preempted")
+    back = robots.wait_for_step("everyday", at, LONG_S)
+    attempts = robots.in_run(back, "attempts.jsonl")
+    names = ("everyday", "patient", "urgent")
+    assert {name: robots.wait_for_end(name, LONG_S) for name in names} == dict.fromkeys(names, "Succeeded")
+    return Story(waited, short, at, preempted, why, attempts, {name: robots.replica(name) for name in names})
+
+
+def test_a_job_that_has_no_room_waits_and_its_status_names_the_queue(story):
+    """What is short is Kueue's to tell, in the Workload that docs/queues.md shows how to read."""
+    assert story.waited["phase"] == "Suspended"
+    assert story.waited["message"] == "waits in queue trainings for Kueue"
+    assert story.waited["attempt"] == 0
+    assert "insufficient unused quota for" in story.short
+
+
+def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
+    """Its status says who took it, by the word of whoever did."""
+    last = story.preempted["lastAttempt"]
+
+    assert story.preempted["phase"] == "Suspended"
+    assert story.preempted["reason"] == last["reason"] == "Queued"
+    assert "which took it back" in last["message"]
+    assert "Preempted to accommodate a workload" in story.why
+    assert any("which took it back" in each for each in robots.events("everyday", "Queued"))
+
+
+def test_a_preempted_job_goes_on_from_its_checkpoint_when_there_is_room(story):
+    """Written on the way out, so nothing is lost; with a backoffLimit of 0, as it is no failure."""
+    resumed_at = int(story.attempts[1]["reason"].removeprefix("resumed at step "))
+
+    assert len(story.attempts) == 2
+    assert resumed_at >= story.at - EVERY_STEPS
+    assert story.ends["everyday"]["step"] == TRAINING["steps"]
+
+
+def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
+    """Both are Kueue's doing, and neither is anybody's fault."""
+    none = dict.fromkeys(("trainer", "simulator", "disruption", "suspension"), 0)
+
+    assert story.ends["everyday"]["restarts"] == {**none, "suspension": 1}
+    assert story.ends["patient"]["restarts"] == story.ends["urgent"]["restarts"] == none
+    assert {name: end["attempt"] for name, end in story.ends.items()} == {
+        "everyday": 2,
+        "patient": 1,
+        "urgent": 1,
+    }
+
+
+@pytest.mark.parametrize("name", NEVER)
+def test_why_a_job_is_never_admitted_is_told_by_its_workload(name, robots):
+    """The page shows how to read it, and what helps."""
+    asked, queue, told = NEVER[name]
+    trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
+    robots.apply(make_job(name, trainer=trainer, scheduling={"queueName": queue}))
+
+    assert told in robots.wait(lambda: words(workload(robots, name), "QuotaReserved"))
+    assert robots.wait(lambda: robots.replica(name).get("reason") == "Queued")
+
+
+def test_a_default_queue_is_that_of_jobs_that_name_none(robots):
+    """Kueue suspends what the spec does not; whoever resumed it would fight with Kueue over each pod."""
+    default = {"apiVersion": VERSION, "kind": "LocalQueue", "spec": {"clusterQueue": QUEUE}}
+    robots.create("localqueues", {**default, "metadata": {"name": "default"}})
+    change_queue(robots, stopPolicy="Hold")
+    robots.apply(make_job("anyone", script="exit 0"))
+    robots.wait(lambda: robots.replica("anyone").get("reason") == "Queued")
+    assert "waits in queue default" in robots.replica("anyone")["message"]
+
+    change_queue(robots, stopPolicy="None")
+
+    assert robots.wait_for_end("anyone") == "Succeeded"
+    assert robots.pods_made("anyone") == 1

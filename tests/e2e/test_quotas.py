@@ -1,0 +1,163 @@
+"""What a namespace may take: the refusal is a reason in the status, and ends when whoever refuses lets go."""
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from tests.e2e.cluster import Object
+from tests.e2e.jobs import LITTLE, make_job
+from tests.e2e.namespace import LONG_S, Namespace, named
+
+pytestmark = pytest.mark.timeout(600)
+
+MISSING, URGENT = "palaestra-e2e-missing", "palaestra-e2e-urgent"
+OF_URGENT = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [URGENT]}]}
+PLACE = "palaestra.dev/place"  # a resource of which there is one
+IN_PLACE = {"resources": {"requests": {**LITTLE["requests"], PLACE: "1"}, "limits": {PLACE: "1"}}}
+WAITS_ONCE = (
+    "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen;"
+    " trap 'exit 75' TERM; sleep 3600 & wait"
+)
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """An object that refuses what a job needs, and in which words; `scheduling` is the job's."""
+
+    kind: str
+    spec: Object
+    words: str
+    scheduling: Object = field(default_factory=dict)
+
+    def begin(self, place: Namespace) -> None:
+        """Let nothing be made in a namespace."""
+        place.create(self.kind, {"metadata": {"name": "none"}, "spec": self.spec})
+
+    def end(self, place: Namespace) -> None:
+        """Let everything be made."""
+        place.cluster.delete(self.kind, place.name, "none")
+
+
+class NoSuchClass(Refusal):
+    """A PriorityClass that is not there until the end."""
+
+    def begin(self, place: Namespace) -> None:
+        """Leave it as it is."""
+
+    def end(self, place: Namespace) -> None:
+        """Make it."""
+        place.cluster.create(self.kind, priority_class(MISSING))
+
+
+def priority_class(name: str) -> Object:
+    """Return a PriorityClass above the default."""
+    return {"metadata": {"name": name}, "value": 1000, "description": "Made by a test, and taken away."}
+
+
+def at_least(**quantities: str) -> Object:
+    """Return the LimitRange for containers that ask for no less."""
+    return {"limits": [{"type": "Container", "min": quantities}]}
+
+
+def claims_of(most: str) -> Object:
+    """Return the LimitRange for claims that ask for no more."""
+    return {"limits": [{"type": "PersistentVolumeClaim", "max": {"storage": most}}]}
+
+
+REFUSALS = {
+    "quota": Refusal("resourcequotas", {"hard": {"pods": "0"}}, "exceeded quota: none"),
+    "container": Refusal("limitranges", at_least(cpu="2"), "minimum cpu usage per Container is 2"),
+    "claim": Refusal(
+        "limitranges", claims_of("1Mi"), "maximum storage usage per PersistentVolumeClaim is 1Mi"
+    ),
+    "class": NoSuchClass(
+        "priorityclasses", {}, f"no PriorityClass with name {MISSING}", {"priorityClassName": MISSING}
+    ),
+    "urgent": Refusal(
+        "resourcequotas",
+        {"hard": {"pods": "0"}, "scopeSelector": OF_URGENT},
+        "exceeded quota: none",
+        {"priorityClassName": URGENT},
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def classes(cluster):
+    """A PriorityClass; the one that is missing is taken away too."""
+    cluster.create("priorityclasses", priority_class(URGENT))
+    yield
+    for name in (MISSING, URGENT):
+        cluster.delete("priorityclasses", None, name)
+
+
+@pytest.fixture(scope="module")
+def places(make_namespace, classes):  # noqa: ARG001 - is there
+    """A namespace for each refusal, with a job that waits in it, so that they wait side by side."""
+    made = {name: make_namespace(f"refuses-{name}") for name in REFUSALS}
+    for name, place in made.items():
+        REFUSALS[name].begin(place)
+        place.apply(make_job("waits", script="exit 0", scheduling=REFUSALS[name].scheduling))
+    return made
+
+
+@pytest.fixture(scope="module")
+def refused(places):
+    """What the status said of each replica that was refused; by now nothing refuses it any more."""
+    for place in places.values():
+        place.wait(lambda place=place: place.replica("waits").get("reason") == "PodsRefused")
+    told = {name: place.replica("waits") for name, place in places.items()}
+    for name, place in places.items():
+        REFUSALS[name].end(place)
+    return told
+
+
+@pytest.fixture
+def one_place(cluster):
+    """A node that has one of the resource for which jobs compete, however large it is."""
+    node = named(cluster.select("nodes", None)[0])
+
+    def give(amount: str | None) -> None:
+        content = {"status": {"capacity": {PLACE: amount}, "allocatable": {PLACE: amount}}}
+        cluster.request("PATCH", f"api/v1/nodes/{node}/status", content)
+
+    give("1")
+    yield
+    give(None)
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_what_is_refused_is_told_in_the_words_of_whoever_refuses(name, refused):
+    """There is no pod to look at: only the Job's events, or the answer to the operator, tell of it."""
+    assert refused[name]["phase"] == "Pending"
+    assert REFUSALS[name].words in refused[name]["message"]
+    assert refused[name]["attempt"] == 0
+
+
+@pytest.mark.usefixtures("classes", "one_place")
+def test_a_job_that_the_scheduler_takes_off_its_node_is_told_so_and_comes_back(namespace, job):
+    """A PriorityClass makes room without a queue as well; that is a disruption and no failure."""
+    namespace.apply(job("everyday", script=WAITS_ONCE, simulator=IN_PLACE, backoffLimit=0))
+    namespace.wait_for_pod("everyday")
+
+    urgent = {"priorityClassName": URGENT}
+    namespace.apply(job("urgent", script="exit 0", simulator=IN_PLACE, scheduling=urgent))
+
+    assert namespace.wait_for_end("urgent", LONG_S) == "Succeeded"
+    assert namespace.wait_for_end("everyday", LONG_S) == "Succeeded"
+    assert namespace.replica("everyday")["restarts"]["disruption"] == 1
+    assert namespace.replica("everyday")["attempt"] == 2
+    (message,) = namespace.events("everyday", "Disrupted")
+    assert "preempting to accommodate a higher priority pod" in message
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+@pytest.mark.usefixtures("refused")
+def test_a_job_that_was_refused_goes_on_by_itself(name, places):
+    """Nobody has to touch it, and nothing of it counts as a failure."""
+    place = places[name]
+
+    assert place.wait_for_end("waits", LONG_S) == "Succeeded"
+    assert place.replica("waits")["attempt"] == 1
+    assert set(place.replica("waits")["restarts"].values()) == {0}
+    assert len(place.events("waits", "PodsRefused")) == 1
