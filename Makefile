@@ -7,6 +7,7 @@ BIN := .venv/bin
 PACKAGES := operator trainer sim_image
 SOURCES := operator/src trainer/src sim_image/src
 JOB := manifests/examples/move-to-target.yaml
+COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 
 .PHONY: help setup run test check e2e images cluster cluster-down format bench soak golden lock
 
@@ -21,8 +22,9 @@ setup: .venv/ready ## install ROS from the distribution and everything else into
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy
 	@$(BIN)/palaestra run $(JOB)
 
+# Four at once, also on two processors: many tests wait for processes, leases and deadlines most of their time.
 test: setup ## run every test; also that generated files are current
-	@$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
+	@$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder
 
 check: setup ## lint, format, types and the allowed imports
 	@$(BIN)/ruff check
@@ -58,5 +60,5 @@ golden: setup ## record the plans of the examples and other generated files anew
 	@$(BIN)/python -m tests.golden
 
 lock: setup ## resolve the dependencies again, within the bounds of the pyproject files
-	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
-	  --no-emit-package palaestra-sim --group dev $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
+	@$(COMPILE) --no-emit-package palaestra-sim --group dev $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
+	@$(COMPILE) --group checkov -o tests/chart/checkov.lock

@@ -13,9 +13,10 @@ from palaestra.api.crd import crd
 from palaestra.cli import operator
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
-from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm
+from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
 from tests.chart.installation import SECRETS_ROLE
 from tests.chart.modes import DIGEST, MODES
+from tests.chart.rights import held
 
 CLUSTER_WIDE = {"ClusterRole", "ClusterRoleBinding", "CustomResourceDefinition"}
 REGISTRY = "registry.example.com:5000/robots/"
@@ -42,15 +43,8 @@ def options(deployment):
 
 
 def rules(roles):
-    """Return (group, resource, verb) of everything that some roles allow."""
-    return {
-        (group, resource, verb)
-        for role in roles
-        for rule in role["rules"]
-        for group in rule["apiGroups"]
-        for resource in rule["resources"]
-        for verb in rule["verbs"]
-    }
+    """Return everything that some roles allow."""
+    return {right for role in roles for right in held(role)}
 
 
 def roles(objects):
@@ -258,11 +252,16 @@ def test_tensorboard_changes_no_run(one):
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):
-    """It stays in its Secret."""
+    """It stays in its Secret, and comes as a file that the server alone is told of."""
     pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
+    [server] = pod["containers"]
 
-    [token] = [each for each in pod["containers"][0]["env"] if each["name"] == "JUPYTER_TOKEN"]
-    assert token["valueFrom"] == {"secretKeyRef": {"name": "notebooks", "key": "token"}}
+    environment = {each["name"]: each["value"] for each in server["env"]}
+    [folder] = [mount["mountPath"] for mount in server["volumeMounts"] if mount["name"] == "token"]
+    [volume] = [each["secret"] for each in pod["volumes"] if each["name"] == "token"]
+    assert volume["secretName"] == "notebooks"
+    assert [f"{folder}/{item['path']}" for item in volume["items"]] == [environment["JUPYTER_TOKEN_FILE"]]
+    assert environment.keys() == {"JUPYTER_TOKEN_FILE", "HOME"}
 
 
 def test_the_alerts_are_those_of_the_file(one):
@@ -270,6 +269,19 @@ def test_the_alerts_are_those_of_the_file(one):
     rules_of_file = yaml.safe_load((CHART / "alerts.yaml").read_text())
 
     assert one("monitored", "PrometheusRule", "palaestra")["spec"] == rules_of_file
+
+
+def test_runbooks_are_links_where_the_chart_is_told_the_address():
+    """The project's files are read where somebody keeps them."""
+    address = "https://git.example.com/palaestra/blob/main"
+    rule = {"enabled": True, "runbooks": address}
+
+    made = objects({"monitoring": {"prometheusRule": rule}})
+
+    (groups,) = (each["spec"]["groups"] for each in made if each["kind"] == "PrometheusRule")
+    links = [each["annotations"]["runbook_url"] for group in groups for each in group["rules"]]
+    assert all(link.startswith(f"{address}/docs/operations.md#palaestra") for link in links)
+    assert links
 
 
 def test_every_dashboard_is_mounted_as_it_is(made):

@@ -38,6 +38,8 @@ WRONG = [  # the value that is set, to what, and where below it the mistake is
     ("monitoring.podMonitor.interval", 15, ""),
     ("monitoring.podMonitor.interval", "often", ""),
     ("monitoring.namespace", "", ""),
+    ("monitoring.prometheusRule.runbooks", "git.example.com", ""),
+    ("monitoring.prometheusRule.runbooks", "https://git.example.com/", ""),
     ("monitoring.dashboards.labels", {"grafana_dashboard": 1}, "/grafana_dashboard"),
     ("test.deadlineSeconds", -1, ""),
     ("serviceAccount.name", "", ""),

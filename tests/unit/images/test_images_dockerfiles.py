@@ -1,15 +1,21 @@
-"""What every Dockerfile keeps to; the linters for them are no Python packages."""
+"""What every Dockerfile keeps to, and that hadolint finds nothing else in them."""
 
+import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tools.images.lock import PYTHON
 from tools.images.recipes import recipes
 
 ROOT = Path(__file__).parents[3]
 RECIPES = tuple(recipes("debian").values())
+HADOLINT = Path(sys.executable).with_name("hadolint")
+EXCUSES = ROOT / ".hadolint.yaml"
 
 
 @pytest.fixture(params=RECIPES, ids=lambda recipe: recipe.name)
@@ -99,3 +105,34 @@ def test_folders_with_the_version_of_python_are_those_of_the_lock():
     for recipe in RECIPES:
         found = re.findall(r"/python(3\.\d+)/", (ROOT / recipe.dockerfile).read_text())
         assert set(found) <= {PYTHON}
+
+
+def linted(*options):
+    """Return the rules that hadolint sees broken, by Dockerfile."""
+    files = [str(path.relative_to(ROOT)) for path in ROOT.glob("*/Dockerfile*")]
+    done = subprocess.run(
+        [HADOLINT, "--no-fail", "--format=json", *options, *files],
+        cwd=ROOT,
+        capture_output=True,
+        check=True,
+        timeout=30,
+    )
+    broken = {file: set() for file in files}
+    for each in json.loads(done.stdout):
+        broken[each["file"]].add(each["code"])
+    return broken
+
+
+def test_hadolint_finds_nothing_in_any_dockerfile():
+    """Also in one that no recipe builds yet, and in what ShellCheck knows of the shell in them."""
+    broken = linted()
+
+    assert broken.keys() >= {recipe.dockerfile for recipe in RECIPES}
+    assert not any(broken.values()), broken
+
+
+def test_every_excuse_of_hadolint_is_needed():
+    """One that nobody needs any more would hide the next mistake."""
+    broken = linted("--config=/dev/null")
+
+    assert set(yaml.safe_load(EXCUSES.read_text())["ignored"]) == set().union(*broken.values())

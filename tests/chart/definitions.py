@@ -1,0 +1,39 @@
+"""CustomResourceDefinitions of what the chart has to do with, out of those projects' Go modules."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+from tests.cluster.images import version_of
+from tests.control_plane.programs import REQUIRED, NoPrograms
+
+PROMETHEUS = ("github.com/prometheus-operator/prometheus-operator@v0.85.0", "example/prometheus-operator-crd")
+KUEUE = (f"sigs.k8s.io/kueue@{version_of('kueue', 'sigs.k8s.io/kueue')}", "config/components/crd/bases")
+DOWNLOAD_S = 300
+
+
+def definitions(module: str, folder: str) -> Path:
+    """Return the folder of a Go module that holds its CustomResourceDefinitions.
+
+    Nothing is downloaded unless the tests are required to run.
+
+    Raises:
+        NoPrograms: Go, or the module, is not there.
+    """
+    proxy = {} if os.environ.get(REQUIRED) == "1" else {"GOPROXY": "off"}
+    try:
+        done = subprocess.run(
+            ["go", "mod", "download", "-json", module],
+            env={**os.environ, **proxy},
+            capture_output=True,
+            text=True,
+            timeout=DOWNLOAD_S,
+            check=False,
+        )
+    except FileNotFoundError as error:
+        raise NoPrograms("Go is missing; install Go 1.26") from error
+    answer = json.loads(done.stdout or "{}")
+    if "Dir" not in answer:
+        raise NoPrograms(f"{module} is not downloaded; get it with: go mod download {module}")
+    return Path(answer["Dir"]) / folder

@@ -1,0 +1,94 @@
+"""Values chosen together so that each pair of choices occurs: no template may rely on a default."""
+
+from collections.abc import Iterable
+from itertools import combinations
+from math import comb
+from typing import Any
+
+from tests.chart.modes import DIGEST, MODES, Values, merged
+
+PARTS = ("operator", "trainer", "stub", "webots")
+MONITORS = ("podMonitor", "serviceMonitor", "prometheusRule", "dashboards")
+RESOURCES = {"requests": {"cpu": "1"}, "limits": {"memory": "1Gi"}}
+SPREAD = {"maxSkew": 1, "topologyKey": "zone", "whenUnsatisfiable": "DoNotSchedule"}
+LABELS = {"example.com/team": "robots"}
+
+# Another value than the default, for each value that there is.
+OTHERS: dict[str, Any] = {
+    "images.registry": "registry.example.com:5000/robots",
+    "images.pullPolicy": "Never",
+    **{f"images.{part}.repository": "other" for part in PARTS},
+    **{f"images.{part}.tag": "1.2" for part in PARTS},
+    **{f"images.{part}.digest": DIGEST for part in PARTS},
+    "imagePullSecrets": [{"name": "registry"}],
+    "crds.install": False,
+    "crds.keep": False,
+    "watchNamespaces": ["robots", "drones"],
+    "operator.replicas": 3,
+    "operator.leaderElection": False,
+    "operator.workers": 2,
+    "operator.resyncSeconds": 60,
+    "operator.resources": RESOURCES,
+    "operator.topologySpreadConstraints": [SPREAD],
+    **{f"operator.{name}": chosen for name, chosen in MODES["closed"]["operator"].items()},
+    "serviceAccount.create": False,
+    "serviceAccount.name": "other",
+    "serviceAccount.annotations": LABELS,
+    "podDisruptionBudget.enabled": False,
+    "networkPolicy.enabled": False,
+    "networkPolicy.egress.restricted": True,
+    "networkPolicy.egress.apiServerPorts": [8443],
+    "monitoring.namespace": "elsewhere",
+    **{f"monitoring.{each}.enabled": True for each in MONITORS},
+    **{f"monitoring.{each}.labels": LABELS for each in MONITORS},
+    "monitoring.podMonitor.interval": "1m",
+    "monitoring.serviceMonitor.interval": "1m",
+    "monitoring.prometheusRule.runbooks": "https://git.example.com/palaestra/blob/main",
+    "monitoring.dashboards.annotations": LABELS,
+    "monitoring.dashboards.namespace": "elsewhere",
+    "test.namespace": "elsewhere",
+    "test.deadlineSeconds": 60,
+    "tensorboard.enabled": True,
+    "tensorboard.existingClaim": "runs",
+    "tensorboard.namespace": "elsewhere",
+    "tensorboard.resources": RESOURCES,
+    "jupyter.enabled": True,
+    "jupyter.image": "notebooks:1",
+    "jupyter.namespace": "elsewhere",
+    "jupyter.tokenSecret.name": "notebooks",
+    "jupyter.tokenSecret.key": "secret",
+    "jupyter.existingClaim": "notes",
+    "jupyter.resources": RESOURCES,
+}
+# What the schema demands beside a value.
+BESIDE: dict[str, dict[str, Any]] = {
+    "operator.leaderElection": {"operator.replicas": 1},
+    "tensorboard.enabled": {"tensorboard.existingClaim": "runs"},
+    "jupyter.enabled": {"jupyter.image": "notebooks:1", "jupyter.tokenSecret.name": "notebooks"},
+}
+
+
+def rows() -> list[tuple[str, ...]]:
+    """Return a few choices of paths. Of any two paths, each is somewhere alone, both are, and neither.
+
+    Nothing is chosen in the first of n + 1 rows, and each path in its own n/2 of the others, rounded up: two
+    such halves overlap, and neither holds the other (Katona 1973).
+    """
+    n = next(odd for odd in range(1, 99, 2) if comb(odd, odd // 2 + 1) >= len(OTHERS))
+    halves = list(zip(OTHERS, combinations(range(1, n + 1), n // 2 + 1), strict=False))
+    return [tuple(path for path, half in halves if row in half) for row in range(n + 1)]
+
+
+def together(row: Iterable[str]) -> Values:
+    """Return other values than the defaults for some paths, and what those need beside them."""
+    chosen = {path: OTHERS[path] for path in row}
+    for path in tuple(chosen):
+        chosen |= BESIDE.get(path, {})
+    return merged(*(_below(path, value) for path, value in chosen.items()))
+
+
+def _below(path: str, value: Any) -> Values:
+    for step in reversed(path.split(".")):
+        value = {step: value}
+    whole: Values = value
+    return whole

@@ -1,0 +1,60 @@
+"""What checkov has against the chart, down to the last finding, and why it stays so."""
+
+from typing import NamedTuple
+
+import pytest
+
+from tests.chart.checkov import Finding, findings
+from tests.chart.helm import rendered
+from tests.chart.modes import MODES
+
+OPERATOR = ("Deployment", "palaestra-operator")
+TENSORBOARD = ("Deployment", "palaestra-tensorboard")
+JUPYTER = ("Deployment", "palaestra-jupyter")
+TRIAL = ("Pod", "palaestra-test")
+Objects = tuple[tuple[str, str], ...]
+
+
+class Accepted(NamedTuple):
+    """A check whose findings are no faults, with the objects that it is about."""
+
+    reason: str
+    objects: Objects
+
+
+ALWAYS = {
+    "CKV_K8S_11": Accepted(
+        "A limit of CPU slows a pod down on an idle node; requests share a busy one, and memory is limited.",
+        (OPERATOR, TENSORBOARD, JUPYTER, TRIAL),
+    ),
+    "CKV_K8S_38": Accepted("Both ask the API server; nobody else holds a token.", (OPERATOR, TRIAL)),
+    "CKV_K8S_8": Accepted("It ends by itself, and at its deadline at the latest.", (TRIAL,)),
+    "CKV_K8S_9": Accepted("Nobody sends it requests.", (TRIAL,)),
+    "CKV2_K8S_6": Accepted("It listens on no port, so there is nothing to close.", (TRIAL,)),
+}
+BY_DEFAULT = {
+    "CKV_K8S_43": Accepted("Digests are those of whoever pushed the images: values.", (OPERATOR, TRIAL)),
+    "CKV_K8S_15": Accepted(
+        "Images of a release never change, and nodes without a registry hold them.", (OPERATOR, TRIAL)
+    ),
+}
+EXPECTED = {"default": {**ALWAYS, **BY_DEFAULT}, "everything": ALWAYS}
+
+
+@pytest.fixture(scope="module")
+def found():
+    """What it finds, by mode; one run for all, since it takes seconds to begin."""
+    return findings({mode: rendered(MODES[mode], "--skip-tests=false") for mode in EXPECTED})
+
+
+@pytest.mark.parametrize("mode", EXPECTED)
+def test_every_finding_has_a_reason_and_every_reason_a_finding(found, mode):
+    """A new one is mended, or somebody says why not; and what was mended loses its excuse."""
+    parts = {OPERATOR, TRIAL} if mode == "default" else {OPERATOR, TENSORBOARD, JUPYTER, TRIAL}
+
+    assert found[mode] == {
+        Finding(check, *each)
+        for check, accepted in EXPECTED[mode].items()
+        for each in accepted.objects
+        if each in parts
+    }

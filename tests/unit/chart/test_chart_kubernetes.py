@@ -1,0 +1,50 @@
+"""Every object of the chart meets the schemas of Kubernetes, whatever is chosen together.
+
+Those of the oldest Kubernetes that the chart allows, and of the newest that is known. What comes with the
+Prometheus Operator has none there: a real API server takes it in tests/integration/chart.
+"""
+
+import copy
+from itertools import permutations, product
+
+import kubernetes_validate
+import pytest
+import yaml
+
+from tests.chart import readme
+from tests.chart.helm import CHART, objects
+from tests.chart.pairs import OTHERS, rows, together
+
+OLDEST = yaml.safe_load((CHART / "Chart.yaml").read_text())["kubeVersion"].removeprefix(">=")
+RELEASES = (OLDEST, kubernetes_validate.latest_version())
+FOREIGN = {"PodMonitor", "PrometheusRule", "ServiceMonitor"}
+ROWS = rows()
+
+
+@pytest.mark.parametrize("row", ROWS, ids=range(len(ROWS)))
+def test_every_object_meets_the_schemas_of_kubernetes(row):
+    """Strictly: an unknown field is a misspelt one, which an API server would drop."""
+    made = [each for each in objects(together(row), tests=True) if each["kind"] not in FOREIGN]
+
+    assert len(made) > len(FOREIGN)
+    for each, release in product(made, RELEASES):
+        kubernetes_validate.validate(each, release, strict=True)
+
+
+def test_a_misspelt_field_is_found(one):
+    """Otherwise the schemas would prove nothing."""
+    deployment = copy.deepcopy(one("default", "Deployment"))
+    deployment["spec"]["template"]["spec"]["nodeSelektor"] = {}
+
+    for release in RELEASES:
+        with pytest.raises(kubernetes_validate.ValidationError, match="nodeSelektor"):
+            kubernetes_validate.validate(deployment, release, strict=True)
+
+
+def test_each_value_is_chosen_with_and_without_each_other():
+    """A template that relies on another value's default breaks when both are chosen."""
+    assert OTHERS.keys() == {value.path for value in readme.values(readme.VALUES.read_text())}
+    assert ROWS[0] == ()
+    for one, another in permutations(OTHERS, 2):
+        chosen = {(one in row, another in row) for row in ROWS}
+        assert chosen == {(False, False), (True, False), (False, True), (True, True)}

@@ -1,0 +1,114 @@
+"""Rights as they are read from roles and from an audit log: by these two, grants and uses are compared."""
+
+import json
+
+import pytest
+
+from tests.chart.installation import installed
+from tests.chart.rights import Right, Use, granted, uses
+
+READ = Right("", "pods", "list")
+WHY = 'RBAC: allowed by RoleBinding "reader/robots"'
+
+
+@pytest.fixture(autouse=True)
+def helm_is_built():
+    """Needed by the other tests of this folder only."""
+
+
+def role(name, namespace=None, verb="list"):
+    """Return a role that allows one verb on pods, in the cluster or in a namespace."""
+    metadata = {"name": name} | ({"namespace": namespace} if namespace else {})
+    rules = [{"apiGroups": [""], "resources": ["pods"], "verbs": [verb]}]
+    return {"kind": "Role" if namespace else "ClusterRole", "metadata": metadata, "rules": rules}
+
+
+def binding(of, account="operator"):
+    """Return the binding of a role to a service account of the namespace `robots`."""
+    subject = {"kind": "ServiceAccount", "name": account, "namespace": "robots"}
+    reference = {"kind": of["kind"], "name": of["metadata"]["name"]}
+    return {
+        "kind": f"{of['kind']}Binding",
+        "metadata": of["metadata"],
+        "roleRef": reference,
+        "subjects": [subject],
+    }
+
+
+def entry(verb, *, user="system:serviceaccount:robots:operator", code=200, decision="allow", **target):
+    """Return a line of an audit log."""
+    return json.dumps(
+        {
+            "verb": verb,
+            "user": {"username": user},
+            "requestReceivedTimestamp": "2026-01-02T00:00:00.000001Z",
+            "objectRef": {"resource": "pods", "namespace": "robots", **target},
+            "responseStatus": {"code": code},
+            "annotations": {
+                "authorization.k8s.io/decision": decision,
+                "authorization.k8s.io/reason": WHY,
+            },
+        }
+    )
+
+
+def test_a_right_is_granted_by_a_binding_and_not_by_a_role_alone():
+    """A role that nobody binds opens nothing."""
+    bound, alone = role("reads"), role("deletes", verb="delete")
+
+    assert granted([bound, alone, binding(bound)], "robots", "operator") == {READ}
+
+
+def test_roles_of_one_name_are_told_apart_by_their_namespaces():
+    """Each list of namespaces has a role of this name in every one of them."""
+    here, there = role("jobs", "robots"), role("jobs", "drones", "delete")
+
+    assert granted([here, there, binding(here)], "robots", "operator") == {READ}
+
+
+def test_what_another_account_holds_is_not_granted():
+    """An account is a namespace and a name."""
+    bound = role("reads")
+
+    assert granted([bound, binding(bound, "trial")], "robots", "operator") == set()
+    assert granted([bound, binding(bound)], "drones", "operator") == set()
+
+
+def test_the_installation_grants_no_secrets_though_a_role_for_them_is_in_it():
+    """It waits for somebody who binds it."""
+    rights = granted(installed(), "palaestra-system", "palaestra-operator")
+
+    assert rights
+    assert "secrets" not in {right.resource for right in rights}
+
+
+def test_a_request_is_the_use_of_a_right():
+    """With the part of the object that it was for, and who allowed it."""
+    log = entry("patch", apiGroup="palaestra.dev", resource="trainingjobs", subresource="status")
+
+    right = Right("palaestra.dev", "trainingjobs/status", "patch")
+    assert list(uses(log)) == [Use("robots", "operator", right, allowed=True, reason=WHY)]
+
+
+def test_whoever_applies_what_is_not_there_yet_uses_two_rights():
+    """An API server asks for both, and writes down one."""
+    verbs = {code: [use.right.verb for use in uses(entry("patch", code=code))] for code in (200, 201)}
+
+    assert verbs == {200: ["patch"], 201: ["patch", "create"]}
+
+
+def test_a_refused_request_is_no_right():
+    """It says that one is missing."""
+    [use] = uses(entry("list", decision="forbid", code=403))
+
+    assert not use.allowed
+
+
+def test_people_discovery_the_past_and_half_a_line_are_left_out():
+    """A log that is still written to, of a server that others use too."""
+    discovery = json.loads(entry("get"))
+    del discovery["objectRef"]
+    lines = [entry("list", user="admin"), json.dumps(discovery), entry("list"), '{"verb": "li']
+
+    assert [use.right for use in uses("\n".join(lines))] == [READ]
+    assert list(uses(entry("list"), since="2026-01-03")) == []
