@@ -35,10 +35,12 @@ up_existing() {
   echo "$KUBECONFIG"
 }
 
-# Start kind without letting it outlive this script; in the background, so that a signal is acted on at once.
+# Start kind without letting it outlive this script; in the background, so that a signal is acted on at once. It looks for
+# the files that kind.yaml mounts where it is called.
 create_cluster() {
   say "creating the cluster"
-  setpriv --pdeathsig KILL kind create cluster --name "$CLUSTER" --image "$1" --config "$2" --kubeconfig "$STATE/kubeconfig.part" --wait 180s \
+  setpriv --pdeathsig KILL env --chdir "$HERE" \
+    kind create cluster --name "$CLUSTER" --image "$1" --config "$2" --kubeconfig "$STATE/kubeconfig.part" --wait 180s \
     >"$STATE/kind.log" 2>&1 8>&- &
   wait $! || die "kind could not create the cluster:
 $(tail -40 "$STATE/kind.log")"

@@ -148,6 +148,7 @@ def _api_server(plane: ControlPlane, etcd_port: int) -> list[str]:
         f"--service-cluster-ip-range={SERVICES}",
         "--endpoint-reconciler-type=none",
         "--authorization-mode=RBAC",
+        "--enable-admission-plugins=OwnerReferencesPermissionEnforcement",  # as OpenShift has it
         f"--audit-policy-file={policy}",
         f"--audit-log-path={plane.audit_log}",
     ]

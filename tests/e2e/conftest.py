@@ -23,7 +23,7 @@ CHOSEN = "PALAESTRA_E2E"  # set by whoever chose the cluster of $KUBECONFIG for 
 MONITORING = "monitoring"  # the operator's --monitoring-namespace
 NAMESPACE_BYTES = 40
 BEGIN_FIRST = ("long_run", "evictions", "always_interrupted")
-LATE = ("comes_late", "trains", "changes_the_operator")
+LATE = ("comes_late", "trains", "changes_the_operator", "looks_back")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -32,7 +32,10 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "trains: needs two processors, so it waits for the end of what takes long"
     )
-    config.addinivalue_line("markers", "changes_the_operator: comes last, so that it disturbs no other test")
+    config.addinivalue_line("markers", "changes_the_operator: comes late, so that it disturbs no other test")
+    config.addinivalue_line(
+        "markers", "looks_back: looks at what all other tests have left, so it comes last"
+    )
 
 
 @pytest.hookimpl(trylast=True)

@@ -4,26 +4,40 @@ Helm takes that installation over, and it is put back at the end. For a list of 
 own is made, while the operator of the cluster is away.
 """
 
+import json
 import os
+import shutil
 import subprocess
 
 import pytest
 
+from tests.chart.definitions import PROMETHEUS, definitions
 from tests.chart.helm import CHART, ROOT
-from tests.e2e.jobs import WAIT
+from tests.chart.modes import MODES, merged
+from tests.e2e.jobs import WAIT, make_claim
 from tests.e2e.long_run import operators
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 from tests.e2e.test_operators import KINDS, fingerprint
+from tests.e2e.tour import tour
 
 pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 
 WITHIN_S = 600  # for `helm test`, which pulls nothing here
 RELEASE = "palaestra"
+KINDS_OF_PROMETHEUS = ("podmonitors", "servicemonitors", "prometheusrules")
+# What needs nothing that this cluster lacks: a registry, and an image with JupyterLab.
+EVERYTHING = merged(
+    MODES["available"],
+    MODES["monitored"],
+    MODES["closed"],
+    {"operator": {"replicas": 2}, "serviceAccount": {"create": True, "name": OPERATOR}},
+    {"tensorboard": {"enabled": True, "existingClaim": "runs"}},
+)
 
 
-def helm(verb, namespace, *options):
+def helm(verb, namespace, *options, chart=CHART):
     """Run Helm for our release on the cluster of $KUBECONFIG; return what it says."""
-    chart = [str(CHART)] if verb in {"install", "upgrade"} else []
+    chart = [str(chart)] if verb in {"install", "upgrade"} else []
     done = subprocess.run(
         ["helm", verb, RELEASE, *chart, f"--namespace={namespace}", f"--timeout={WITHIN_S}s", *options],
         capture_output=True,
@@ -37,16 +51,38 @@ def helm(verb, namespace, *options):
 
 
 @pytest.fixture
-def taken_over(cluster):
-    """The installation as a release of Helm; put back as kubectl made it."""
+def earlier_chart(tmp_path):
+    """The chart as an earlier version, whose operator has another image."""
+    shutil.copytree(CHART, tmp_path / RELEASE)
+    described = tmp_path / RELEASE / "Chart.yaml"
+    described.write_text(described.read_text().replace("\nversion: 0.1.0\n", "\nversion: 0.0.9\n"))
+    return tmp_path / RELEASE
+
+
+@pytest.fixture
+def taken_over(cluster, earlier_chart):
+    """The installation as an earlier release of Helm; put back as kubectl made it."""
+    earlier = ("--set=images.operator.tag=next", "--take-ownership", "--force-conflicts", "--wait")
     try:
-        helm("install", SYSTEM, "--take-ownership", "--wait")
+        helm("install", SYSTEM, *earlier, chart=earlier_chart)
         yield
     finally:
         helm("uninstall", SYSTEM, "--ignore-not-found", "--wait")
         said = cluster.kubectl("apply", "-f", str(ROOT / "manifests" / "install.yaml"))
         assert cluster.get("deployments", SYSTEM, OPERATOR), said
         cluster.rolled_out(SYSTEM, OPERATOR)
+
+
+@pytest.fixture
+def surroundings(cluster):
+    """What the chart asks of a cluster for everything that it can bring: Prometheus' kinds, and runs."""
+    folder = definitions(*PROMETHEUS)
+    files = [f"--filename={folder / f'monitoring.coreos.com_{each}.yaml'}" for each in KINDS_OF_PROMETHEUS]
+    cluster.kubectl("apply", "--server-side", *files)
+    cluster.create("persistentvolumeclaims", make_claim("runs", namespace=SYSTEM))
+    yield
+    cluster.delete("persistentvolumeclaims", SYSTEM, "runs")
+    cluster.kubectl("delete", "--ignore-not-found", *files)
 
 
 @pytest.fixture
@@ -58,27 +94,48 @@ def alone(cluster):
     cluster.rolled_out(SYSTEM, OPERATOR)
 
 
-def test_an_upgrade_to_two_operators_touches_no_pod_and_the_end_leaves_the_job(
+def test_an_upgrade_to_everything_touches_no_pod_and_the_end_leaves_the_job(
+    surroundings,  # noqa: ARG001 - there before, gone after
     taken_over,  # noqa: ARG001 - is put back
     cluster,
     namespace,
     job,
+    tmp_path,
 ):
-    """A release's whole life, with a job running through it."""
+    """A release's whole life, from the version before to two operators, with a job running through it."""
+    assert image_of(cluster, OPERATOR).endswith(":next")
     namespace.apply(job("stays", script=WAIT))
     namespace.wait_for_pod("stays", LONG_S)
     namespace.wait(lambda: namespace.status("stays").get("phase") == "Running")
     before = {kind: fingerprint(namespace, kind) for kind in KINDS}
 
-    helm("test", SYSTEM)
-    helm("upgrade", SYSTEM, "--set=operator.replicas=2", "--force-conflicts", "--wait")  # with kubectl
+    values = tmp_path / "everything.yaml"
+    values.write_text(json.dumps(EVERYTHING))
+    helm("upgrade", SYSTEM, f"--values={values}", "--force-conflicts", "--wait")  # with kubectl
+    assert not image_of(cluster, OPERATOR).endswith(":next")
     assert len(operators(namespace)) == 2
     assert {kind: fingerprint(namespace, kind) for kind in KINDS} == before
+    assert "TensorBoard" in page_of(cluster, "palaestra-tensorboard", 6006)
+    helm("test", SYSTEM)
 
     helm("uninstall", SYSTEM, "--wait")
     assert cluster.get("deployments", SYSTEM, OPERATOR) is None
     assert {kind: fingerprint(namespace, kind) for kind in KINDS} == before
     assert namespace.status("stays")["phase"] == "Running"
+
+
+def image_of(cluster, deployment):
+    """Return the image of a Deployment of the release."""
+    (container,) = cluster.get("deployments", SYSTEM, deployment)["spec"]["template"]["spec"]["containers"]
+    return container["image"]
+
+
+def page_of(cluster, deployment, port):
+    """Return the first page of a server that no other pod reaches, as `kubectl port-forward` would."""
+    fetch = (
+        f"from urllib.request import urlopen; print(urlopen('http://127.0.0.1:{port}', timeout=30).read())"
+    )
+    return cluster.kubectl("exec", "-n", SYSTEM, f"deploy/{deployment}", "--", "python3", "-c", fetch)
 
 
 def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - is put back
@@ -88,4 +145,5 @@ def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: A
 
     assert f"{namespace.name}/palaestra-test" in helm("test", namespace.name)
     assert namespace.select("trainingjobs") == []
+    tour(namespace, namespace.name)  # of which tests/e2e/test_permissions.py finds the rights that were used
     helm("uninstall", namespace.name, "--wait")

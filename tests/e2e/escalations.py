@@ -1,0 +1,291 @@
+"""What somebody tries who may write TrainingJobs and make no pods; each attempt with what it would gain.
+
+Data only: tests/e2e/test_escalations.py says what becomes of them.
+"""
+
+import copy
+from typing import Any, NamedTuple
+
+from tests.e2e.cluster import Object
+from tests.e2e.jobs import make_job
+from tests.e2e.namespace import SYSTEM
+
+CORE, BATCH = "api/v1/namespaces/{namespace}", "apis/batch/v1/namespaces/{namespace}"
+RBAC = "apis/rbac.authorization.k8s.io/v1/namespaces/{namespace}"
+JOBS = "apis/palaestra.dev/v1alpha1/namespaces/{namespace}/trainingjobs"
+OPERATOR = {"kind": "ServiceAccount", "name": "palaestra-operator", "namespace": SYSTEM}
+SECRETS = {"apiGroup": "rbac.authorization.k8s.io", "kind": "ClusterRole", "name": "palaestra-job-secrets"}
+POD = {"containers": [{"name": "c", "image": "i", "securityContext": {"privileged": True}}]}
+HOST = [{"name": "node", "hostPath": {"path": "/"}}]
+
+
+class Request(NamedTuple):
+    """A request past the TrainingJob; `where` is below the API's root, `{namespace}` the author's own."""
+
+    name: str
+    gain: str
+    method: str
+    where: str
+    content: Object | None
+
+
+class Field(NamedTuple):
+    """A field of a TrainingJob, by a path such as `spec.simulators.0.name`, and what is told of it."""
+
+    name: str
+    gain: str
+    path: str
+    value: Any
+    told: str = ""
+
+
+# Refused by the roles that the author has.
+REQUESTS = (
+    Request(
+        "a pod",
+        "Runs as whatever its maker likes.",
+        "POST",
+        f"{CORE}/pods",
+        {"metadata": {"name": "own"}, "spec": POD},
+    ),
+    Request(
+        "a Job",
+        "Makes pods as well.",
+        "POST",
+        f"{BATCH}/jobs",
+        {"metadata": {"name": "own"}, "spec": {"template": {"spec": POD | {"restartPolicy": "Never"}}}},
+    ),
+    Request(
+        "a TrainingJob elsewhere",
+        "Uses another's quota.",
+        "POST",
+        "apis/palaestra.dev/v1alpha1/namespaces/default/trainingjobs",
+        make_job("own"),
+    ),
+    Request("a secret by name", "Holds another's password.", "GET", f"{CORE}/secrets/words", None),
+    Request(
+        "a container in a pod that runs",
+        "Acts as the pod.",
+        "PATCH",
+        f"{CORE}/pods/any/ephemeralcontainers",
+        {"spec": {"ephemeralContainers": [{"name": "own", "image": "i"}]}},
+    ),
+    Request(
+        "the operator's token",
+        "Acts in all namespaces.",
+        "POST",
+        f"api/v1/namespaces/{SYSTEM}/serviceaccounts/palaestra-operator/token",
+        {"spec": {}},
+    ),
+    Request(
+        "the right to read secrets",
+        "Lets jobs use them.",
+        "POST",
+        f"{RBAC}/rolebindings",
+        {"metadata": {"name": "own"}, "roleRef": SECRETS, "subjects": [OPERATOR]},
+    ),
+    Request(
+        "the label of what is for jobs",
+        "Opens a volume.",
+        "PATCH",
+        f"{CORE}/persistentvolumeclaims/kept",
+        {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}},
+    ),
+    Request(
+        "a status by hand",
+        "Says that a run succeeded, or was never begun.",
+        "PATCH",
+        f"{JOBS}/plain/status",
+        {"status": {"phase": "Succeeded"}},
+    ),
+    Request(
+        "the mark that stops a replica",
+        "Ends another's training.",
+        "PATCH",
+        f"{BATCH}/jobs/plain-0",
+        {
+            "metadata": {"annotations": {"palaestra.dev/stopped": "Stalled: now"}},
+            "spec": {"activeDeadlineSeconds": 1},
+        },
+    ),
+)
+
+# Refused by the definition of a TrainingJob.
+REFUSED = (
+    Field(
+        "the cluster's own priority",
+        "Pushes everybody else's pods off their nodes.",
+        "spec.scheduling.priorityClassName",
+        "system-node-critical",
+        "classes that begin with system- are for the cluster's own parts",
+    ),
+    Field(
+        "a control plane's taint",
+        "Runs where the cluster's own credentials are near.",
+        "spec.scheduling.tolerations",
+        [{"key": "node-role.kubernetes.io/control-plane", "operator": "Exists"}],
+        "keeps nodes free for the cluster's own parts",
+    ),
+    Field(
+        "every taint",
+        "That of a control plane is among them.",
+        "spec.scheduling.tolerations",
+        [{"operator": "Exists"}],
+        "spec.scheduling.tolerations[0].key: Required value",
+    ),
+    Field(
+        "the label of an app",
+        "A Service sends the app's requests here, a NetworkPolicy lets this pod in.",
+        "spec.scheduling.podLabels",
+        {"app": "database"},
+        "put a domain of yours before it",
+    ),
+    Field(
+        "the name of an app",
+        "As above, by the usual label.",
+        "spec.scheduling.podLabels",
+        {"app.kubernetes.io/name": "database"},
+        "put a domain of yours before it",
+    ),
+    Field(
+        "an operator's label",
+        "Trainers of all namespaces let an operator in.",
+        "spec.scheduling.podLabels",
+        {"palaestra.dev/operator": "true"},
+        "are set by Palaestra; remove them",
+    ),
+    Field(
+        "Kueue's label",
+        "Goes past the queue, or takes another's quota.",
+        "spec.scheduling.podLabels",
+        {"kueue.x-k8s.io/queue-name": "theirs"},
+        "are set by Palaestra; remove them",
+    ),
+    Field(
+        "no AppArmor",
+        "The kernel confines the pod less.",
+        "spec.scheduling.podAnnotations",
+        {"container.apparmor.security.beta.kubernetes.io/trainer": "unconfined"},
+        "how a pod is confined is not the job's to say",
+    ),
+    Field(
+        "a claim elsewhere",
+        "Writes on another's volume.",
+        "spec.storage.existingClaim",
+        "other/kept",
+        "spec.storage.existingClaim",
+    ),
+    Field(
+        "a ConfigMap elsewhere",
+        "Reads another's configuration.",
+        "spec.simulators.0.world",
+        {"configMap": {"name": "../other/config", "key": "w"}},
+        "world.configMap.name",
+    ),
+    Field(
+        "a pull secret elsewhere",
+        "Pulls another's images.",
+        "spec.imagePullSecrets",
+        [{"name": "other/registry"}],
+        "spec.imagePullSecrets[0].name",
+    ),
+    Field(
+        "a run outside of the volume's folders",
+        "Reads another's run.",
+        "spec.storage",
+        {"existingClaim": "kept", "resumeFrom": "../other"},
+        "spec.storage.resumeFrom",
+    ),
+    Field(
+        "a name that ends a node of a world",
+        "Writes the world's text.",
+        "spec.simulators.0.name",
+        'a" } Robot { name "b',
+        "spec.simulators[0].name",
+    ),
+    Field(
+        "a name with a second line",
+        "Writes a line of training.yaml.",
+        "spec.simulators.0.name",
+        "a\nb",
+        "spec.simulators[0].name",
+    ),
+    Field(
+        "a master elsewhere",
+        "The operator's settings of a trainer are its own.",
+        "spec.trainer.env",
+        [{"name": "ROS_MASTER_URI", "value": "http://other"}],
+        "are set by Palaestra",
+    ),
+)
+
+# Unknown to a TrainingJob: refused where the client asks for it, dropped otherwise.
+UNKNOWN = (
+    Field("a folder of the node", "Reads and writes the node.", "spec.trainer.volumes", HOST),
+    Field(
+        "a privileged container",
+        "Is the node.",
+        "spec.trainer.securityContext",
+        {"privileged": True, "runAsUser": 0},
+    ),
+    Field(
+        "the node's network", "Listens to what only the node may hear.", "spec.scheduling.hostNetwork", True
+    ),
+    Field("a service account", "Asks the API server with its rights.", "spec.serviceAccountName", "default"),
+    Field(
+        "a node by name",
+        "Goes past the scheduler, taints and quotas of nodes.",
+        "spec.scheduling.nodeName",
+        "palaestra-control-plane",
+    ),
+    Field(
+        "a whole pod",
+        "All of the above at once.",
+        "spec.template",
+        {"spec": {**POD, "hostPID": True, "volumes": HOST}},
+    ),
+)
+
+# Accepted as a request, and not carried out: nobody has opened to jobs what they name.
+HELD = (
+    Field(
+        "a secret of this namespace",
+        "Its value would be in the pod's environment.",
+        "spec.trainer.env",
+        [{"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}],
+        "SecretNotForJobs",
+    ),
+    Field(
+        "a ConfigMap of this namespace",
+        "Its text would be in the replica's.",
+        "spec.simulators.0.world",
+        {"configMap": {"name": "settings", "key": "text"}},
+        "ConfigMapNotForJobs",
+    ),
+    Field(
+        "a claim of this namespace",
+        "Its files would be in the pod.",
+        "spec.storage",
+        {"existingClaim": "kept"},
+        "ClaimNotForJobs",
+    ),
+    Field(
+        "a file of the node in a world",
+        "Its text would be in the simulator.",
+        "spec.simulators.0.world",
+        {"inline": '#VRML_SIM R2023b utf8\nEXTERNPROTO "../../etc/shadow.proto"\nWorldInfo {}\n'},
+        "WorldInvalid",
+    ),
+)
+
+
+def authors(name: str, *fields: tuple[str, Any]) -> Object:
+    """Return a TrainingJob with fields of it set by path; suspended, as nothing of it has to run."""
+    job = make_job(name, script="exit 0", suspend=True)
+    for path, value in fields:
+        *above, last = path.split(".")
+        inside: Any = job
+        for step in above:
+            inside = inside[int(step)] if isinstance(inside, list) else inside.setdefault(step, {})
+        inside[last] = copy.deepcopy(value)
+    return job

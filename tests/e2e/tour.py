@@ -1,0 +1,71 @@
+"""A grand tour through everything that an operator does in a namespace: each of its rights is used.
+
+What a person does there, not what the rights are: a right that nobody's wish needs is found by it.
+"""
+
+from palaestra_sim.world import builtin
+from tests.e2e.cluster import Object
+from tests.e2e.jobs import LITTLE, WAIT, make_claim, make_job
+from tests.e2e.namespace import LONG_S, OPERATOR, Namespace, named
+
+FOR_JOBS = {"palaestra.dev/for-jobs": "true"}
+WORLD = {"configMap": {"name": "worlds", "key": "arena.wbt"}}
+SPENT = {"metadata": {"name": "spent"}, "spec": {"hard": {"pods": "0"}}}
+
+
+def tour(place: Namespace, operators: str) -> None:
+    """Have the operator whose pods are in the namespace `operators` do in `place` all that it ever does."""
+    refer(place)
+    give_up(place)
+    suspend(place, flag=False)
+    suspend(place, flag=True)
+    replace_operator(place, operators)
+    suspend(place, flag=False)  # the second operator meets the events of the first
+    suspend(place, flag=True)
+    place.create("resourcequotas", SPENT)
+    place.apply(make_job("refused", script="exit 0"))
+    place.wait(lambda: "PodsRefused" in place.reasons("refused"), LONG_S)
+
+
+def refer(place: Namespace) -> None:
+    """Use a claim and a world that are there, and meet somebody else's Job."""
+    place.create("persistentvolumeclaims", make_claim("shared", labels=FOR_JOBS))
+    world = {"arena.wbt": builtin("arena").decode()}
+    place.create("configmaps", {"metadata": {"name": "worlds", "labels": FOR_JOBS}, "data": world})
+    place.create("jobs", somebody_s("taken-0"))
+    place.apply(make_job("claimed", script="exit 0", suspend=True, storage={"existingClaim": "shared"}))
+    place.apply(make_job("mapped", script="exit 0", suspend=True, simulator={"world": WORLD}))
+    place.apply(make_job("taken", script="exit 0"))
+    place.apply(make_job("paused", script=WAIT, suspend=True))
+    for name in ("claimed", "mapped", "paused"):
+        place.wait(lambda name=name: place.select("jobs", name), LONG_S)
+    place.wait(lambda: "NameTaken" in place.reasons("taken"), LONG_S)
+
+
+def give_up(place: Namespace) -> None:
+    """Fail a job at once, and have it deleted."""
+    place.apply(make_job("brief", trainer={"algorithm": {"name": "SAC"}}, ttlSecondsAfterFinished=1))
+    place.wait(lambda: place.get("trainingjobs", "brief") is None, LONG_S)
+
+
+def suspend(place: Namespace, *, flag: bool) -> None:
+    """Suspend or resume a job, and wait until its Job is."""
+    place.patch("paused", suspend=flag)
+    place.wait(lambda: (place.get("jobs", "paused-0") or {})["spec"]["suspend"] is flag, LONG_S)
+
+
+def replace_operator(place: Namespace, operators: str) -> None:
+    """Have another operator lead, which finds no Lease."""
+    before = place.cluster.select("pods", operators, "app.kubernetes.io/component=operator")
+    for pod in before:
+        place.cluster.delete("pods", operators, named(pod))
+        place.wait(lambda pod=pod: place.cluster.get("pods", operators, named(pod)) is None, LONG_S)
+    place.cluster.delete("leases", operators, OPERATOR)
+    place.cluster.rolled_out(operators, OPERATOR)
+
+
+def somebody_s(name: str) -> Object:
+    """Return a Job that has nothing to do with Palaestra."""
+    container = {"name": "main", "image": "theirs:1", "resources": LITTLE}
+    template = {"spec": {"restartPolicy": "Never", "containers": [container]}}
+    return {"metadata": {"name": name}, "spec": {"suspend": True, "template": template}}
