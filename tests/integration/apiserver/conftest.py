@@ -1,4 +1,4 @@
-"""API servers for the tests: a rude one, and a real one without nodes."""
+"""A rude API server, and clients of it and of the real one."""
 
 import itertools
 import json
@@ -9,10 +9,7 @@ import pytest
 from palaestra.cluster import Limits, connect
 from palaestra.cluster.backoff import Backoff
 from palaestra.cluster.resources import NAMESPACES
-from tests.control_plane.fixture import control_plane
 from tests.integration.apiserver.server import serving
-
-__all__ = ["control_plane"]
 
 HASTE = Limits(
     connect_s=1, call_s=1, silence_s=0.5, again=Backoff(first_s=0.05, cap_s=0.2, chance=lambda: 0.0)

@@ -34,7 +34,7 @@ def test_an_example_says_what_each_object_is_for(path):
         assert document.lstrip().startswith("# ")
 
 
-def test_authors_train_and_readers_look_on(cluster, kubectl, tmp_path):  # noqa: ARG001 - as above
+def test_authors_train_and_readers_look_on(cluster, places, kubectl):  # noqa: ARG001 - as above
     """By the roles that every cluster has, and by the author's alone without a right to pods."""
     (roles,) = (path for path in PLATFORM if path.stem == "roles")
     kubectl("apply", "-f", str(roles), "-f", str(ROOT / "manifests" / "crd.yaml"))

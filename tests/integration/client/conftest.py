@@ -1,43 +1,14 @@
-"""A control plane that knows TrainingJobs, a namespace for each test, and its client."""
+"""A client of the namespace of a test, commands that are typed there, and the operator's word."""
 
 from collections.abc import Callable, Iterator
 
 import pytest
 
 from palaestra import Client
-from palaestra.api.crd import crd
 from palaestra.cli import main
-from palaestra.cluster import Api, NotFound, connect
-from palaestra.cluster.resources import DEFINITIONS, TRAINING_JOBS
-from tests.control_plane.fixture import control_plane
+from palaestra.cluster.resources import TRAINING_JOBS
 from tests.control_plane.plane import ControlPlane
-from tests.integration.operator.cluster import Place, eventually
-
-__all__ = ["control_plane"]
-
-
-@pytest.fixture(scope="session")
-def installed(control_plane: ControlPlane) -> Iterator[Api]:
-    """An administrator's client, once the API server knows TrainingJobs."""
-    api = connect(str(control_plane.kubeconfig))
-    api.create(DEFINITIONS, crd())
-
-    def served() -> bool:
-        try:
-            api.list(TRAINING_JOBS)
-        except NotFound:
-            return False
-        return True
-
-    eventually(served)
-    yield api
-    api.close()
-
-
-@pytest.fixture
-def place(installed: Api) -> Place:
-    """A namespace of the test's own."""
-    return Place(installed)
+from tests.integration.operator.cluster import Place
 
 
 @pytest.fixture

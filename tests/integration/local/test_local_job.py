@@ -35,6 +35,7 @@ class Play:
         self.folder = folder
         self.pids = folder / "pids"
         self.starts = folder / "starts"
+        self._runners: list[subprocess.Popen] = []
 
     def start(
         self, trainer: str, *, sidecar: str = "sleep 300", limit: int = 3, deadline: str = ""
@@ -62,16 +63,24 @@ class Play:
         file = self.folder / "job.json"
         file.write_text(json.dumps(job))
         command = [sys.executable, PLAY, file, self.folder, *deadline.split()]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self._runners.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        return self._runners[-1]
 
     def run(self, trainer: str, **options) -> dict:
         """Run a Job to its end and return its outcome and the number of pods that were seen."""
         out, _ = self.start(trainer, **options).communicate(timeout=60)
         return json.loads(out.splitlines()[-1]) | {"seen": len(self.starts.read_text().split())}
 
+    def end(self) -> None:
+        """Kill the runners that are left; their containers end with them."""
+        for runner in self._runners:
+            with runner:
+                runner.kill()
+
     def running(self) -> list[int]:
         """Return those of the processes in `pids` that still run; zombies do not."""
-        return [pid for pid in map(int, self.pids.read_text().split()) if _runs(pid)]
+        written = self.pids.read_text().split() if self.pids.exists() else []
+        return [pid for pid in map(int, written) if _runs(pid)]
 
 
 def _runs(pid: int) -> bool:
@@ -82,9 +91,11 @@ def _runs(pid: int) -> bool:
 
 
 @pytest.fixture
-def play(tmp_path):
-    """A place to run a Job in."""
-    return Play(tmp_path)
+def play(tmp_path, eventually):
+    """A place to run a Job in; whatever becomes of the test, nothing of it is left."""
+    yield (place := Play(tmp_path))
+    place.end()
+    eventually(lambda: not place.running())
 
 
 def test_a_trainer_that_is_done_completes_the_job(play):

@@ -16,6 +16,7 @@ def diverge(place: Place, job: str = "unlucky") -> None:
     place.train(job)
     [first] = place.pods(job)
     place.run(first)
+    place.until("Running", job)  # else an operator that is slow sees it for the first time when it has ended
     place.end(first, 1)
     [second] = place.pods(job)
     place.run(second)

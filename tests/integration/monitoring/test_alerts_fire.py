@@ -19,6 +19,8 @@ from tests.monitoring.prometheus import PROGRAMS, scraping
 from tests.monitoring.questions import ALERTS, alerts
 from tests.soak.jobs import LITTLE_PPO, make_job
 
+pytestmark = pytest.mark.minutes(2)
+
 CASES = Path(__file__).with_name("alerts.test.yaml")
 DEADLINE_S = 90
 # Slower than real time, and with a rollout of six checkpoints.

@@ -1,4 +1,4 @@
-"""A control plane with the installation in it, a namespace for each test, and operators to start."""
+"""Operators to start, in the namespace of a test."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -6,46 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from palaestra.cluster import Api, NotFound, Resource, connect
-from palaestra.cluster.resources import LEASES, TRAINING_JOBS
+from palaestra.cluster import Api, NotFound
+from palaestra.cluster.resources import LEASES
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
-from tests.chart.installation import installed as installation
-from tests.control_plane.fixture import control_plane
 from tests.control_plane.plane import ControlPlane
-from tests.integration.operator.cluster import Place, eventually
+from tests.integration.operator.cluster import Place
 from tests.integration.operator.operators import RunningOperator
 
-__all__ = ["control_plane"]
-
 Start = Callable[..., RunningOperator]
-UNNAMESPACED = {"Namespace", "CustomResourceDefinition", "ClusterRole", "ClusterRoleBinding"}
-PLURALS = {"NetworkPolicy": "networkpolicies"}
-
-
-@pytest.fixture(scope="session")
-def installed(control_plane: ControlPlane) -> Iterator[Api]:
-    """An administrator's client, once everything of install.yaml but the Deployment is there."""
-    api = connect(str(control_plane.kubeconfig))
-    for obj in installation():
-        if obj["kind"] != "Deployment":
-            kind = obj["kind"]
-            resource = Resource(
-                api_version=obj["apiVersion"],
-                kind=kind,
-                plural=PLURALS.get(kind, f"{kind.lower()}s"),
-                namespaced=kind not in UNNAMESPACED,
-            )
-            api.create(resource, obj)
-    eventually(lambda: _served(api))
-    yield api
-    api.close()
-
-
-@pytest.fixture
-def place(installed: Api) -> Place:
-    """A namespace of the test's own."""
-    return Place(installed)
 
 
 @pytest.fixture
@@ -71,11 +40,3 @@ def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: P
     yield begin
     for each in started:
         each.kill()
-
-
-def _served(api: Api) -> bool:
-    try:
-        api.list(TRAINING_JOBS)
-    except NotFound:
-        return False
-    return True

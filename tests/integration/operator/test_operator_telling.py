@@ -102,6 +102,7 @@ def test_a_job_that_runs_and_ends_is_counted(place, start):
     place.train()
     [pod] = place.pods()
     place.run(pod)
+    place.until("Running")
     place.end(pod, code=81)
     place.until("Failed")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.control import SimulatorState
+from palaestra_sim.protocol.control import SidecarState, SimulatorState
 from palaestra_sim.world import builtin
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
@@ -40,6 +40,11 @@ def processes_with(mark):
             if mark.encode() in (folder / "cmdline").read_bytes():
                 found.add(int(folder.name))
     return found
+
+
+def was_seen(state):
+    """Return whether a sidecar knows that its simulator ran: the simulator may tell it sooner itself."""
+    return state.pid is not None or state.state is not SidecarState.STARTING
 
 
 class Sidecar:
@@ -97,10 +102,10 @@ class Sidecar:
         eventually(lambda: sum(text in line for line in list(self.lines)) >= times)
 
     def start(self):
-        """Start the simulator; return the state when it has printed its first `up`."""
+        """Start the simulator; return the state when it has printed its first `up` and was seen to run."""
         ups = self.lines.count("up") + 1
         self.request("/start")
-        eventually(lambda: self.lines.count("up") >= ups)
+        eventually(lambda: self.lines.count("up") >= ups and was_seen(self.state))
         return self.state
 
     def end(self, number=signal.SIGTERM):

@@ -11,6 +11,7 @@ import pytest
 from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar.keeper import children
 from palaestra_sim.world import RunIdentity, robots, ros_name
+from tests.integration.sidecar.conftest import was_seen
 
 IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
 FIRST, SECOND = "", "/standby"
@@ -30,11 +31,11 @@ class Two:
         return SimulatorState.from_json(json.loads(text))
 
     def start(self, above):
-        """Start one; return its state when it has printed `up`."""
+        """Start one; return its state when it has printed `up` and was seen to run."""
         line = {FIRST: "a: up", SECOND: "b: up"}[above]
         ups = self.it.lines.count(line) + 1
         self.it.request(f"{above}/start")
-        self._eventually(lambda: self.it.lines.count(line) >= ups)
+        self._eventually(lambda: self.it.lines.count(line) >= ups and was_seen(self.state(above)))
         return self.state(above)
 
     def until(self, above, wanted):

@@ -94,7 +94,7 @@ def test_it_has_no_camera(arena):
 
 def test_a_lost_wake_up_costs_an_extra_step_and_no_fault(start):
     """The real controller can sleep through a step that comes too early."""
-    arena = start("--lost-wakeup", "--publish-delay-ms=3")
+    arena = start("--lost-wakeup", "--publish-delay-ms=50")  # the next step is asked for within it
 
     extra = [arena.robot.advance() for _ in range(4)]
 

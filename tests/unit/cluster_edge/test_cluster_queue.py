@@ -81,7 +81,7 @@ class Workers(RuleBasedStateMachine):
             self.owed.add(key)
 
 
-Workers.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
+Workers.TestCase.settings = settings(max_examples=60, stateful_step_count=40)
 TestWorkers = Workers.TestCase
 
 

@@ -57,7 +57,7 @@ class Cache(RuleBasedStateMachine):
         assert all(self.store.get(*key) == obj for key, obj in self.model.items())
 
 
-Cache.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+Cache.TestCase.settings = settings(max_examples=60, stateful_step_count=30)
 TestCache = Cache.TestCase
 
 

@@ -11,7 +11,6 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, settings
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import ReplicaStatus, Status
@@ -19,10 +18,6 @@ from palaestra.decide import Create, Decision, Delete, accept, as_data, decide, 
 from palaestra.observe import Objects, Polled, observe, references
 from palaestra.plan import ClusterLayout, Images
 from palaestra_sim.protocol.status import SimulatorStatus, Termination, TrainerStatus
-
-# How long an example takes says how busy the machine is, not whether a claim holds.
-settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("unhurried")
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)

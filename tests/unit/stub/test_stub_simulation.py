@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.stub.physics import WHEELS, wheel_speeds
@@ -57,7 +57,6 @@ def test_it_can_be_driven_without_ros(simulation):
     assert robot.sensors["ir1"].value == pytest.approx(0.31, rel=0.05)
 
 
-@settings(deadline=None)  # every example loads the world twice
 @given(
     ways=st.lists(
         st.tuples(

@@ -4,7 +4,7 @@ import math
 from signal import Signals
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.stub.faults import kinds
@@ -130,7 +130,6 @@ def test_a_wrong_fault_is_told_with_its_place_its_fact_and_a_remedy(text, words)
     assert str(told.value).startswith(f"test: {text}: {words}")
 
 
-@settings(deadline=None)
 @given(st.text(alphabet="acehlnorstwy_:=,.0123456789-* ²", max_size=40))
 def test_any_text_is_a_fault_or_an_error_that_names_it(text):
     """Nothing that a person may type ends in a traceback."""

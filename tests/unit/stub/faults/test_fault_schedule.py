@@ -1,6 +1,6 @@
 """When faults happen: a function of seed, simulator, life and number, and of nothing else."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.stub.faults.kinds import Event, Trigger
@@ -94,7 +94,6 @@ def test_the_draws_are_the_same_in_every_release():
     assert happenings(schedule, numbers=range(1, 21)) == [7, 12, 20]
 
 
-@settings(deadline=None)
 @given(st.integers(1, 10**12), st.integers(0, 2**64))
 def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
     """Evenly; never negative."""
@@ -104,7 +103,6 @@ def test_a_delay_lies_between_latency_and_latency_with_jitter(number, seed):
     assert 0.05 <= schedule.delay_s(fault, number) < 0.07
 
 
-@settings(deadline=None)
 @given(st.integers(1, 10**6), st.integers(1, 1000), st.floats(0, 1, exclude_max=True))
 def test_a_trigger_needs_both_its_multiple_and_its_chance(number, every, draw):
     """One that says nothing fires always."""

@@ -25,11 +25,14 @@ from palaestra.cluster.resources import (
 )
 from tests.control_plane.plane import running
 from tests.control_plane.programs import REQUIRED
-from tests.e2e.control_plane.installed import READS, asked, operator, wait_for
+from tests.integration.operator.installed import READS, asked, operator, wait_for
 
-pytestmark = pytest.mark.skipif(
-    os.environ.get(REQUIRED) != "1", reason=f"takes three minutes; set {REQUIRED}=1, as `make e2e` does"
-)
+pytestmark = [
+    pytest.mark.minutes(3),
+    pytest.mark.skipif(
+        os.environ.get(REQUIRED) != "1", reason=f"takes three minutes; set {REQUIRED}=1, as `.ci/run` does"
+    ),
+]
 
 ROOT = Path(__file__).parents[3]
 NAMESPACE = "crowd"

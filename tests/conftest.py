@@ -1,0 +1,22 @@
+"""In which order tests run, on how many threads, and that no unit test is about time."""
+
+import os
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+# Networks of this size learn faster on one thread than on several, which wait for each other; read by torch.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+# A property is not about time, and machines are noisy: what is slow is told by --durations.
+settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("unhurried")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest, so that no worker is left alone with it at the end."""
+    items.sort(key=_minutes, reverse=True)
+
+
+def _minutes(item: pytest.Item) -> float:
+    mark = item.get_closest_marker("minutes")
+    return mark.args[0] if mark else 0
