@@ -53,8 +53,11 @@ class LocalRun:
         self.stop()
 
     def start(self, *options):
-        """Start it, again if it has ended; its output is kept until the next start."""
-        command = [PALAESTRA, "run", self.file, "--dir", self.runs, *options]
+        """Start it, again if it has ended; its output is kept until the next start.
+
+        It ends with the thread that starts it, however that ends.
+        """
+        command = ["setpriv", "--pdeathsig=TERM", PALAESTRA, "run", self.file, "--dir", self.runs, *options]
         with self._output.open("w") as output:
             self.process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         return self
