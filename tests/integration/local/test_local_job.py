@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from palaestra.plan.text import literal
+
 PLAY = Path(__file__).with_name("play_job.py")
 MARKER = "PALAESTRA_LOCAL_CONTAINER"
 POLICY = {
@@ -51,11 +53,11 @@ class Play:
                     {
                         "name": "sim-a",
                         "restartPolicy": "Always",
-                        "command": ["bash", "-c", count + sidecar],
+                        "command": ["bash", "-c", literal(count + sidecar)],
                         "env": env,
                     }
                 ],
-                "containers": [{"name": "trainer", "command": ["bash", "-c", trainer], "env": env}],
+                "containers": [{"name": "trainer", "command": ["bash", "-c", literal(trainer)], "env": env}],
                 "volumes": [],
             }
         }
