@@ -67,6 +67,22 @@ def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(train
     assert last(scene) == (1, 137, "TrainerFailed")
 
 
+def test_restarts_that_only_a_poll_told_of_are_kept_at_once(accepted, simulator):
+    """Also where the trainer had ended when its pod was first seen; a second look finds nothing new."""
+    scene = accepted(backoffLimit=5)
+    pod = scene.running_pod()
+    scene.end(pod, 1)
+    pod["status"]["phase"] = "Running"  # its sidecars still run
+    scene.poll(pod, simulators=(simulator(restarts=3),))
+
+    scene.step()
+    first = scene.replica().last_attempt
+    scene.step()
+
+    assert first.restarts == 3
+    assert scene.replica().last_attempt == first
+
+
 def test_the_log_of_a_container_before_the_trainer_is_kept(accepted, command_groups):
     """The trainer never started and has none."""
     scene = accepted(simulators=command_groups)

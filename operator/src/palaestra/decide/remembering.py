@@ -68,10 +68,10 @@ def _replaced(it: Situation) -> Attempt | None:
 
 
 def _record(attempt: Attempt, told: Told) -> LastAttempt:
-    word, named = attempt.word, attempt.it.old.pod
+    word = attempt.word
     restarts = word.restarts if word is not None else None
-    if restarts is None and named is not None and attempt.name == named.name:
-        restarts = attempt.it.old.simulator_restarts
+    if restarts is None:
+        restarts = _counted_restarts(attempt)
     return LastAttempt(
         attempt=attempt.number,
         exit_code=attempt.code,
@@ -81,6 +81,15 @@ def _record(attempt: Attempt, told: Told) -> LastAttempt:
         faults=tuple(_faults(word.faults if word is not None else ())),
         restarts=min(restarts or 0, MOST_COUNT),
     )
+
+
+def _counted_restarts(attempt: Attempt) -> int:
+    """Return the restarts of simulators that were counted in an attempt, whose trainer says nothing."""
+    now, before = attempt.it.counted, attempt.it.old
+    for counts in (now, before):
+        if counts.pod is not None and counts.pod.name == attempt.name:
+            return counts.simulator_restarts
+    return 0
 
 
 def _log(attempt: Attempt) -> tuple[str, ...]:
