@@ -82,7 +82,7 @@ def asked(plane: ControlPlane) -> list[Asked]:
     for line in plane.audit_log.read_text().splitlines():
         with suppress(json.JSONDecodeError):  # the last line may not be whole yet
             entry = json.loads(line)
-            if entry["user"]["username"] == USER and entry["stage"] == "ResponseComplete":
+            if entry["user"].get("username") == USER and entry["stage"] == "ResponseComplete":
                 what = entry.get("objectRef") or {}
                 found.append(
                     Asked(

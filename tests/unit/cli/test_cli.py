@@ -123,7 +123,7 @@ def test_a_wrong_job_is_told_with_all_its_mistakes(command, tmp_path, fails, mon
 @pytest.mark.parametrize(
     ("spec", "line"),
     [
-        ("storage: {existingClaim: a, resumeFrom: b}", "spec.storage.resumeFrom: is not carried out"),
+        ("storage: {existingClaim: a, resumeFrom: b}", "spec.storage.resumeFrom: names a run on a claim"),
         ("suspend: true", "spec.suspend: is true"),
         ("trainer: {env: [{name: A, secretKeyRef: {name: b, key: c}}]}", "env A of container trainer: "),
     ],
