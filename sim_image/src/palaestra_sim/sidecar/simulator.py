@@ -71,7 +71,7 @@ class Simulator:
         self._process: Process | None = None
         self._kill_at: float | None = None
         self._closing = False
-        self._actions: Mapping[Action, Callable[[_Message], None]] = {
+        self._actions: Mapping[Action, Callable[[SimulatorState, _Message], SimulatorState]] = {
             Action.NOTHING: self._nothing,
             Action.SPAWN: self._spawn,
             Action.WAIT: self._wait,
@@ -130,68 +130,67 @@ class Simulator:
         self._closing |= message.event is Event.SHUTDOWN
         step = lifecycle.step(self.state.state, message.event)
         if step is not None:
-            state, action = step
-            self.state = replace(self.state, state=state, detail="")
-            self._actions[action](message)
+            to, action = step
+            entered = replace(self.state, state=to, detail="")
+            self.state = self._actions[action](entered, message)
             detail = f": {self.state.detail}" if self.state.detail else ""
             log.info("%s%s%s", self._command.mark, self.state.state.value, detail)
         if message.answers is not None:
             message.answers.put(Answer(allowed=step is not None, state=self.state))
 
-    def _nothing(self, _: _Message) -> None:
-        """Go on."""
+    def _nothing(self, state: SimulatorState, _: _Message) -> SimulatorState:
+        return state
 
-    def _spawn(self, _: _Message) -> None:
-        self.state = replace(self.state, starts=self.state.starts + 1)
+    def _spawn(self, state: SimulatorState, _: _Message) -> SimulatorState:
+        start = state.starts + 1
         try:
-            self._process = Process.start(self._numbered(), self._report)
+            self._process = Process.start(self._numbered(start), self._report)
         except OSError as error:
             self._report(Ended(problem=f"it could not be run: {error.strerror}"))
+        return replace(state, starts=start)
 
-    def _numbered(self) -> Command:
+    def _numbered(self, start: int) -> Command:
         """Return the command, told which start this is: a stub that fails by chance draws anew each time."""
-        environment = {**self._command.environment, "PALAESTRA_SIMULATOR_START": str(self.state.starts)}
+        environment = {**self._command.environment, "PALAESTRA_SIMULATOR_START": str(start)}
         return replace(self._command, environment=environment)
 
-    def _wait(self, message: _Message) -> None:
-        self._end_within(message.deadline_s)
+    def _wait(self, state: SimulatorState, message: _Message) -> SimulatorState:
+        return self._to_end_within(message.deadline_s, state)
 
-    def _terminate(self, _: _Message) -> None:
+    def _terminate(self, state: SimulatorState, _: _Message) -> SimulatorState:
         if self._process is not None:
             self._process.terminate()
-        self._end_within(SHUTDOWN_GRACE_S)
+        return self._to_end_within(SHUTDOWN_GRACE_S, state)
 
-    def _kill(self, _: _Message) -> None:
+    def _kill(self, state: SimulatorState, _: _Message) -> SimulatorState:
         self._kill_at = None
-        self.state = replace(self.state, detail="killed at its deadline")
         if self._process is not None:
             self._process.kill()
+        return replace(state, detail="killed at its deadline")
 
-    def _blame(self, message: _Message) -> None:
-        kind, how = self._ended(message.ended or Ended(), expected=False)
+    def _blame(self, state: SimulatorState, message: _Message) -> SimulatorState:
+        ended = message.ended or Ended()
+        kind, how = _described(ended)
         self.faults = {**self.faults, kind: self.faults[kind] + 1}
-        self.state = replace(self.state, faults=self.state.faults + 1, detail=how)
+        return replace(self._after(ended, state, expected=False), faults=state.faults + 1, detail=how)
 
-    def _accept(self, message: _Message) -> None:
-        self._ended(message.ended or Ended(), expected=True)
+    def _accept(self, state: SimulatorState, message: _Message) -> SimulatorState:
+        return self._after(message.ended or Ended(), state, expected=True)
 
-    def _ended(self, ended: Ended, *, expected: bool) -> tuple[str, str]:
-        """Note an exit; return its kind, and a sentence about it."""
+    def _after(self, ended: Ended, state: SimulatorState, *, expected: bool) -> SimulatorState:
+        """Let go of a process that ended; return the state with its exit noted."""
         if self._process is not None:
             self._process.close()
         self._process = None
         self._kill_at = None
         last = LastExit(code=ended.code, signal=ended.signal, expected=expected)
-        self.state = replace(self.state, pid=None, last_exit=last)
-        kind, how = _described(ended)
-        said = f"; it said last: {ended.last_line}" if ended.last_line else ""
-        return kind, f"the simulator {how}{said}"
+        return replace(state, pid=None, last_exit=last)
 
-    def _end_within(self, deadline_s: float) -> None:
-        """Kill it when the deadline has passed; an earlier one stays."""
+    def _to_end_within(self, deadline_s: float, state: SimulatorState) -> SimulatorState:
+        """Kill it when the deadline has passed; an earlier one stays. Return the state that says so."""
         kill_at = self._clock() + deadline_s
         self._kill_at = kill_at if self._kill_at is None else min(self._kill_at, kill_at)
-        self.state = replace(self.state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
+        return replace(state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
 
     def _report(self, report: Started | Ended) -> None:
         """Take a report from the process's thread."""
@@ -202,9 +201,10 @@ class Simulator:
 
 
 def _described(ended: Ended) -> tuple[str, str]:
-    """Return the kind of an end that was a fault, and how it ended in words."""
+    """Return the kind of an end that was a fault, and a sentence about it."""
+    said = f"; it said last: {ended.last_line}" if ended.last_line else ""
     if ended.code is not None:
-        return "code", f"ended with code {ended.code}"
+        return "code", f"the simulator ended with code {ended.code}{said}"
     if ended.signal is not None:
-        return "signal", f"was ended by {ended.signal}"
-    return "unknown", f"ended: {ended.problem}"
+        return "signal", f"the simulator was ended by {ended.signal}{said}"
+    return "unknown", f"the simulator ended: {ended.problem}{said}"

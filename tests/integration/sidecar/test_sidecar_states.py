@@ -1,0 +1,43 @@
+"""What other threads see of a simulator while its one owner acts."""
+
+import os
+import sys
+import threading
+
+import pytest
+
+from palaestra_sim.protocol.control import SidecarState, SimulatorState
+from palaestra_sim.sidecar.lifecycle import Event
+from palaestra_sim.sidecar.process import Command
+from palaestra_sim.sidecar.simulator import Simulator
+from tests.integration.sidecar.conftest import DEADLINE_S, eventually
+
+
+class Watched(Simulator):
+    """A simulator that keeps every state which it lets others see."""
+
+    def __setattr__(self, name, value):
+        super().__setattr__(name, value)
+        if name == "state":
+            self.__dict__.setdefault("seen", []).append(value)
+
+
+@pytest.mark.parametrize("statement", ["sys.exit(0)", "os.kill(os.getpid(), signal.SIGKILL)"])
+def test_no_state_is_seen_half_made(statement) -> None:
+    """A trainer may ask at any moment and acts on what it reads: a failure comes with how it ended."""
+    program = (sys.executable, "-I", "-S", "-c", f"import os, signal, sys; {statement}")
+    simulator = Watched(
+        Command(arguments=program, environment=dict(os.environ)),
+        SimulatorState(state=SidecarState.IDLE, driver="command", world="arena.wbt"),
+    )
+    owner = threading.Thread(target=simulator.run, daemon=True)
+    owner.start()
+
+    simulator.ask(Event.START)
+    eventually(lambda: simulator.state.faults)
+    simulator.shut_down()
+    owner.join(DEADLINE_S)
+
+    failed = [state for state in simulator.seen if state.state is SidecarState.FAILED]
+    assert failed
+    assert all(state.faults == 1 and state.pid is None and state.last_exit for state in failed)
