@@ -11,12 +11,14 @@ cd "$HERE/../.."
 INSTALLATION=manifests/install.yaml
 MARK=$STATE/by-e2e # this cluster was brought up here, and is to go with us
 tests=
+images=
 installed=
 
 finish() {
   local status=$?
   trap '' INT TERM HUP
   trap - EXIT
+  [[ -z $images ]] || kill "$images" 2>/dev/null || true
   if [[ ${KEEP:-} == 1 ]]; then
     rm -f "$MARK"
     say "KEEP=1: the cluster stands, KUBECONFIG=${KUBECONFIG:-$KUBECONFIG_FILE}; remove it with: make cluster-down"
@@ -44,10 +46,16 @@ bring_up() {
   [[ $stood || ${PALAESTRA_CLUSTER:-} == existing ]] || touch "$MARK"
 }
 
+# Name the archives in a file, as this goes on beside the cluster's coming up. What builds ends with this shell.
+build_images() {
+  { setpriv --pdeathsig TERM tools/images.sh --archives &&
+    setpriv --pdeathsig TERM tools/images.sh --archives --tag next operator; } >"$CACHE/e2e-images"
+}
+
 install_palaestra() {
   local archives
-  # Through a file, as the exit status of a process substitution is lost.
-  { tools/images.sh --archives && tools/images.sh --archives --tag next operator; } >"$CACHE/e2e-images"
+  wait "$images" || die "the images could not be built: the message is above."
+  images=
   mapfile -t archives < <(cut -d= -f2 "$CACHE/e2e-images")
   "$HERE/load.sh" "${archives[@]}"
   kubectl get namespace palaestra-system >/dev/null 2>&1 || installed=yes
@@ -63,6 +71,9 @@ trap 'stop 0' INT
 trap 'stop INT' TERM HUP
 programs=$("$HERE/programs.sh" kubectl kind cyclonus helm kueue)
 PATH=$programs:$PATH
+mkdir -p "$CACHE"
+build_images &
+images=$!
 bring_up
 say "installing Palaestra"
 install_palaestra

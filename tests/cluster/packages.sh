@@ -16,12 +16,16 @@ done
 install="apt-get install -y --no-install-recommends ${missing[*]}"
 [[ $EUID -eq 0 ]] || die "packages are missing. Type this line, then repeat the command:
   sudo apt-get update && sudo $install"
-say "installing ${missing[*]}"
-apt-get update -qq
-# Services that come with a package (containerd) are not to run beside ours, hence the temporary policy.
-[[ -e /usr/sbin/policy-rc.d ]] || {
-  trap 'rm -f /usr/sbin/policy-rc.d' EXIT
-  printf '#!/bin/sh\nexit 101\n' >/usr/sbin/policy-rc.d
-  chmod 755 /usr/sbin/policy-rc.d
+
+install_missing() {
+  say "installing ${missing[*]}"
+  apt-get update -qq
+  # Services that come with a package (containerd) are not to run beside ours, hence the temporary policy.
+  [[ -e /usr/sbin/policy-rc.d ]] || {
+    trap 'rm -f /usr/sbin/policy-rc.d' EXIT
+    printf '#!/bin/sh\nexit 101\n' >/usr/sbin/policy-rc.d
+    chmod 755 /usr/sbin/policy-rc.d
+  }
+  DEBIAN_FRONTEND=noninteractive $install -qq >/dev/null
 }
-DEBIAN_FRONTEND=noninteractive $install -qq >/dev/null
+locked packages install_missing # images are built while the cluster comes up, and apt can't do two things at once

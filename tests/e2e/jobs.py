@@ -8,6 +8,14 @@ from tests.e2e.namespace import example
 
 WAIT = "trap exit TERM; sleep 3600 & wait"
 LITTLE = {"requests": {"cpu": "5m", "memory": "48Mi"}}
+# Steps that take time and no processor.
+SLOW = {
+    "name": "collect",
+    "role": "Collect",
+    "env": [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=40"}],
+    "resources": {"requests": {"cpu": "20m", "memory": "64Mi"}},
+}
+SMALL = {"requests": {"cpu": "60m", "memory": "400Mi"}}
 
 
 def make_claim(name: str, **metadata: Any) -> Object:
@@ -37,3 +45,17 @@ def make_job(name: str = "tiny", *, script: str = "", simulator: Object | None =
     fields["simulators"][0] |= simulator or {}
     fields.update(copy.deepcopy(spec))
     return job
+
+
+def make_slow_job(name: str, *, steps: int, every_steps: int, **spec: Any) -> Object:
+    """Return a training of at most 25 steps a second, so that it still goes on when all has been looked at.
+
+    However busy the machine is; and there is room for it beside others.
+    """
+    trainer = {
+        "steps": steps,
+        "checkpoint": {"everySteps": every_steps},
+        "evaluation": {"everySteps": 0},
+        "resources": SMALL,
+    }
+    return make_job(name, trainer=trainer, simulators=[SLOW], **spec)

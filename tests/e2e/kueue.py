@@ -98,6 +98,16 @@ def workload(space: Namespace, job: str) -> Object:
     return owners.get(f"{job}-0", {})
 
 
+def wait_for_words(space: Namespace, job: str, kind: str, told: str) -> str:
+    """Wait until a condition of a TrainingJob's Workload tells so, and return all that it says."""
+
+    def said() -> str:
+        found = words(workload(space, job), kind)
+        return found if told in found else ""
+
+    return space.wait(said)
+
+
 def words(found: Object, kind: str) -> str:
     """Return what a condition of a Workload says, "" where it has none."""
     conditions = found.get("status", {}).get("conditions", [])

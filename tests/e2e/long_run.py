@@ -5,7 +5,7 @@ import threading
 from typing import Self
 
 from tests.e2e.cluster import CommandFailed, Object
-from tests.e2e.namespace import OPERATOR, SYSTEM, Namespace, example, named, trains
+from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, example, named, trains
 
 NAME = "move-to-target"
 REPLICAS = 2
@@ -13,6 +13,9 @@ KILLS = 10
 SEED = 20
 GAP_S = (5.0, 40.0)  # between two kills: so short that some hit an operator that has only just begun
 END_S = 900.0
+# So little that there is room beside it, and that others come before it where the processors are short.
+SIMULATOR = {"requests": {"cpu": "5m", "memory": "160Mi"}}
+TRAINER = {"requests": {"cpu": "20m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
 
 # The operator is process 1 of its container, which no signal from inside can kill, unless the pod
 # shares its process namespace.
@@ -40,6 +43,9 @@ class LongRun:
         make_killable(self.namespace)
         job = example(NAME)
         job["spec"]["replicas"] = REPLICAS
+        for group in job["spec"]["simulators"]:
+            group["resources"] = SIMULATOR
+        job["spec"]["trainer"]["resources"] = TRAINER
         self.namespace.apply(job)
         self._killer.start()
         return self
@@ -59,12 +65,16 @@ class LongRun:
             steps = [space.trainer_status(named(pod)).get("step", 0) for pod in found]
             return found if len(found) == REPLICAS and all(steps) else []
 
-        return space.wait(training, 240)
+        return space.wait(training, LONG_S)
+
+    def wait_for_kills(self) -> None:
+        """Wait until nobody kills the operator any more."""
+        self._killer.join(END_S)
 
     def end(self) -> Object:
         """Return its last status."""
         self.namespace.wait_for_end(NAME, END_S)
-        self._killer.join(END_S)
+        self.wait_for_kills()
         return self.namespace.status(NAME)
 
     def _kill_again_and_again(self) -> None:

@@ -1,6 +1,7 @@
 """One namespace with the TrainingJobs of one test in it: what is asked there, and what is waited for."""
 
 import json
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,8 +18,10 @@ SYSTEM = "palaestra-system"
 EXAMPLES = Path(__file__).parents[2] / "manifests/examples"
 RESTRICTED = {"pod-security.kubernetes.io/enforce": "restricted"}
 LOOK_EVERY_S = 0.5
-SHORT_S, LONG_S = 90.0, 240.0  # for what takes 10 s, and for a tiny training, on a busy machine
+# For what takes 10 s and for a tiny training, on a busy machine whose operator is killed again and again.
+SHORT_S, LONG_S = 180.0, 360.0
 JOB = "palaestra.dev/job"
+NAME_BYTES = 40
 
 ASK = """
 import sys, urllib.request
@@ -146,7 +149,7 @@ class Namespace:
         text = self.execute(pod, "bash", "-c", f"cat $PALAESTRA_RUN/{name}")
         return [json.loads(line) for line in text.splitlines()]
 
-    def wait(self, claim: Callable[[], T], within_s: float = SHORT_S) -> T:
+    def wait(self, claim: Callable[[], T | None], within_s: float = SHORT_S) -> T:
         """Return the first true value of `claim`.
 
         Raises:
@@ -159,6 +162,10 @@ class Namespace:
             time.sleep(LOOK_EVERY_S)
         return value
 
+    def wait_for_reason(self, name: str, reason: str, within_s: float = SHORT_S) -> Object:
+        """Wait until the status gives a reason for the only replica; return what it says of it then."""
+        return self.wait(lambda: _if_so(self.replica(name), reason), within_s)
+
     def wait_for_end(self, name: str, within_s: float = LONG_S) -> str:
         """Wait until a TrainingJob has ended; return its phase."""
         ends = {"Succeeded", "Failed"}
@@ -168,12 +175,13 @@ class Namespace:
         """Wait until the trainer of a TrainingJob's only pod runs; return the pod's name."""
         return self.wait(lambda: next((named(pod) for pod in self.pods(name) if trains(pod)), ""), within_s)
 
-    def wait_for_step(self, name: str, step: int, within_s: float = LONG_S) -> str:
-        """Wait until the trainer of the only pod says to have passed a step; return the pod's name."""
+    def wait_for_step(self, name: str, step: int, within_s: float = LONG_S) -> tuple[str, int]:
+        """Wait until the trainer of the only pod has passed a step; return the pod's name and its step."""
 
-        def passed() -> str:
-            pods = [named(pod) for pod in self.pods(name) if trains(pod)]
-            return next((pod for pod in pods if self.trainer_status(pod).get("step", 0) >= step), "")
+        def passed() -> tuple[str, int] | None:
+            told = {named(pod): self.trainer_status(named(pod)) for pod in self.pods(name) if trains(pod)}
+            steps = {pod: status.get("step", 0) for pod, status in told.items()}
+            return next(((pod, at) for pod, at in steps.items() if at >= step), None)
 
         return self.wait(passed, within_s)
 
@@ -190,6 +198,12 @@ class Namespace:
         parts += [self.cluster.kubectl("get", "pods", "-n", SYSTEM)]
         parts += [self.cluster.kubectl("logs", f"deploy/{OPERATOR}", "--tail=60", "-n", SYSTEM)]
         return "\n".join(parts)
+
+
+def unique(text: str) -> str:
+    """Return a name for a namespace that nothing else has, made of the name of a test."""
+    plain = re.sub("[^a-z0-9]+", "-", text.removeprefix("test_").lower())[:NAME_BYTES].strip("-")
+    return f"e2e-{plain}-{time.time_ns() // 1_000_000 % 0xFFFFFF:x}"
 
 
 def named(content: Object) -> str:
@@ -213,6 +227,10 @@ def example(name: str) -> Object:
     """Return a TrainingJob of manifests/examples."""
     job: Object = yaml.safe_load((EXAMPLES / f"{name}.yaml").read_text())
     return job
+
+
+def _if_so(replica: Object, reason: str) -> Object:
+    return replica if replica.get("reason") == reason else {}
 
 
 def _plain(objects: list[Object]) -> list[Object]:

@@ -25,14 +25,27 @@ pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 WITHIN_S = 600  # for `helm test`, which pulls nothing here
 RELEASE = "palaestra"
 KINDS_OF_PROMETHEUS = ("podmonitors", "servicemonitors", "prometheusrules")
-# What needs nothing that this cluster lacks: a registry, and an image with JupyterLab.
+NOTEBOOKS = "notebooks"
+TOKEN = "sesame"  # of the notebook server
+# What needs nothing that this cluster lacks: a registry.
 EVERYTHING = merged(
     MODES["available"],
     MODES["monitored"],
     MODES["closed"],
     {"operator": {"replicas": 2}, "serviceAccount": {"create": True, "name": OPERATOR}},
     {"tensorboard": {"enabled": True, "existingClaim": "runs"}},
+    {"jupyter": {"enabled": True, "tokenSecret": {"name": NOTEBOOKS}}},
 )
+STATUS_CODES = """
+import http.client, json, sys
+_, token, *paths = sys.argv
+codes = {}
+for path in paths:
+    server = http.client.HTTPConnection("127.0.0.1", 8888, timeout=30)
+    server.request("GET", path, headers={"Authorization": f"token {token}"} if token else {})
+    codes[path] = server.getresponse().status
+print(json.dumps(codes))
+"""
 
 
 def helm(verb, namespace, *options, chart=CHART):
@@ -75,12 +88,15 @@ def taken_over(cluster, earlier_chart):
 
 @pytest.fixture
 def surroundings(cluster):
-    """What the chart asks of a cluster for everything that it can bring: Prometheus' kinds, and runs."""
+    """What the chart asks of a cluster for everything that it can bring: Prometheus' kinds, runs, a token."""
     folder = definitions(*PROMETHEUS)
     files = [f"--filename={folder / f'monitoring.coreos.com_{each}.yaml'}" for each in KINDS_OF_PROMETHEUS]
     cluster.kubectl("apply", "--server-side", *files)
     cluster.create("persistentvolumeclaims", make_claim("runs", namespace=SYSTEM))
+    secret = {"metadata": {"name": NOTEBOOKS, "namespace": SYSTEM}, "stringData": {"token": TOKEN}}
+    cluster.create("secrets", {"apiVersion": "v1", "kind": "Secret", **secret})
     yield
+    cluster.delete("secrets", SYSTEM, NOTEBOOKS)
     cluster.delete("persistentvolumeclaims", SYSTEM, "runs")
     cluster.kubectl("delete", "--ignore-not-found", *files)
 
@@ -116,6 +132,8 @@ def test_an_upgrade_to_everything_touches_no_pod_and_the_end_leaves_the_job(
     assert len(operators(namespace)) == 2
     assert {kind: fingerprint(namespace, kind) for kind in KINDS} == before
     assert "TensorBoard" in page_of(cluster, "palaestra-tensorboard", 6006)
+    assert_notebooks_are_served_to_who_has_the_token(cluster)
+    assert_the_first_notebook_drives_a_robot(cluster)
     helm("test", SYSTEM)
 
     helm("uninstall", SYSTEM, "--wait")
@@ -135,7 +153,38 @@ def page_of(cluster, deployment, port):
     fetch = (
         f"from urllib.request import urlopen; print(urlopen('http://127.0.0.1:{port}', timeout=30).read())"
     )
-    return cluster.kubectl("exec", "-n", SYSTEM, f"deploy/{deployment}", "--", "python3", "-c", fetch)
+    return inside(cluster, deployment, "python3", "-c", fetch)
+
+
+def inside(cluster, deployment, *command):
+    """Return all that a command says in a pod of a Deployment of the release."""
+    return cluster.kubectl("exec", "-n", SYSTEM, f"deploy/{deployment}", "--", *command)
+
+
+def assert_notebooks_are_served_to_who_has_the_token(cluster):
+    """All others are told that a server is there, which is what the kubelet asks, and where to log in."""
+
+    def codes(token):
+        asked = ("/api", "/api/contents", "/lab")
+        return json.loads(inside(cluster, "palaestra-jupyter", "python3", "-c", STATUS_CODES, token, *asked))
+
+    for token in ("", "another"):
+        assert codes(token) == {"/api": 200, "/api/contents": 403, "/lab": 302}
+    assert codes(TOKEN) == {"/api": 200, "/api/contents": 200, "/lab": 200}
+
+
+def assert_the_first_notebook_drives_a_robot(cluster):
+    """With a kernel as the browser's, a simulator and a ROS master, in a pod that may do nothing else."""
+    look = (
+        "touch /usr/written; ls /var/run/secrets/kubernetes.io; jupyter execute --inplace first-steps.ipynb"
+    )
+    said = inside(cluster, "palaestra-jupyter", "sh", "-c", f"{look}; cat first-steps.ipynb")
+
+    assert "touch: cannot touch '/usr/written': Read-only file system" in said
+    assert "ls: cannot access '/var/run/secrets/kubernetes.io'" in said
+    assert "reached after" in said
+    assert "image/png" in said
+    assert '"name": "stderr"' not in said
 
 
 def test_an_operator_of_one_namespace_trains_there(alone, namespace):  # noqa: ARG001 - is put back

@@ -2,10 +2,10 @@
 
 import pytest
 
-from tests.e2e.jobs import WAIT, make_job
-from tests.e2e.namespace import LONG_S, SHORT_S, named
+from tests.e2e.jobs import WAIT
+from tests.e2e.namespace import LONG_S, named
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
 
 GONE = ("trainingjobs", "jobs", "pods", "configmaps", "networkpolicies")
 NOWHERE = {"nodeSelector": {"palaestra.dev/nowhere": "true"}}
@@ -45,29 +45,19 @@ PHASES = {
 }
 
 
-@pytest.fixture(scope="module")
-def uids(shared):
-    """The jobs of all phases, by name, so that they get there side by side."""
-    return {
-        phase: shared.apply(make_job(phase, **spec))["metadata"]["uid"]
-        for phase, (_, spec) in PHASES.items()
-        if phase != "starting"  # a phase that is over too soon to be met later
-    }
-
-
 @pytest.mark.parametrize("phase", PHASES)
-def test_deleted_while_it_is(phase, uids, shared):
+def test_deleted_while_it_is(phase, namespace, job):
     """Nothing is left but the volume, and nothing of ours holds up the deletion."""
     reached, spec = PHASES[phase]
-    uid = uids.get(phase) or shared.apply(make_job(phase, **spec))["metadata"]["uid"]
-    shared.wait(lambda: reached(shared, phase), LONG_S)
-    assert "finalizers" not in shared.get("trainingjobs", phase)["metadata"]
+    uid = namespace.apply(job(phase, **spec))["metadata"]["uid"]
+    namespace.wait(lambda: reached(namespace, phase), LONG_S)
+    assert "finalizers" not in namespace.get("trainingjobs", phase)["metadata"]
 
-    shared.cluster.delete("trainingjobs", shared.name, phase)
+    namespace.cluster.delete("trainingjobs", namespace.name, phase)
 
     # Not sooner than its grace of 60 s goes a pod whose script was told to end before it set its trap.
-    shared.wait(lambda: not any(_left(shared, kind, phase) for kind in GONE), SHORT_S)
-    claims = shared.select("persistentvolumeclaims", phase)
+    namespace.wait(lambda: not any(_left(namespace, kind, phase) for kind in GONE), LONG_S)
+    claims = namespace.select("persistentvolumeclaims", phase)
     assert [named(claim) for claim in claims] == [f"{phase}-0-{uid}"]
 
 

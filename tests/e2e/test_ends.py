@@ -2,7 +2,6 @@
 
 import pytest
 
-from tests.e2e.jobs import make_job
 from tests.e2e.namespace import LONG_S, named
 
 pytestmark = pytest.mark.timeout(600)
@@ -18,55 +17,57 @@ GIVEN_UP = {
 }
 
 
-@pytest.fixture(scope="module")
-def ends(shared):
-    """The namespace with a job for each row, so that their pods wait side by side."""
-    for name, (code, _) in GIVEN_UP.items():
-        shared.apply(make_job(name, script=f"exit {code}"))
-    shared.apply(make_job("fails", script="exit 70", backoffLimit=2))
-    shared.apply(make_job("interrupted", script=INTERRUPTED_ONCE, backoffLimit=0))
-    shared.apply(make_job("stalls", script="exit 82", backoffLimit=0))
-    return shared
-
-
+@pytest.mark.beside
 @pytest.mark.parametrize("name", GIVEN_UP)
-def test_a_trainer_that_says_so_is_not_tried_again(ends, name):
+def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
     """Wrong configuration, spent fault budget, diverged: a second pod would come to the same."""
     code, reason = GIVEN_UP[name]
 
-    assert ends.wait_for_end(name, LONG_S) == "Failed"
-    assert ends.replica(name)["reason"] == reason
-    assert f"exit code {code}" in ends.replica(name)["message"]
-    assert ends.pods_made(name) == 1
+    namespace.apply(job(name, script=f"exit {code}"))
+
+    assert namespace.wait_for_end(name, LONG_S) == "Failed"
+    assert namespace.replica(name)["reason"] == reason
+    assert f"exit code {code}" in namespace.replica(name)["message"]
+    assert namespace.pods_made(name) == 1
 
 
-def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(ends):
+@pytest.mark.beside
+@pytest.mark.after_the_kills
+def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, job):
     """Limit n: n failures are tried again, so n + 1 pods, which are attempts 1 to n + 1."""
-    assert ends.wait_for_end("fails", LONG_S) == "Failed"
+    namespace.apply(job("fails", script="exit 70", backoffLimit=2))
 
-    replica = ends.replica("fails")
-    pods = [named(pod) for pod in ends.pods("fails", live=False)]
-    assert ends.pods_made("fails") == len(pods) == 3
+    assert namespace.wait_for_end("fails", LONG_S) == "Failed"
+
+    replica = namespace.replica("fails")
+    pods = [named(pod) for pod in namespace.pods("fails", live=False)]
+    assert namespace.pods_made("fails") == len(pods) == 3
     assert replica["attempt"] == 3
     assert replica["pod"]["name"] == pods[-1]
     assert replica["reason"] == "BackoffLimitSpent"
     assert replica["restarts"]["trainer"] == 2
-    retried = " ".join(each for each in ends.events("fails", "Retrying"))
+    retried = " ".join(namespace.events("fails", "Retrying"))
     assert pods[0] in retried
     assert pods[1] in retried
 
 
-def test_a_stalled_trainer_counts_against_the_limit(ends):
+@pytest.mark.beside
+def test_a_stalled_trainer_counts_against_the_limit(namespace, job):
     """It may be tried again, and with a limit of 0 it is not."""
-    assert ends.wait_for_end("stalls", LONG_S) == "Failed"
-    assert ends.pods_made("stalls") == 1
+    namespace.apply(job("stalls", script="exit 82", backoffLimit=0))
+
+    assert namespace.wait_for_end("stalls", LONG_S) == "Failed"
+    assert namespace.pods_made("stalls") == 1
 
 
-def test_an_interrupted_trainer_is_tried_again_and_not_counted(ends):
+@pytest.mark.beside
+def test_an_interrupted_trainer_is_tried_again_and_not_counted(namespace, job):
     """Exit 75 after a checkpoint: with a backoffLimit of 0 it still goes on, on the same volume."""
-    assert ends.wait_for_end("interrupted", LONG_S) == "Succeeded"
-    assert ends.pods_made("interrupted") == 2
-    assert ends.replica("interrupted")["restarts"]["trainer"] == 0
+    namespace.apply(job("interrupted", script=INTERRUPTED_ONCE, backoffLimit=0))
+
+    assert namespace.wait_for_end("interrupted", LONG_S) == "Succeeded"
+    assert namespace.pods_made("interrupted") == 2
+    assert namespace.replica("interrupted")["restarts"]["trainer"] == 0
 
 
 @pytest.mark.comes_late

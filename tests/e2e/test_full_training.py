@@ -62,7 +62,7 @@ def test_the_status_tells_where_each_replica_stands(long_run):
         }
 
 
-@pytest.mark.comes_late
+@pytest.mark.after_the_long_run
 def test_two_replicas_train_to_the_end_though_the_operator_is_killed_ten_times(long_run):
     """SIGKILL at random moments, of which the pods notice nothing: one pod a replica, the same end."""
     status = long_run.end()
@@ -82,7 +82,7 @@ def test_two_replicas_train_to_the_end_though_the_operator_is_killed_ten_times(l
     assert not space.holds(NAME, "Running")
 
 
-@pytest.mark.comes_late
+@pytest.mark.after_the_long_run
 def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
     """The final truth does not hang on having been asked in time."""
     long_run.end()
@@ -93,7 +93,7 @@ def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
         assert json.loads(ended["message"])["step"] == 50_000
 
 
-@pytest.mark.comes_late
+@pytest.mark.after_the_long_run
 def test_kubectl_shows_a_job_in_one_line(long_run):
     """Status, Replicas, Step, Success and Age are what a person looks for first."""
     status = long_run.end()
@@ -106,7 +106,7 @@ def test_kubectl_shows_a_job_in_one_line(long_run):
     assert float(line.split()[4]) == pytest.approx(status["successRate"])
 
 
-@pytest.mark.comes_late
+@pytest.mark.after_the_long_run
 def test_what_was_run_stands_in_the_config_maps(long_run):
     """Anyone can read the resolved job and the generated worlds of a replica, after its end too."""
     long_run.end()

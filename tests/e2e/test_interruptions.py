@@ -2,14 +2,14 @@
 
 import pytest
 
-from tests.e2e.jobs import make_claim
-from tests.e2e.namespace import LONG_S, SHORT_S, named
+from tests.e2e.jobs import make_claim, make_slow_job
+from tests.e2e.namespace import LONG_S, named
 
-pytestmark = [pytest.mark.trains, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.beside, pytest.mark.after_the_kills, pytest.mark.timeout(900)]
 
 EVERY_STEPS = 100
-STEPS = 1200
-AMID = 350
+STEPS = 1000
+AMID = 150
 
 
 def suspend(namespace, name, pod):
@@ -34,17 +34,14 @@ def evict(namespace, name, pod):  # noqa: ARG001
 @pytest.mark.parametrize(
     ("interrupt", "counted"), [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption")]
 )
-def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace, job):
+def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
     """Written on the way out, so nothing is lost; never more than one interval if it is not."""
-    training = {"steps": STEPS, "checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
-    namespace.apply(job("amid", trainer=training, backoffLimit=0))
-    first = namespace.wait_for_step("amid", AMID)
-    before = namespace.trainer_status(first)["step"]
+    namespace.apply(make_slow_job("amid", steps=STEPS, every_steps=EVERY_STEPS, backoffLimit=0))
+    first, before = namespace.wait_for_step("amid", AMID)
 
     interrupt(namespace, "amid", first)
-    namespace.wait(lambda: namespace.get("pods", first) is None, SHORT_S)
-    second = namespace.wait_for_step("amid", 1)
-    after = namespace.trainer_status(second)["step"]
+    namespace.wait(lambda: namespace.get("pods", first) is None)
+    second, after = namespace.wait_for_step("amid", 1)
     attempts = namespace.in_run(second, "attempts.jsonl")
 
     resumed_at = int(attempts[1]["reason"].removeprefix("resumed at step "))
@@ -59,16 +56,16 @@ def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace, 
     assert [named(pod) for pod in namespace.pods("amid", live=False)] == [second]
 
 
-def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace, job):
+def test_a_run_that_has_ended_is_prolonged_by_another_job(namespace):
     """Both name one claim; the second goes on to a total of its own."""
     namespace.create("persistentvolumeclaims", make_claim("runs", labels={"palaestra.dev/for-jobs": "true"}))
-    training = {"checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
     storage = {"existingClaim": "runs"}
-    namespace.apply(job("first", trainer=training | {"steps": 300}, storage=storage))
+    namespace.apply(make_slow_job("first", steps=300, every_steps=EVERY_STEPS, storage=storage))
     assert namespace.wait_for_end("first", LONG_S) == "Succeeded"
 
     uid = namespace.get("trainingjobs", "first")["metadata"]["uid"]
-    namespace.apply(job("longer", trainer=training | {"steps": 500}, storage=storage | {"resumeFrom": uid}))
+    storage |= {"resumeFrom": uid}
+    namespace.apply(make_slow_job("longer", steps=500, every_steps=EVERY_STEPS, storage=storage))
 
     assert namespace.wait_for_end("longer", LONG_S) == "Succeeded"
     assert namespace.replica("longer")["step"] == 500

@@ -14,12 +14,13 @@ from tests.e2e.kueue import (
     change_queue,
     leave_room_for_one,
     scheduling,
+    wait_for_words,
     words,
     workload,
 )
-from tests.e2e.namespace import LONG_S, SHORT_S
+from tests.e2e.namespace import LONG_S
 
-pytestmark = [pytest.mark.trains, pytest.mark.timeout(900), pytest.mark.usefixtures("robots")]
+pytestmark = [pytest.mark.changes_the_cluster, pytest.mark.timeout(900), pytest.mark.usefixtures("robots")]
 
 EVERY_STEPS = 100
 AMID = 150
@@ -79,15 +80,15 @@ def story(robots):
     robots.apply(make_job("everyday", trainer=TRAINING, backoffLimit=0, scheduling=scheduling()))
     leave_room_for_one(robots, "everyday")
     robots.apply(make_job("patient", trainer=ENDS, scheduling=scheduling()))
-    short = robots.wait(lambda: words(workload(robots, "patient"), "QuotaReserved"))
-    robots.wait(lambda: robots.replica("patient").get("reason") == "Queued")
-    waited, first = robots.replica("patient"), robots.wait_for_step("everyday", AMID)
-    at = robots.trainer_status(first)["step"]
+    short = wait_for_words(robots, "patient", "QuotaReserved", "insufficient unused quota for")
+    waited = robots.wait_for_reason("patient", "Queued")
+    _, at = robots.wait_for_step("everyday", AMID)
 
     robots.apply(make_job("urgent", trainer=ENDS, scheduling=scheduling("urgent")))
-    robots.wait(lambda: "lastAttempt" in robots.replica("everyday"), SHORT_S)
-    preempted, why = robots.replica("everyday"), words(workload(robots, "everyday"), "Preempted")
-    back = robots.wait_for_step("everyday", at, LONG_S)
+    robots.wait(lambda: "lastAttempt" in robots.replica("everyday"))
+    preempted = robots.wait_for_reason("everyday", "Queued")
+    why = words(workload(robots, "everyday"), "Preempted")
+    back, _ = robots.wait_for_step("everyday", at, LONG_S)
     attempts = robots.in_run(back, "attempts.jsonl")
     names = ("everyday", "patient", "urgent")
     assert {name: robots.wait_for_end(name, LONG_S) for name in names} == dict.fromkeys(names, "Succeeded")
@@ -142,8 +143,8 @@ def test_why_a_job_is_never_admitted_is_told_by_its_workload(name, robots):
     trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
     robots.apply(make_job(name, trainer=trainer, scheduling={"queueName": queue}))
 
-    assert told in robots.wait(lambda: words(workload(robots, name), "QuotaReserved"))
-    assert robots.wait(lambda: robots.replica(name).get("reason") == "Queued")
+    assert told in wait_for_words(robots, name, "QuotaReserved", told)
+    assert robots.wait_for_reason(name, "Queued")
 
 
 def test_a_default_queue_is_that_of_jobs_that_name_none(robots):
@@ -152,8 +153,7 @@ def test_a_default_queue_is_that_of_jobs_that_name_none(robots):
     robots.create("localqueues", {**default, "metadata": {"name": "default"}})
     change_queue(robots, stopPolicy="Hold")
     robots.apply(make_job("anyone", script="exit 0"))
-    robots.wait(lambda: robots.replica("anyone").get("reason") == "Queued")
-    assert "waits in queue default" in robots.replica("anyone")["message"]
+    assert "waits in queue default" in robots.wait_for_reason("anyone", "Queued")["message"]
 
     change_queue(robots, stopPolicy="None")
 

@@ -8,10 +8,10 @@ import subprocess
 import pytest
 
 from tests.e2e.askers import LISTEN, Asker, plain_pod
-from tests.e2e.jobs import WAIT
-from tests.e2e.namespace import LONG_S, SYSTEM, named, trains
+from tests.e2e.jobs import WAIT, make_job
+from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, named, trains
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = pytest.mark.timeout(600)
 
 STATUS, HEALTH, CONTROL, MASTER = 9090, 7200, 7100, 11311
 OPEN = {STATUS, HEALTH, HEALTH + 31}
@@ -20,11 +20,11 @@ VERDICT = re.compile(r"IS ALLOWED\?\s*\|\s*(TRUE|FALSE)")
 DENY_ALL = {"metadata": {"name": "deny"}, "spec": {"podSelector": {}, "policyTypes": ["Ingress"]}}
 
 
-@pytest.fixture
-def pod(namespace, job):
+@pytest.fixture(scope="module")
+def pod(shared):
     """A pod in training, with a NetworkPolicy."""
-    namespace.apply(job("guarded", script=WAIT))
-    return namespace.get("pods", namespace.wait_for_pod("guarded", LONG_S))
+    shared.apply(make_job("guarded", script=WAIT))
+    return shared.get("pods", shared.wait_for_pod("guarded", LONG_S))
 
 
 @pytest.fixture(scope="session")
@@ -48,47 +48,47 @@ def shared_listener(make_namespace):
     return space, space.get("pods", "listens")
 
 
-def test_ros_and_control_are_on_loopback_and_metrics_are_not(pod, monitor):
+def test_ros_and_control_are_on_loopback_and_metrics_are_not(pod, shared, monitor):
     """ROS 1 has no authentication; whatever a cluster's network does, nobody outside speaks it."""
-    assert monitor.reaches(pod, HEALTH)
+    shared.wait(lambda: monitor.reaches(pod, HEALTH))
     assert not monitor.reaches(pod, CONTROL)
     assert not monitor.reaches(pod, MASTER)
 
 
-def test_no_stranger_reaches_a_training_pod(pod, namespace, make_namespace, monitor, enforced):
+def test_no_stranger_reaches_a_training_pod(pod, shared, make_namespace, monitor, enforced):
     """Neither another namespace nor a pod beside it, even one that wears the operator's label."""
     if not enforced:
         pytest.skip("this cluster's network enforces no NetworkPolicy: the control pod was reached")
-    beside = Asker(namespace, "beside")
+    beside = Asker(shared, "beside")
     elsewhere = Asker(make_namespace("strangers"), "elsewhere", {"palaestra.dev/operator": "true"})
 
-    assert monitor.reaches(pod, HEALTH)
+    shared.wait(lambda: monitor.reaches(pod, HEALTH))
     assert not beside.reaches(pod, HEALTH)
     assert not elsewhere.reaches(pod, HEALTH)
 
 
-def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, namespace, tmp_path):
+def test_the_policy_admits_operator_and_monitoring_and_nobody_else(pod, shared, tmp_path):
     """By cyclonus, which was written to test networks' own reading of policies: not by our reading."""
-    operator = namespace.cluster.select("pods", SYSTEM, "app.kubernetes.io/component=operator")[0]
-    labels = operator["metadata"]["labels"]
+    labels = shared.cluster.get("deployments", SYSTEM, OPERATOR)["spec"]["template"]["metadata"]["labels"]
     admitted = [peer(SYSTEM, labels), peer("monitoring", {}), peer("monitoring", {"any": "thing"})]
     strangers = [
         peer("default", {}),
         peer("default", labels),
         peer(SYSTEM, {}),
-        peer(namespace.name, {}),
-        peer(namespace.name, labels),
-        peer(namespace.name, {"palaestra.dev/job": "another"}),
+        peer(shared.name, {}),
+        peer(shared.name, labels),
+        peer(shared.name, {"palaestra.dev/job": "another"}),
         {"IP": "198.51.100.7"},
     ]
-    target = peer(namespace.name, pod["metadata"]["labels"])
+    target = peer(shared.name, pod["metadata"]["labels"])
     asked = [(who, port) for who in [*admitted, *strangers] for port in sorted(OPEN | CLOSED)]
 
-    verdicts = evaluate(namespace, tmp_path, [traffic(who, target, port) for who, port in asked])
+    verdicts = evaluate(shared, tmp_path, [traffic(who, target, port) for who, port in asked])
 
     assert verdicts == [who in admitted and port in OPEN for who, port in asked]
 
 
+@pytest.mark.beside
 def test_a_job_may_close_the_way_out(namespace, job, tmp_path):
     """With `egress: Closed` the pods call nobody; who may call them stays as it was."""
     namespace.apply(job("closed", script=WAIT, network={"egress": "Closed"}))

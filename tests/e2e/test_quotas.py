@@ -8,7 +8,7 @@ from tests.e2e.cluster import Object
 from tests.e2e.jobs import LITTLE, make_job
 from tests.e2e.namespace import LONG_S, Namespace, named
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.after_the_kills, pytest.mark.timeout(600)]
 
 MISSING, URGENT = "palaestra-e2e-missing", "palaestra-e2e-urgent"
 OF_URGENT = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [URGENT]}]}
@@ -104,9 +104,7 @@ def places(make_namespace, classes):  # noqa: ARG001 - is there
 @pytest.fixture(scope="module")
 def refused(places):
     """What the status said of each replica that was refused; by now nothing refuses it any more."""
-    for place in places.values():
-        place.wait(lambda place=place: place.replica("waits").get("reason") == "PodsRefused")
-    told = {name: place.replica("waits") for name, place in places.items()}
+    told = {name: place.wait_for_reason("waits", "PodsRefused") for name, place in places.items()}
     for name, place in places.items():
         REFUSALS[name].end(place)
     return told

@@ -5,15 +5,14 @@ import pytest
 from tests.e2e.jobs import make_claim
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
 
 SECRETS_ROLE = "palaestra-job-secrets"
 FOR_JOBS = {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}}
 
 
-@pytest.fixture
-def secrets_readable(namespace):
-    """The operator can read no Secret until somebody lets it, namespace by namespace."""
+def let_secrets_be_read(namespace):
+    """Let the operator read Secrets, which it cannot until somebody does so, namespace by namespace."""
     role = {"apiGroup": "rbac.authorization.k8s.io", "kind": "ClusterRole", "name": SECRETS_ROLE}
     subject = {"kind": "ServiceAccount", "name": OPERATOR, "namespace": SYSTEM}
     binding = {"metadata": {"name": SECRETS_ROLE}, "roleRef": role, "subjects": [subject]}
@@ -34,9 +33,9 @@ def test_a_claim_is_used_only_if_it_is_for_jobs(namespace, job):
     assert namespace.select("persistentvolumeclaims", "writes") == []
 
 
-@pytest.mark.usefixtures("secrets_readable")
 def test_a_secret_is_used_only_if_it_is_for_jobs(namespace, job):
     """Otherwise whoever may write TrainingJobs could read every Secret of the namespace."""
+    let_secrets_be_read(namespace)
     variable = {"name": "WORD", "secretKeyRef": {"name": "words", "key": "word"}}
     namespace.apply(job("reads", script='test "$WORD" = open', trainer={"env": [variable]}, backoffLimit=0))
     namespace.wait(lambda: namespace.condition("reads", "Accepted").get("reason") == "SecretMissing")

@@ -9,6 +9,8 @@ from tests.e2e.cluster import CommandFailed, Refused
 from tests.e2e.jobs import WAIT
 from tests.e2e.namespace import LONG_S
 
+# A program that has not begun to listen to signals yet is ended by SIGKILL, after the pod's grace.
+ENDS_WHEN_ALL_IS_UP = "until (: </dev/tcp/127.0.0.1/7200) 2>/dev/null; do sleep 0.2; done"
 TOKEN = "/var/run/secrets/kubernetes.io/serviceaccount/token"
 
 
@@ -24,13 +26,15 @@ def test_a_pod_that_asks_for_more_is_refused_here(namespace):
     assert 'violates PodSecurity "restricted' in refusal.value.message
 
 
-@pytest.mark.trains
-@pytest.mark.timeout(400)
+@pytest.mark.beside
+@pytest.mark.after_the_kills
+@pytest.mark.timeout(600)
 def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
     """All that a person asks of a run that has ended, without a look into its pod."""
     namespace.apply(job("tiny"))
 
     assert namespace.wait_for_end("tiny") == "Succeeded"
+    namespace.wait(lambda: namespace.events("tiny", "Succeeded"))  # which follow the status
 
     status = namespace.status("tiny")
     replica = status["replicas"][0]
@@ -45,9 +49,11 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
     assert namespace.pods_made("tiny") == 1
 
 
+@pytest.mark.beside
+@pytest.mark.timeout(600)
 def test_a_pod_ends_with_its_trainer(namespace, job):
     """Simulators and ROS master are not what anybody waits for, nor a preempted node's grace."""
-    namespace.apply(job("ends", script="sleep 3"))
+    namespace.apply(job("ends", script=ENDS_WHEN_ALL_IS_UP))
     assert namespace.wait_for_end("ends") == "Succeeded"
 
     (pod,) = namespace.pods("ends", live=False)
@@ -65,7 +71,8 @@ def moment(terminated):
     return datetime.fromisoformat(terminated["finishedAt"])
 
 
-@pytest.mark.timeout(400)
+@pytest.mark.beside
+@pytest.mark.timeout(600)
 def test_no_container_can_write_its_image_or_speak_to_the_cluster(namespace, job):
     """Whoever may make TrainingJobs, and no pods, must gain nothing by it."""
     namespace.apply(job("waits", script=WAIT))

@@ -4,28 +4,22 @@ import pytest
 
 from palaestra_sim.world import builtin
 from tests.e2e.askers import IMAGE
-from tests.e2e.jobs import WAIT, make_job
+from tests.e2e.jobs import LITTLE, SMALL, WAIT
 from tests.e2e.namespace import LONG_S
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
 
 FOR_JOBS = {"palaestra.dev/for-jobs": "true"}
-STUCK = {
-    "crashes": {
-        "simulator": {"env": [{"name": "PYTHONHOME", "value": "/nowhere"}], "startDeadlineSeconds": 20}
-    },
-    "no-image": {"simulator": {"image": "nowhere:0", "startDeadlineSeconds": 20}},
-    "no-node": {"scheduling": {"nodeSelector": {"palaestra.dev/nowhere": "true"}}},
+CRASHES = {"env": [{"name": "PYTHONHOME", "value": "/nowhere"}], "startDeadlineSeconds": 20}
+NO_IMAGE = {"image": "nowhere:0", "startDeadlineSeconds": 20}
+NOWHERE = {"nodeSelector": {"palaestra.dev/nowhere": "true"}}
+NEVER_UP = {
+    "driver": "command",
+    "image": IMAGE,
+    "command": ["sleep", "3600"],
+    "startDeadlineSeconds": 15,
+    "resources": LITTLE,
 }
-NEVER_UP = {"driver": "command", "image": IMAGE, "command": ["sleep", "3600"], "startDeadlineSeconds": 15}
-
-
-@pytest.fixture(scope="module")
-def stuck(shared):
-    """The namespace with jobs that do not start, each for a reason of its own, side by side."""
-    for name, spec in STUCK.items():
-        shared.apply(make_job(name, script=WAIT, **spec))
-    return shared
 
 
 def world_map(**labels):
@@ -33,32 +27,34 @@ def world_map(**labels):
     return {"metadata": {"name": "arena", "labels": labels}, "data": {"arena.wbt": builtin("arena").decode()}}
 
 
-@pytest.mark.trains
-def test_a_simulator_that_never_comes_up_fails_the_replica_and_is_named(shared, job):
+@pytest.mark.after_the_kills
+def test_a_simulator_that_never_comes_up_fails_the_replica_and_is_named(namespace, job):
     """Kubernetes sees a sidecar that runs; only trainer and operator know that nobody answers."""
-    shared.apply(job("never-up", simulator=NEVER_UP, backoffLimit=0))
+    namespace.apply(job("never-up", simulator=NEVER_UP, trainer={"resources": SMALL}, backoffLimit=0))
 
-    assert shared.wait_for_end("never-up", LONG_S) == "Failed"
-    assert shared.replica("never-up")["reason"] == "SimulatorStartDeadline"
-    assert "collect-0" in shared.replica("never-up")["message"]
+    assert namespace.wait_for_end("never-up", LONG_S) == "Failed"
+    assert namespace.replica("never-up")["reason"] == "SimulatorStartDeadline"
+    assert "collect-0" in namespace.replica("never-up")["message"]
 
 
-def test_a_sidecar_that_crash_loops_fails_the_replica_and_is_named(stuck):
+def test_a_sidecar_that_crash_loops_fails_the_replica_and_is_named(namespace, job):
     """Kubernetes never fails a pod for it, and its main container waits for nobody."""
-    assert stuck.wait_for_end("crashes", LONG_S) == "Failed"
-    assert stuck.replica("crashes")["reason"] == "SidecarCrashLoop"
-    assert "sim-collect-0" in stuck.replica("crashes")["message"]
+    namespace.apply(job("crashes", script=WAIT, simulator=CRASHES))
+
+    assert namespace.wait_for_end("crashes", LONG_S) == "Failed"
+    assert namespace.replica("crashes")["reason"] == "SidecarCrashLoop"
+    assert "sim-collect-0" in namespace.replica("crashes")["message"]
 
 
-def test_an_image_that_cannot_be_pulled_is_named_with_its_container(stuck):
+def test_an_image_that_cannot_be_pulled_is_named_with_its_container(namespace, job):
     """Told as soon as the kubelet knows it, and the end of the replica after the start deadline."""
-    stuck.wait(lambda: stuck.replica("no-image").get("reason") == "ImagePull")
+    namespace.apply(job("no-image", script=WAIT, simulator=NO_IMAGE))
 
-    message = stuck.replica("no-image")["message"]
-    assert "sim-collect-0" in message
-    assert "nowhere:0" in message
-    assert stuck.wait_for_end("no-image", LONG_S) == "Failed"
-    assert stuck.replica("no-image")["reason"] == "ImagePull"
+    told = namespace.wait_for_reason("no-image", "ImagePull", LONG_S)
+    assert "sim-collect-0" in told["message"]
+    assert "nowhere:0" in told["message"]
+    assert namespace.wait_for_end("no-image", LONG_S) == "Failed"
+    assert namespace.replica("no-image")["reason"] == "ImagePull"
 
 
 def test_a_job_starts_when_its_world_appears(namespace, job):
@@ -76,9 +72,11 @@ def test_a_job_starts_when_its_world_appears(namespace, job):
     assert namespace.wait_for_end("waits", LONG_S) == "Succeeded"
 
 
-def test_a_pod_that_no_node_takes_is_told_in_the_scheduler_s_words(stuck):
+def test_a_pod_that_no_node_takes_is_told_in_the_scheduler_s_words(namespace, job):
     """Nothing fails: a node may come."""
-    stuck.wait(lambda: stuck.replica("no-node").get("reason") == "Unschedulable")
+    namespace.apply(job("no-node", script=WAIT, scheduling=NOWHERE))
 
-    assert "node affinity/selector" in stuck.replica("no-node")["message"]
-    assert stuck.status("no-node")["phase"] == "Pending"
+    told = namespace.wait_for_reason("no-node", "Unschedulable", LONG_S)
+    assert "node affinity/selector" in told["message"]
+    assert told["phase"] == "Pending"
+    assert namespace.status("no-node")["phase"] == "Pending"

@@ -22,19 +22,14 @@ STAYS = "; trap exit TERM; sleep 3600 & wait"
 LEFT = {"model.zip": b"weights", "tensorboard/events": bytes(3_000_000)}
 
 
-@pytest.fixture
-def typed(namespace):
+def typed(namespace, *arguments):
     """Type a command of `palaestra`; return its exit code and its output."""
-
-    def run(*arguments):
-        program = Path(sys.executable).with_name("palaestra")
-        done = subprocess.run(
-            [program, *arguments, f"--namespace={namespace.name}"],
-            capture_output=True, text=True, timeout=COMMAND_S, check=False, env=os.environ,
-        )  # fmt: skip
-        return done.returncode, done.stdout + done.stderr
-
-    return run
+    program = Path(sys.executable).with_name("palaestra")
+    done = subprocess.run(
+        [program, *arguments, f"--namespace={namespace.name}"],
+        capture_output=True, text=True, timeout=COMMAND_S, check=False, env=os.environ,
+    )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
 
 
 def found(folder):
@@ -47,38 +42,40 @@ def readers(namespace):
     return namespace.cluster.select("pods", namespace.name, "palaestra.dev/fetch")
 
 
-def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, typed, tmp_path):
+@pytest.mark.beside
+def test_a_run_that_goes_on_is_fetched_and_its_log_is_read(namespace, tmp_path):
     """The trainer is not disturbed."""
     namespace.apply(make_job("goes-on", script=LEAVES_A_RUN + STAYS))
-    namespace.wait(lambda: "left it" in typed("logs", "goes-on")[1], LONG_S)
+    namespace.wait(lambda: "left it" in typed(namespace, "logs", "goes-on")[1], LONG_S)
 
-    code, told = typed("fetch", "goes-on", f"--dir={tmp_path}")
+    code, told = typed(namespace, "fetch", "goes-on", f"--dir={tmp_path}")
 
     assert code == 0, told
     assert {name: content for name, content in found(tmp_path / "goes-on/0").items() if name in LEFT} == LEFT
     assert readers(namespace) == []
     namespace.wait(lambda: namespace.replica("goes-on").get("phase") == "Running")
-    assert typed("logs", "goes-on", "--tail=1") == (0, "left it\n")
+    assert typed(namespace, "logs", "goes-on", "--tail=1") == (0, "left it\n")
 
 
-def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, typed, tmp_path):
+@pytest.mark.beside
+def test_a_run_that_has_ended_is_fetched_from_its_claim(namespace, tmp_path):
     """With a pod that *restricted* admits, and that is gone afterwards."""
     namespace.apply(make_job("ended", script=LEAVES_A_RUN))
     assert namespace.wait_for_end("ended", LONG_S) == "Succeeded"
 
-    code, told = typed("fetch", "ended", f"--dir={tmp_path}")
+    code, told = typed(namespace, "fetch", "ended", f"--dir={tmp_path}")
 
     assert code == 0, told
     assert {name: content for name, content in found(tmp_path / "ended/0").items() if name in LEFT} == LEFT
     assert [each for each in readers(namespace) if "deletionTimestamp" not in each["metadata"]] == []
-    assert typed("fetch", "ended", f"--dir={tmp_path}")[0] == 1
+    assert typed(namespace, "fetch", "ended", f"--dir={tmp_path}")[0] == 1
 
 
-@pytest.mark.trains  # after the long run, whose operator is killed again and again
-def test_the_doctor_finds_nothing_wrong_where_jobs_run(typed, cluster):
+@pytest.mark.comes_late  # after the long run, whose operator is killed again and again
+def test_the_doctor_finds_nothing_wrong_where_jobs_run(namespace, cluster):
     """Jobs have trained here."""
     cluster.rolled_out(SYSTEM, OPERATOR)
-    code, told = typed("doctor")
+    code, told = typed(namespace, "doctor")
 
     assert {line.split()[0] for line in told.splitlines()} == {"ok"}, told
     assert code == 0, told

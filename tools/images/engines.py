@@ -126,8 +126,8 @@ class Buildah:
             )
         logs = folder / "logs"
         if shutil.which("buildah") is None:
-            install = "apt-get update && apt-get install -y --no-install-recommends buildah"
-            programs.run(["sh", "-c", install], log=logs / "apt.log", deadline_s=_STEP_DEADLINE_S)
+            install = str(root / "tests" / "cluster" / "packages.sh")
+            programs.run([install, "buildah"], log=logs / "apt.log", deadline_s=_STEP_DEADLINE_S)
         tree = programs.answer([str(root / "tests" / "cluster" / "base.sh")], deadline_s=_STEP_DEADLINE_S)
         if tree is None:
             raise ImagesError("tests/cluster/base.sh: made no Debian tree; run it to see why")
