@@ -20,15 +20,11 @@ MODES: dict[str, Values] = {
     "offline": {
         "images": {
             "registry": "registry.example.com:5000/robots",
-            **{part: {"digest": DIGEST} for part in ("operator", "trainer", "stub", "webots")},
+            **{part: {"digest": DIGEST} for part in ("operator", "trainer", "stub", "webots", "notebook")},
         },
         "imagePullSecrets": [{"name": "registry"}],
         "tensorboard": {"enabled": True, "existingClaim": "runs"},
-        "jupyter": {
-            "enabled": True,
-            "image": f"registry.example.com:5000/robots/notebooks@{DIGEST}",
-            "tokenSecret": {"name": "notebooks"},
-        },
+        "jupyter": {"enabled": True, "tokenSecret": {"name": "notebooks"}},
     },
     "closed": {
         "networkPolicy": {"egress": {"restricted": True}},

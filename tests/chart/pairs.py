@@ -7,7 +7,7 @@ from typing import Any
 
 from tests.chart.modes import DIGEST, MODES, Values, merged
 
-PARTS = ("operator", "trainer", "stub", "webots")
+PARTS = ("operator", "trainer", "stub", "webots", "notebook")
 MONITORS = ("podMonitor", "serviceMonitor", "prometheusRule", "dashboards")
 RESOURCES = {"requests": {"cpu": "1"}, "limits": {"memory": "1Gi"}}
 SPREAD = {"maxSkew": 1, "topologyKey": "zone", "whenUnsatisfiable": "DoNotSchedule"}
@@ -53,7 +53,6 @@ OTHERS: dict[str, Any] = {
     "tensorboard.namespace": "elsewhere",
     "tensorboard.resources": RESOURCES,
     "jupyter.enabled": True,
-    "jupyter.image": "notebooks:1",
     "jupyter.namespace": "elsewhere",
     "jupyter.tokenSecret.name": "notebooks",
     "jupyter.tokenSecret.key": "secret",
@@ -64,7 +63,7 @@ OTHERS: dict[str, Any] = {
 BESIDE: dict[str, dict[str, Any]] = {
     "operator.leaderElection": {"operator.replicas": 1},
     "tensorboard.enabled": {"tensorboard.existingClaim": "runs"},
-    "jupyter.enabled": {"jupyter.image": "notebooks:1", "jupyter.tokenSecret.name": "notebooks"},
+    "jupyter.enabled": {"jupyter.tokenSecret.name": "notebooks"},
 }
 
 

@@ -49,12 +49,12 @@ def _parser() -> argparse.ArgumentParser:
         prog="tools/images.sh", description="Build the container images that have changed.", epilog=EPILOG
     )
     add = parser.add_argument
-    add("names", nargs="*", metavar="NAME", help="of stub, trainer, operator; default: all")
+    add("names", nargs="*", metavar="NAME", help="of stub, trainer, notebook, operator; default: all")
     add(
         "--torch",
         choices=("debian", "cuda"),
         default="debian",
-        help="the trainer's PyTorch (default: %(default)s)",
+        help="PyTorch of trainer and notebook (default: %(default)s)",
     )
     add("--tag", help="tag of the images; default: the version")
     add("--archives", action="store_true", help="print lines of NAME=ARCHIVE, for scripts")

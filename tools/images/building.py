@@ -48,7 +48,8 @@ class Wanted:
                 self.base.digest,
                 self.dockerfile,
                 *(f"{name}={value}" for name, value in sorted(self.recipe.arguments.items())),
-                self.inside.requirements_digest,
+                self.inside.requirements.digest,
+                *([self.inside.extra.digest] if self.inside.extra else []),
                 self.inside.packages_digest,
             )
         )
@@ -120,7 +121,8 @@ class Workshop:
         return {
             "BASE": wanted.base.name,
             **wanted.recipe.arguments,
-            "REQUIREMENTS": wanted.inside.requirements_digest,
+            "REQUIREMENTS": wanted.inside.requirements.digest,
+            **({"EXTRA": wanted.inside.extra.digest} if wanted.inside.extra else {}),
             "PACKAGES": wanted.inside.packages_digest,
             "VERSION": wanted.version,
             "REVISION": _revision(self.root),

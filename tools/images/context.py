@@ -7,7 +7,7 @@ build itself asks no index. They stay in the cache, so that only a changed lock 
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,11 +26,19 @@ _OLDEST_GLIBC, _NEWEST_GLIBC = 5, 41  # 2.41 is Debian trixie's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contents:
-    """What goes into one image: the locked share of other packages, and digests of that and of ours."""
+class Locked:
+    """Packages of others, as a requirements file with hashes, and the digest of that."""
 
-    requirements: str
-    requirements_digest: str
+    text: str
+    digest: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What goes into one image: its share of the lock, the lock that it has besides, and a digest of ours."""
+
+    requirements: Locked
+    extra: Locked | None
     packages_digest: str
 
 
@@ -41,16 +49,12 @@ def contents(root: Path, recipe: Recipe, machine: str) -> Contents:
         ImagesError: the lock is not as `make lock` writes it.
     """
     names = [project(root, package)["name"] for package in recipe.packages]
-    try:
-        pins = lock.parse((root / "requirements.lock").read_text())
-    except ValueError as error:
-        raise ImagesError(str(error)) from error
-    requirements = lock.share(pins, names, machine, recipe.without)
+    share = lock.share(_pins(root / "requirements.lock"), names, machine, recipe.without)
     ours = [path for package in recipe.packages for path in sources(root, package)]
     files = [root / file for file in recipe.files]
     return Contents(
-        requirements=requirements,
-        requirements_digest=digest((requirements, machine)),
+        requirements=_locked(share, machine),
+        extra=_extra(root / recipe.extra, share, machine) if recipe.extra else None,
         packages_digest=digest_of_files(root, (*ours, *files)),
     )
 
@@ -63,9 +67,11 @@ def fill(folder: Path, root: Path, recipe: Recipe, inside: Contents, *, wheels: 
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    (folder / "requirements.txt").write_text(inside.requirements)
-    fetched = _fetched(wheels / inside.requirements_digest, inside, machine)
-    shutil.copytree(fetched, folder / "wheels", copy_function=os.link)
+    for name, locked in (("requirements", inside.requirements), ("extra", inside.extra)):
+        if locked is not None:
+            (folder / f"{name}.txt").write_text(locked.text)
+            fetched = _fetched(wheels / locked.digest, locked, machine)
+            shutil.copytree(fetched, folder / "wheels", copy_function=os.link, dirs_exist_ok=True)
     shutil.copy(_uv(), folder / "uv")
     for file in recipe.files:
         shutil.copy(root / file, folder)
@@ -73,7 +79,25 @@ def fill(folder: Path, root: Path, recipe: Recipe, inside: Contents, *, wheels: 
         _make_wheel(root / package, folder / "packages")
 
 
-def _fetched(kept: Path, inside: Contents, machine: str) -> Path:
+def _pins(file: Path) -> Sequence[lock.Pin]:
+    try:
+        return lock.parse(file.read_text())
+    except ValueError as error:
+        raise ImagesError(f"{file.name}: {error}") from error
+
+
+def _extra(file: Path, share: str, machine: str) -> Locked:
+    """Return a whole lock, without what is in the other's share already."""
+    pins = _pins(file)
+    there = [pin.name for pin in lock.parse(share)]
+    return _locked(lock.share(pins, [pin.name for pin in pins], machine, there), machine)
+
+
+def _locked(requirements: str, machine: str) -> Locked:
+    return Locked(text=requirements, digest=digest((requirements, machine)))
+
+
+def _fetched(kept: Path, locked: Locked, machine: str) -> Path:
     """Return the folder of the locked wheels, fetched whole or not at all."""
     if kept.exists():
         cache.use(kept)
@@ -82,7 +106,7 @@ def _fetched(kept: Path, inside: Contents, machine: str) -> Path:
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
     listed, log = part / "requirements.txt", part / "pip.log"
-    listed.write_text(inside.requirements)
+    listed.write_text(locked.text)
     fetch = [sys.executable, "-m", "pip", "download", *_FETCH_OPTIONS, f"--dest={part}"]
     platforms = (f"--platform={platform}" for platform in _platforms(machine))
     programs.run([*fetch, *platforms, f"--requirement={listed}"], log=log, deadline_s=_FETCH_DEADLINE_S)

@@ -63,7 +63,7 @@ def share(pins: Iterable[Pin], packages: Collection[str], machine: str, without:
 def _pin(block: list[str]) -> Pin:
     head = _PIN.match(block[0])
     if head is None:
-        raise ValueError(f"requirements.lock: {block[0]!r} has no version with hashes; repeat `make lock`")
+        raise ValueError(f"{block[0]!r} has no version with hashes; repeat `make lock`")
     return Pin(
         name=head["name"],
         version=head["version"],

@@ -13,8 +13,9 @@ REGISTRY = "docker.io/library"  # what a cluster adds to a name without a host
 class Recipe:
     """One image.
 
-    `packages` are folders of ours, `files` what the Dockerfile runs besides. `without` names locked
-    packages that the image does without, and `arguments` are those of the Dockerfile.
+    `packages` are folders of ours, `files` what the Dockerfile runs or copies besides. `without` names
+    locked packages that the image does without, `extra` is a lock of its own that it has whole besides, and
+    `arguments` are those of the Dockerfile.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Recipe:
     packages: tuple[str, ...]
     files: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    extra: str | None = None
     arguments: Mapping[str, str] = field(default_factory=dict)
 
     def reference(self, tag: str) -> str:
@@ -30,7 +32,8 @@ class Recipe:
 
 
 def recipes(torch: str) -> Mapping[str, Recipe]:
-    """Return all images by name, the trainer with PyTorch of `debian` or with `cuda`."""
+    """Return all images by name, trainer and notebook with PyTorch of `debian` or with `cuda`."""
+    stood_in_for = ("torch",) if torch == "debian" else ()  # by the distribution's
     return {
         "stub": Recipe(
             name="stub",
@@ -42,7 +45,20 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="trainer",
             dockerfile="trainer/Dockerfile",
             packages=("sim_image", "trainer"),
-            without=("torch",) if torch == "debian" else (),  # the distribution's stands in
+            without=stood_in_for,
+            arguments={"TORCH": torch},
+        ),
+        "notebook": Recipe(
+            name="notebook",
+            dockerfile="images/notebook/Dockerfile",
+            packages=("sim_image", "trainer"),
+            files=(
+                "images/notebook/notebook.sh",
+                "images/notebook/overrides.json",
+                "examples/first-steps.ipynb",
+            ),
+            without=stood_in_for,
+            extra="images/notebook/requirements.lock",
             arguments={"TORCH": torch},
         ),
         "operator": Recipe(

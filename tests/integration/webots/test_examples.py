@@ -1,5 +1,6 @@
 """The scripts that people are told to run."""
 
+import json
 import os
 import subprocess
 import sys
@@ -8,19 +9,35 @@ from pathlib import Path
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
-def test_the_facade_example_drives_and_reads():
-    """As typed in the README: no pod, no runner, no ROS master before."""
+def carried_out(*program):
+    """Return what comes of a Python program, without pod, runner and ROS master."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
-
-    result = subprocess.run(
-        [sys.executable, EXAMPLES / "facade.py"],
+    return subprocess.run(
+        [sys.executable, *program],
         capture_output=True,
         text=True,
         timeout=100,
         check=True,
-        env=environment,
+        env={**environment, "MPLBACKEND": "agg"},
     )
+
+
+def test_the_facade_example_drives_and_reads():
+    """As typed in the README."""
+    result = carried_out(EXAMPLES / "facade.py")
 
     assert result.stdout.startswith("Pose(x_m=0.03")
     assert "free" in result.stdout
     assert result.stderr == ""
+
+
+def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom():
+    """`make e2e` does it in the notebook's pod; and a notebook that is new holds no results."""
+    cells = json.loads((EXAMPLES / "first-steps.ipynb").read_text())["cells"]
+    code = [cell for cell in cells if cell["cell_type"] == "code"]
+
+    result = carried_out("-c", "\n".join("".join(cell["source"]) for cell in code))
+
+    assert "reached after" in result.stdout
+    assert result.stderr == ""
+    assert not any(cell["outputs"] for cell in code)

@@ -5,6 +5,8 @@ Prometheus Operator has none there: a real API server takes it in tests/integrat
 """
 
 import copy
+import json
+from functools import cache
 from itertools import permutations, product
 
 import kubernetes_validate
@@ -28,7 +30,13 @@ def test_every_object_meets_the_schemas_of_kubernetes(row):
 
     assert len(made) > len(FOREIGN)
     for each, release in product(made, RELEASES):
-        kubernetes_validate.validate(each, release, strict=True)
+        meets(json.dumps(each), release)
+
+
+@cache
+def meets(text, release):
+    """Refuse an object that a release would not take; most are the same in each row, and one is enough."""
+    kubernetes_validate.validate(json.loads(text), release, strict=True)
 
 
 def test_a_misspelt_field_is_found(one):

@@ -261,7 +261,7 @@ def test_the_token_of_the_notebooks_is_in_no_object(one):
     [volume] = [each["secret"] for each in pod["volumes"] if each["name"] == "token"]
     assert volume["secretName"] == "notebooks"
     assert [f"{folder}/{item['path']}" for item in volume["items"]] == [environment["JUPYTER_TOKEN_FILE"]]
-    assert environment.keys() == {"JUPYTER_TOKEN_FILE", "HOME"}
+    assert environment.keys() == {"JUPYTER_TOKEN_FILE"}
 
 
 def test_the_alerts_are_those_of_the_file(one):

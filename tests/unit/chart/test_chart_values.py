@@ -77,8 +77,7 @@ def test_a_wrong_value_is_refused_with_its_place(path, value, below):
         ),
         ({"operator": {"replicas": 2, "leaderElection": False}}, "at '/operator/leaderElection'"),
         ({"tensorboard": {"enabled": True}}, "at '/tensorboard/existingClaim'"),
-        ({"jupyter": {"enabled": True, "image": "i"}}, "at '/jupyter/tokenSecret/name'"),
-        ({"jupyter": {"enabled": True, "tokenSecret": {"name": "t"}}}, "at '/jupyter/image'"),
+        ({"jupyter": {"enabled": True}}, "at '/jupyter/tokenSecret/name'"),
     ],
 )
 def test_values_that_do_not_go_together_are_refused(values, told):

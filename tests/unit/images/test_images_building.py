@@ -1,7 +1,7 @@
 """An image is built when its content is new, and only then."""
 
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
@@ -96,6 +96,17 @@ def test_a_changed_file_makes_another_archive(workshop, root, engine, changed):
 
     assert first.archive != second.archive
     assert len(engine.orders) == 2
+
+
+def test_a_changed_lock_of_its_own_makes_another_archive(workshop, root, engine):
+    """As one that all images share."""
+    recipe = replace(OPERATOR, extra="extra.lock")
+    (root / "extra.lock").write_text("# nothing is needed\n")
+    without = workshop.build(OPERATOR)
+    first = workshop.build(recipe)
+
+    assert first.archive != without.archive
+    assert [order.arguments.get("EXTRA") is None for order in engine.orders] == [True, False]
 
 
 def test_another_base_makes_another_archive(workshop, engine):

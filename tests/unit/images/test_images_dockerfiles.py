@@ -26,7 +26,12 @@ def recipe(request):
 
 @pytest.fixture
 def instructions(recipe):
-    """Return the Dockerfile as pairs of an instruction and its argument, comments and line ends removed."""
+    """Return the image's Dockerfile."""
+    return parsed(recipe)
+
+
+def parsed(recipe):
+    """Return a Dockerfile as pairs of an instruction and its argument, comments and line ends removed."""
     text = re.sub(r"^\s*#.*\n", "", (ROOT / recipe.dockerfile).read_text(), flags=re.MULTILINE)
     lines = re.sub(r"\\\n\s*", "", text).splitlines()
     return [tuple(line.split(maxsplit=1)) for line in lines if line.strip()]
@@ -63,11 +68,11 @@ def test_every_use_of_apt_is_without_recommendations_and_cleans_up(instructions)
 
 def test_packages_are_installed_by_hash_from_the_context_alone(instructions):
     """No index is asked in a build, so none has to be reachable, trusted or up to date."""
-    locked, ours = (run for run in values(instructions, "RUN") if "uv pip install" in run)
+    *locked, ours = (run for run in values(instructions, "RUN") if "uv pip install" in run)
 
-    assert all("--no-index" in run and "--no-cache" in run and "--no-deps" in run for run in (locked, ours))
-    assert "--require-hashes" in locked
-    assert "--requirements /context/requirements.txt" in locked
+    assert all("--no-index" in run and "--no-cache" in run and "--no-deps" in run for run in (*locked, ours))
+    assert all("--require-hashes" in run for run in locked)
+    assert "--requirements /context/requirements.txt" in locked[0]
     assert "/context/packages/*.whl" in ours
 
 
@@ -82,6 +87,14 @@ def test_what_changes_most_comes_last(instructions):
     order = [f"{instruction} {value}" for instruction, value in instructions]
 
     assert order.index("ARG REQUIREMENTS") < order.index("ARG PACKAGES") < order.index("ARG VERSION")
+
+
+def test_the_notebook_begins_with_the_layers_of_the_trainer():
+    """Debian's PyTorch and the trainer's libraries are 1.4 GB; what is equal is built and kept once."""
+    trainer, notebook = (parsed(recipes("debian")[name]) for name in ("trainer", "notebook"))
+    shared = next(n for n, pair in enumerate(trainer) if "/context/requirements.txt" in pair[1]) + 1
+
+    assert notebook[:shared] == trainer[:shared]
 
 
 def test_the_labels_say_what_is_inside(instructions, recipe):
@@ -109,7 +122,11 @@ def test_folders_with_the_version_of_python_are_those_of_the_lock():
 
 def linted(*options):
     """Return the rules that hadolint sees broken, by Dockerfile."""
-    files = [str(path.relative_to(ROOT)) for path in ROOT.glob("*/Dockerfile*")]
+    files = [
+        str(path.relative_to(ROOT))
+        for folders in ("*", "images/*")
+        for path in ROOT.glob(f"{folders}/Dockerfile*")
+    ]
     done = subprocess.run(
         [HADOLINT, "--no-fail", "--format=json", *options, *files],
         cwd=ROOT,

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tools.images.context import contents
 from tools.images.lock import parse, share
 from tools.images.recipes import project, recipes
 
@@ -102,6 +103,27 @@ def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
 
     assert holds <= chosen
     assert not lacks & chosen
+
+
+def test_what_the_notebook_has_besides_agrees_with_the_lock():
+    """It comes on top of the trainer's libraries, which must stay as they are tested."""
+    here, besides = (
+        {pin.name: pin.version for pin in parse(share(pins, [pin.name for pin in pins], "x86_64"))}
+        for pins in (LOCK, parse((ROOT / recipes("debian")["notebook"].extra).read_text()))
+    )
+    both = here.keys() & besides.keys()
+
+    assert "jupyterlab" in besides.keys() - here.keys()
+    assert {name: besides[name] for name in both} == {name: here[name] for name in both}
+
+
+def test_what_an_image_has_besides_is_nothing_that_it_has_already():
+    """Nothing is fetched twice, and no layer brings what one below it has."""
+    inside = contents(ROOT, recipes("debian")["notebook"], "x86_64")
+
+    assert names(inside.requirements.text)
+    assert names(inside.extra.text)
+    assert not names(inside.requirements.text) & names(inside.extra.text)
 
 
 def test_the_trainer_for_cuda_has_the_locked_torch_and_its_libraries():
