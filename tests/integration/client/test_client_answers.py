@@ -91,6 +91,25 @@ def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, mess
     assert line.endswith("; `palaestra doctor` tells which rights are missing") is hint
 
 
+@pytest.mark.parametrize(
+    ("answer", "code", "said"),
+    [
+        (reply(obj={"columnDefinitions": [], "rows": []}), 0, ""),
+        (refusal(404, "NotFound"), 1, "job trial: there is none in namespace robots"),
+    ],
+    ids=["there", "not there"],
+)
+def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
+    """The table that the API server makes is all that is shown."""
+    script, kubeconfig = server
+    script.calls = [answer]
+
+    assert main(["get", "trial", f"--kubeconfig={kubeconfig}"]) == code
+
+    assert len(script.of(watches=False)) == 1
+    assert said in capsys.readouterr().err
+
+
 def test_a_lease_that_is_given_back_has_no_leader(server):
     """The next change, by who takes it, is what shows that somebody leads."""
     script, kubeconfig = server

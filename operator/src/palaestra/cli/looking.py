@@ -7,7 +7,8 @@ from datetime import UTC, datetime
 from palaestra.api import validate
 from palaestra.cli.cluster import cluster_command, say
 from palaestra.cli.parsing import Commands
-from palaestra.client import Client
+from palaestra.client import Client, NoSuchJob
+from palaestra.cluster import NotFound
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 from palaestra.plan.text import as_yaml
@@ -72,9 +73,12 @@ def _get(client: Client, options: argparse.Namespace) -> int:
         raise PalaestraError("NAME: excludes -A and -l; leave it out, or them")
     namespace = None if options.all_namespaces else client.namespace
     if options.output in {None, "wide"}:
-        if options.name:
-            client.raw(options.name)  # tells in our words that there is none
-        table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
+        try:
+            table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
+        except NotFound as error:
+            if options.name is None:  # the kind itself is not there
+                raise
+            raise NoSuchJob.of(options.name, client.namespace) from error
         say(server_table(table, wide=options.output == "wide", namespaces=options.all_namespaces))
         return 0
     if options.name:

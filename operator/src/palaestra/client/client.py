@@ -102,7 +102,7 @@ class Client:
         try:
             return self.api.get(TRAINING_JOBS, self.namespace, name)
         except NotFound as error:
-            raise self._none(name) from error
+            raise NoSuchJob.of(name, self.namespace) from error
 
     def changes(self, name: str, *, deadline_s: float) -> Iterator[TrainingJob]:
         """Yield a job as it is, then after each change; ends when it has ended or was deleted.
@@ -119,7 +119,7 @@ class Client:
             if current(found) and found.status.phase in TERMINAL:
                 return
         if found is None:
-            raise self._none(name)
+            raise NoSuchJob.of(name, self.namespace)
 
     def statuses(self, name: str, *, deadline_s: float) -> Iterator[Status]:
         """Yield the status of a job as `changes` yields the job; raises the same."""
@@ -142,7 +142,7 @@ class Client:
                 return job
             if phase in TERMINAL:
                 raise EndedOtherwise(f"job {name}: is {phase}, not {until}: {why(job.status)}")
-        raise self._none(name)
+        raise NoSuchJob.of(name, self.namespace)
 
     def logs(
         self,
@@ -244,13 +244,7 @@ class Client:
         try:
             return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, {"spec": {"suspend": suspend}}))
         except NotFound as error:
-            raise self._none(name) from error
-
-    def _none(self, name: str) -> NoSuchJob:
-        return NoSuchJob(
-            f"job {name}: there is none in namespace {self.namespace}; "
-            "`palaestra get` lists those of a namespace, -A those of all"
-        )
+            raise NoSuchJob.of(name, self.namespace) from error
 
 
 def _data(job: TrainingJob | Mapping[str, Any] | Path) -> Any:

@@ -10,6 +10,8 @@ ClientError
 What the API server itself refuses is an ApiError (palaestra.cluster.errors).
 """
 
+from typing import Self
+
 from palaestra.errors import PalaestraError
 
 
@@ -19,6 +21,14 @@ class ClientError(PalaestraError):
 
 class NoSuchJob(ClientError, LookupError):
     """There is no such TrainingJob, or it was deleted meanwhile."""
+
+    @classmethod
+    def of(cls, name: str, namespace: str) -> Self:
+        """Return the error about a job of this name."""
+        return cls(
+            f"job {name}: there is none in namespace {namespace}; "
+            "`palaestra get` lists those of a namespace, -A those of all"
+        )
 
 
 class EndedOtherwise(ClientError):

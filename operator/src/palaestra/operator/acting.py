@@ -14,6 +14,7 @@ from palaestra.cluster import AlreadyExists, Api, ApiError, NotFound
 from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, PODS, TRAINING_JOBS, of
 from palaestra.decide import Action, Create, Delete, SetSuspend, Stop
 from palaestra.errors import PalaestraError
+from palaestra.observe.reading import owners
 from palaestra.operator.caches import Caches
 from palaestra.operator.denials import Denials, Denied
 from palaestra.operator.poller import Key
@@ -117,11 +118,23 @@ class Acting:
         except AlreadyExists:
             log.info("exists", job=key, kind=kind, name=name)
             if of(obj) == JOBS:
-                self._strangers.meet(key, name)
+                self._see_owner(key, obj)
             if of(obj) == CONFIG_MAPS:
                 self._see_content(key[0], obj)
             return
         log.info("applied", job=key, kind=kind, name=name)
+
+    def _see_owner(self, key: Key, obj: Object) -> None:
+        """See that a Job that is there is the TrainingJob's own, of which the cache has not heard yet.
+
+        Raises:
+            AlreadyExists: it is not, or is gone by now.
+        """
+        name = obj["metadata"]["name"]
+        found = self._strangers.meet(key, name)
+        if found is None or not owners(found) & owners(obj):
+            words = f"Job {name} is there already, and is not this job's; delete it"
+            raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _see_content(self, namespace: str, obj: Object) -> None:
         """See that a ConfigMap that is there holds what it should: pods would train whatever it says.

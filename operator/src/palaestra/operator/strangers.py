@@ -32,15 +32,16 @@ class Strangers:
         self._lock = threading.Lock()
         self._met: dict[Key, dict[str, tuple[float, Object]]] = {}
 
-    def meet(self, key: Key, name: str) -> None:
-        """Look at the Job that has a name which a TrainingJob needs."""
+    def meet(self, key: Key, name: str) -> Object | None:
+        """Return the Job that has a name which a TrainingJob needs, and remember it; None: it is gone."""
         try:
             found = self._api.get(JOBS, key[0], name)
         except NotFound:
             self._forget(key, name)
-            return
+            return None
         with self._lock:
             self._met.setdefault(key, {})[name] = (self._clock(), found)
+        return found
 
     def among(self, key: Key, known: Collection[str]) -> list[Object]:
         """Return the strangers in the way of a TrainingJob, as they were ten seconds ago at most.
