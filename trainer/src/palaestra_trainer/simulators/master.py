@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import sys
+from urllib.parse import urlsplit
 
 from palaestra_trainer.errors import MasterLost
 from palaestra_trainer.ros import Master
@@ -20,12 +20,9 @@ def ensure_master() -> None:
     try:
         Master("/palaestra").ping()
     except MasterLost:
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            port = free.getsockname()[1]
-        os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
-        os.environ["ROS_HOSTNAME"] = "localhost"
-        module = [sys.executable, "-m", "palaestra_trainer.simulators.own_master", str(port)]
-        if not first_line(start_child(module, stderr=subprocess.DEVNULL)):
-            raise MasterLost(
-                f"a ROS master could not be started on port {port}; start rosmaster by hand"
-            ) from None
+        module = [sys.executable, "-m", "palaestra_trainer.simulators.own_master"]
+        uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
+        if not uri.startswith("http://"):
+            raise MasterLost("a ROS master could not be started; start rosmaster by hand") from None
+        os.environ["ROS_MASTER_URI"] = uri
+        os.environ["ROS_HOSTNAME"] = urlsplit(uri).hostname or ""

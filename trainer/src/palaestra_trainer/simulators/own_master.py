@@ -1,6 +1,7 @@
-"""A ROS master that lives as long as the program that started it; `python -m` this module with a port.
+"""A ROS master that lives as long as the program that started it; `python -m` this module.
 
-It ends when its standard input closes, which the kernel sees to even when its owner is killed.
+It takes a free port and prints its URI. It ends when its standard input closes, which the kernel sees to
+even when its owner is killed.
 """
 
 from __future__ import annotations
@@ -14,17 +15,21 @@ from rosmaster.master import Master
 
 
 def main() -> None:
-    """Serve on loopback at the port given, until standard input closes."""
+    """Serve on loopback until standard input closes."""
     logging.basicConfig(level=logging.ERROR)
     os.environ["ROS_HOSTNAME"] = "localhost"
-    master = Master(int(sys.argv[1]))
+    # Watched from the start: rosmaster waits for its own server without an end.
+    owned = threading.Thread(target=_end_with_owner)
+    owned.start()
+    master = Master(0)
     master.start()
-    sys.stdout.write("ready\n")
+    sys.stdout.write(f"{master.uri}\n")
     sys.stdout.flush()
-    ended = threading.Thread(target=sys.stdin.read)
-    ended.start()
-    ended.join()
-    master.stop()
+    owned.join()
+
+
+def _end_with_owner() -> None:
+    sys.stdin.read()
     os._exit(0)  # the master's server threads know no end
 
 
