@@ -6,6 +6,8 @@ import pytest
 
 from palaestra_sim.stub.ros import LATER, Loop, RosNode, ServiceFailed
 
+DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
+
 
 class Peer:
     """A node whose services answer, fail, or never answer; it runs in a thread of its own."""
@@ -20,7 +22,7 @@ class Peer:
         self.node.serve("fail", "webots_ros/get_float", self._fail)
         self.node.serve("never", "webots_ros/get_float", lambda _: LATER)
         self.publisher = self.node.advertise("ir1/value", "sensor_msgs/Range")
-        self.thread = threading.Thread(target=self.loop.run)
+        self.thread = threading.Thread(target=self.loop.run, daemon=True)
         self.thread.start()
 
     def _double(self, request):
@@ -34,14 +36,14 @@ class Peer:
         """Run `action` in the node's thread and wait for its end."""
         done = threading.Event()
         self.loop.post(lambda: (action(), done.set()))
-        assert done.wait(5)
+        assert done.wait(DEADLINE_S)
 
     def end(self, last=None):
         """Stop the thread, after `last`, by default a close in good order."""
         if self.thread.is_alive():
             self.do(last or self.node.close)
             self.loop.post(self.loop.stop)
-            self.thread.join(5)
+            self.thread.join(DEADLINE_S)
             self.loop.close()
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_sim.world import RunIdentity, ros_name
+from tests.integration.sidecar.conftest import DEADLINE_S
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
 STANDARD = (1 << 31) - 1  # the signals that are not of real time
@@ -102,7 +103,7 @@ def test_a_sidecar_may_end_with_its_standard_input(arguments, waits) -> None:
 
         process.stdin.close()
 
-        assert process.wait(2) == 0
+        assert process.wait(DEADLINE_S) == 0
 
 
 def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:

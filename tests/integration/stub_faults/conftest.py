@@ -16,6 +16,7 @@ from palaestra_trainer.ros import Master, RosService
 from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.webots import Mode, Webots
 
+DEADLINE_S = 60.0  # of whatever ought to take moments, on a busy machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
 ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
@@ -79,7 +80,7 @@ class Player:
 
     def ended(self):
         """Return how the simulator ended, once it has: its exit code, or its signal."""
-        self.launcher.wait_stopped(5.0)
+        self.launcher.wait_stopped(DEADLINE_S)
         last = self.launcher.state().last_exit
         return last.code if last.signal is None else last.signal
 

@@ -2,17 +2,25 @@
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
-from palaestra_trainer.errors import SimulatorDead, SimulatorHung
+from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.ros import RosService
+from tests.integration.sidecar.conftest import eventually
+from tests.integration.stub_faults.conftest import DEADLINE_S
 
 
 def up(process):
     """Wait for the line that says that the controllers are up; the one about faults comes before it."""
     lines = iter(process.stderr.readline, "")
     assert any("arena.wbt: faulty_" in line for line in lines)
+
+
+def is_stopped(pid):
+    """Return whether a process was stopped by a signal."""
+    return "State:\tT" in Path(f"/proc/{pid}/status").read_text()
 
 
 @pytest.mark.parametrize(
@@ -97,7 +105,7 @@ def test_a_slow_start_can_be_ended_at_once(stub):
 
     process.send_signal(signal.SIGTERM)
 
-    assert process.wait(5) == 0
+    assert process.wait(DEADLINE_S) == 0
     assert not stub.registered()
 
 
@@ -106,13 +114,13 @@ def test_a_hanging_process_is_stopped_and_can_be_continued(player):
     played = player("hang:step=2")
     played.start()
     played.step()
-    step = RosService("/robotino/robot/time_step", "webots_ros/set_int", deadline_s=0.3)
-    with pytest.raises(SimulatorHung):
-        step(value=192)
+    step = RosService("/robotino/robot/time_step", "webots_ros/set_int", DEADLINE_S)
+    step.begin(value=192)
+    eventually(lambda: is_stopped(played.pid))
 
     os.kill(played.pid, signal.SIGCONT)
 
-    assert played.webots.available()
+    assert step.finish().success
     step.close()
 
 
@@ -216,5 +224,5 @@ def test_the_end_by_a_fault_leaves_no_core_file(stub, tmp_path):
     with pytest.raises(SimulatorDead):
         step(value=32)
 
-    assert process.wait(5) == -signal.SIGSEGV
+    assert process.wait(DEADLINE_S) == -signal.SIGSEGV
     assert [path.name for path in tmp_path.iterdir()] == ["arena.wbt"]

@@ -73,7 +73,7 @@ def test_a_killed_simulator_is_dead_and_comes_back_with_the_same_objects(arena):
     os.kill(arena.pid, signal.SIGKILL)
     with pytest.raises(SimulatorDead):
         arena.robot.advance()
-    arena.launcher.wait_stopped(5.0)
+    arena.launcher.wait_stopped(60.0)
 
     arena.webots()
     arena.webots.supervisor.set_mode(Mode.FAST)
