@@ -1,5 +1,6 @@
 """In which order tests run, on how many threads, and that no unit test is about time."""
 
+import gc
 import os
 
 import pytest
@@ -15,6 +16,11 @@ settings.load_profile("unhurried")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with what takes longest, so that no worker is left alone with it at the end."""
     items.sort(key=_minutes, reverse=True)
+
+
+def pytest_collection_finish() -> None:
+    """Let garbage collections pass over what is imported and collected by now: it stays, and it is much."""
+    gc.freeze()
 
 
 def _minutes(item: pytest.Item) -> float:

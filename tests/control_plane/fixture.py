@@ -15,12 +15,12 @@ from tests.control_plane.programs import REQUIRED, NoPrograms, programs
 
 
 @contextmanager
-def running_or_skipped(folder: Path) -> Iterator[ControlPlane]:
-    """Run a control plane in an empty folder until the block ends; skip the test where it cannot be."""
+def running_or_skipped(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane]:
+    """Run a control plane, as `running` does, until the block ends; skip the test where it cannot be."""
     if os.environ.get(REQUIRED) != "1":
         try:
             programs()
         except NoPrograms as error:
             pytest.skip(str(error))
-    with running(folder) as plane:
+    with running(folder, kinds=kinds) as plane:
         yield plane

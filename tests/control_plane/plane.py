@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.error import URLError
 
 from tests.control_plane.certificates import Authority, Pair
@@ -24,6 +25,16 @@ from tests.control_plane.programs import programs
 
 ADDRESS = "127.0.0.1"
 SERVICES = "198.19.0.0/24"  # a range for benchmarks: no route leads there
+# Each of the others would watch a handful of kinds, and ask for more, for nobody.
+CONTROLLERS = (
+    "job-controller",
+    "garbage-collector-controller",
+    "namespace-controller",
+    "serviceaccount-controller",  # a namespace without an account lets no pod in
+    "resourcequota-controller",
+    "clusterrole-aggregation-controller",  # gives `edit` and `view` what others add to them
+    "persistentvolumeclaim-protection-controller",  # lets claims go that the API server holds back
+)
 START_DEADLINE_S = 60
 STOP_DEADLINE_S = 10
 AUDIT = {
@@ -66,6 +77,11 @@ class ControlPlane:
         """A line of JSON for each request, with user, verb and object."""
         return self.folder / "audit.log"
 
+    def audit(self) -> list[dict[str, Any]]:
+        """Return what was asked so far, in order; the last line of the log may not be whole yet."""
+        lines = self.audit_log.read_bytes().splitlines(keepends=True)
+        return [json.loads(line) for line in lines if line.endswith(b"\n")]
+
     def kubectl(self, *arguments: str, sent: str = "") -> "subprocess.CompletedProcess[str]":
         """Run kubectl as the administrator, with `sent` as its standard input; 60 s at most."""
         return subprocess.run(
@@ -84,16 +100,17 @@ class ControlPlane:
 
 
 @contextmanager
-def running(folder: Path, *, controllers: bool = True) -> Iterator[ControlPlane]:
+def running(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane]:
     """Run a control plane with its files in `folder` until the block ends.
 
     Args:
         folder: exists and is empty.
-        controllers: whether Jobs get pods and garbage is collected.
+        kinds: a file of definitions that are there before the controllers, one of which looks for new kinds
+            every 30 s only: it collects the garbage.
 
     Raises:
         NoPrograms: the programs are not built.
-        DidNotStart: one of them did not come up in 60 s.
+        DidNotStart: one of them did not come up in 60 s, or the definitions are refused.
     """
     authority = Authority.create(folder)
     etcd_port, peer_port, port = free_ports(3)
@@ -109,9 +126,18 @@ def running(folder: Path, *, controllers: bool = True) -> Iterator[ControlPlane]
         processes.enter_context(started(folder, _etcd(plane, etcd_port, peer_port)))
         api_server = processes.enter_context(started(folder, _api_server(plane, etcd_port)))
         _wait_ready(plane, api_server)
-        if controllers:
-            processes.enter_context(started(folder, _controllers(plane)))
+        if kinds is not None:
+            _define(plane, kinds)
+        processes.enter_context(started(folder, _controllers(plane)))
         yield plane
+
+
+def _define(plane: ControlPlane, kinds: Path) -> None:
+    file = f"--filename={kinds}"
+    for command in (("apply", "--server-side"), ("wait", "--for=condition=Established", "--timeout=30s")):
+        done = plane.kubectl(*command, file)
+        if done.returncode:
+            raise DidNotStart(f"{kinds}: {done.stderr}")
 
 
 def _etcd(plane: ControlPlane, port: int, peer_port: int) -> list[str]:
@@ -162,6 +188,7 @@ def _controllers(plane: ControlPlane) -> list[str]:
         f"--service-account-private-key-file={plane.folder / 'service-accounts.key'}",
         f"--root-ca-file={plane.authority.pair.certificate}",
         "--use-service-account-credentials",
+        f"--controllers={','.join(CONTROLLERS)}",
         "--leader-elect=false",
         f"--bind-address={ADDRESS}",
         "--secure-port=0",

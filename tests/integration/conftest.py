@@ -2,18 +2,19 @@
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from palaestra.cluster import Api, NotFound, Resource, connect
-from palaestra.cluster.resources import TRAINING_JOBS
+from palaestra.cluster import Api, Resource, connect
 from palaestra_trainer.simulators.master import ensure_master
 from tests.chart.installation import installed as installation
 from tests.control_plane.fixture import running_or_skipped
 from tests.control_plane.plane import ControlPlane
-from tests.integration.operator.cluster import Place, eventually
+from tests.integration.operator.cluster import Place, eventually, served
 
-UNNAMESPACED = {"Namespace", "CustomResourceDefinition", "ClusterRole", "ClusterRoleBinding"}
+KINDS = Path(__file__).parents[2] / "manifests" / "crd.yaml"
+UNNAMESPACED = {"Namespace", "ClusterRole", "ClusterRoleBinding"}
 PLURALS = {"NetworkPolicy": "networkpolicies"}
 
 
@@ -28,8 +29,11 @@ def master() -> str:
 
 @pytest.fixture(scope="session")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
-    """A control plane without nodes for all tests of a worker: each uses a namespace of its own."""
-    with running_or_skipped(tmp_path_factory.mktemp("control-plane")) as plane:
+    """A control plane without nodes for all tests of a worker: each uses a namespace of its own.
+
+    It knows TrainingJobs from the start.
+    """
+    with running_or_skipped(tmp_path_factory.mktemp("control-plane"), kinds=KINDS) as plane:
         yield plane
 
 
@@ -38,7 +42,7 @@ def installed(control_plane: ControlPlane) -> Iterator[Api]:
     """An administrator's client, once everything of install.yaml but the Deployment is there."""
     api = connect(str(control_plane.kubeconfig))
     for obj in installation():
-        if obj["kind"] != "Deployment":
+        if obj["kind"] not in {"Deployment", "CustomResourceDefinition"}:
             kind = obj["kind"]
             resource = Resource(
                 api_version=obj["apiVersion"],
@@ -47,7 +51,7 @@ def installed(control_plane: ControlPlane) -> Iterator[Api]:
                 namespaced=kind not in UNNAMESPACED,
             )
             api.create(resource, obj)
-    eventually(lambda: _served(api))
+    eventually(lambda: served(api))
     yield api
     api.close()
 
@@ -56,11 +60,3 @@ def installed(control_plane: ControlPlane) -> Iterator[Api]:
 def place(installed: Api) -> Place:
     """A namespace of the test's own."""
     return Place(installed)
-
-
-def _served(api: Api) -> bool:
-    try:
-        api.list(TRAINING_JOBS)
-    except NotFound:
-        return False
-    return True

@@ -15,6 +15,11 @@ from tests.control_plane.programs import REQUIRED, NoPrograms, programs
 
 DEFINITION = "trainingjobs.palaestra.dev"  # left by tests that need no more of Palaestra
 NAMESPACES = (NAMESPACE, "robots", "drones")
+# Of dozens that these projects have, which are megabytes that an API server takes seconds to read.
+KINDS = (
+    (PROMETHEUS, "monitoring.coreos.com", ("podmonitors", "prometheusrules", "servicemonitors")),
+    (KUEUE, "kueue.x-k8s.io", ("clusterqueues", "localqueues", "resourceflavors")),
+)
 Kubectl = Callable[..., str]
 
 
@@ -39,16 +44,20 @@ def kubectl(control_plane: ControlPlane) -> Kubectl:
 
 @pytest.fixture(scope="module")
 def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
-    """The control plane with Prometheus' and Kueue's kinds."""
+    """The control plane with those of Prometheus' and Kueue's kinds that the chart and the examples use."""
     try:
-        folders = [definitions(*each) for each in (PROMETHEUS, KUEUE)]
+        files = [
+            f"--filename={definitions(*module)}/{group}_{kind}.yaml"
+            for module, group, kinds in KINDS
+            for kind in kinds
+        ]
         programs(("helm",))
     except NoPrograms as error:
         if os.environ.get(REQUIRED) == "1":
             raise
         pytest.skip(str(error))
-    for folder in folders:
-        kubectl("apply", "--server-side", "-f", str(folder))
+    kubectl("apply", "--server-side", *files)
+    kubectl("wait", "--for=condition=Established", "--timeout=30s", *files)
     return control_plane
 
 

@@ -12,7 +12,7 @@ from tests.chart import installation
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
 from tests.chart.modes import MODES
 from tests.integration.chart.conftest import DEFINITION
-from tests.integration.operator.cluster import eventually, training_job
+from tests.integration.operator.cluster import eventually, served, training_job
 from tests.integration.operator.operators import RunningOperator
 
 
@@ -54,15 +54,10 @@ def short_names(api):
     return api.get(DEFINITIONS, None, DEFINITION)["spec"]["names"]["shortNames"]
 
 
-def served(api):
-    """Return once TrainingJobs can be made."""
-    eventually(lambda: api.serves("palaestra.dev/v1alpha1"))
-
-
 def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older, api):
     """Helm never upgrades what lies in crds/, so the definition is a template."""
     release("install", "palaestra", chart=older)
-    served(api)
+    eventually(lambda: served(api))
     made = api.create(TRAINING_JOBS, _in("robots", training_job("runs")))
     assert short_names(api) == ["old"]
 
@@ -75,7 +70,7 @@ def test_an_upgrade_brings_the_new_definition_and_touches_no_job(release, older,
 def test_the_end_of_a_release_leaves_the_jobs(release, api):
     """Deleting the definition would delete every TrainingJob of the cluster."""
     release("install", "palaestra")
-    served(api)
+    eventually(lambda: served(api))
     api.create(TRAINING_JOBS, _in("robots", training_job("stays")))
 
     release("uninstall", "palaestra")
@@ -98,7 +93,7 @@ def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
 ):
     """With the rights of such an installation, which hold for two namespaces."""
     release("install", "palaestra", values={**MODES["namespaced"], "crds": {"install": True}})
-    served(api)
+    eventually(lambda: served(api))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-operator"
     operator = RunningOperator(
         cluster.kubeconfig_of(account, "system:serviceaccounts"),
@@ -115,7 +110,7 @@ def test_a_namespaced_operator_looks_after_its_namespaces_and_asks_for_no_other(
 
         assert "status" not in api.get(TRAINING_JOBS, "default", "trains")
         assert operator.said("watch broken") == []
-        assert pending(operator.ask("/metrics")) == 2
+        eventually(lambda: pending(operator.ask("/metrics")) == 2)  # once it has seen what it wrote
     finally:
         operator.kill()
 
@@ -133,7 +128,7 @@ def _in(namespace, job):
 def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(release, cluster, kubectl, api):
     """`helm test` where no operator runs: it ends in time, tells what to look at, and leaves nothing."""
     release("install", "palaestra")
-    served(api)
+    eventually(lambda: served(api))
     rights = [each for each in objects(tests=True) if each["kind"] in {"Role", "RoleBinding"}]
     kubectl("apply", "--server-side", "-f", "-", sent=yaml.safe_dump_all(rights))
     account = f"system:serviceaccount:{NAMESPACE}:palaestra-test"
@@ -150,7 +145,7 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
 def test_helm_takes_over_what_kubectl_has_installed(release, kubectl, api):
     """Objects that kubectl made are kept, down to the definition and its jobs."""
     kubectl("apply", "-f", str(installation.PATH))
-    served(api)
+    eventually(lambda: served(api))
     made = api.create(TRAINING_JOBS, _in("robots", training_job("before")))
 
     release("install", "palaestra", "--take-ownership")

@@ -48,6 +48,15 @@ def eventually(seen: Callable[[], Any], deadline_s: float = DEADLINE_S) -> Any:
     return found
 
 
+def served(api: Api) -> bool:
+    """Return whether TrainingJobs can be made; discovery may still tell of a definition that is gone."""
+    try:
+        api.list(TRAINING_JOBS)
+    except NotFound:
+        return False
+    return True
+
+
 def training_job(name: str = "job", **spec: Any) -> Object:
     """Return a TrainingJob; keywords are fields of its spec."""
     return {

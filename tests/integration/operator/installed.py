@@ -1,6 +1,5 @@
 """An operator as a process, with the rights of an installed one, and what it asked of the API server."""
 
-import json
 import signal
 import socket
 import subprocess
@@ -79,19 +78,17 @@ class Installed:
 def asked(plane: ControlPlane) -> list[Asked]:
     """Return all that any operator ever asked, watches and the Lease included, in order."""
     found = []
-    for line in plane.audit_log.read_text().splitlines():
-        with suppress(json.JSONDecodeError):  # the last line may not be whole yet
-            entry = json.loads(line)
-            if entry["user"].get("username") == USER and entry["stage"] == "ResponseComplete":
-                what = entry.get("objectRef") or {}
-                found.append(
-                    Asked(
-                        verb=entry["verb"],
-                        resource=what.get("resource", entry["requestURI"]),
-                        name=what.get("name", ""),
-                        code=entry["responseStatus"]["code"],
-                    )
+    for entry in plane.audit():
+        if entry["user"].get("username") == USER and entry["stage"] == "ResponseComplete":
+            what = entry.get("objectRef") or {}
+            found.append(
+                Asked(
+                    verb=entry["verb"],
+                    resource=what.get("resource", entry["requestURI"]),
+                    name=what.get("name", ""),
+                    code=entry["responseStatus"]["code"],
                 )
+            )
     return found
 
 

@@ -42,8 +42,9 @@ class RunningOperator:
             )
 
     def lines(self) -> list[dict[str, Any]]:
-        """Return its log lines."""
-        return [json.loads(line) for line in self._log.read_text().splitlines()]
+        """Return its log lines, but for one that is being written."""
+        lines = self._log.read_bytes().splitlines(keepends=True)
+        return [json.loads(line) for line in lines if line.endswith(b"\n")]
 
     def said(self, event: str) -> list[dict[str, Any]]:
         """Return its log lines with a message."""

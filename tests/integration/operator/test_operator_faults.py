@@ -1,6 +1,5 @@
 """An operator may be killed at any write, be there twice, or be replaced: the end is the same."""
 
-import json
 import threading
 import time
 
@@ -21,8 +20,7 @@ LEASE_S = 15.0
 def creations(control_plane, namespace):
     """Return how many objects of each kind were created in a namespace, by whomever."""
     counts = {}
-    for line in control_plane.audit_log.read_text().splitlines():
-        event = json.loads(line)
+    for event in control_plane.audit():
         target = event.get("objectRef", {})
         made = event["verb"] == "create" and event.get("responseStatus", {}).get("code") == 201
         if made and target.get("namespace") == namespace and "subresource" not in target:

@@ -25,7 +25,7 @@ def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
     assert place.condition("Succeeded")["status"] == "True"
     assert status["successRate"] == 0.9
     assert status["step"] == 20
-    assert {"Accepted", "Succeeded"} <= place.events()
+    assert eventually(lambda: {"Accepted", "Succeeded"} <= place.events())  # told once the status is written
 
 
 def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(place, start):
@@ -123,6 +123,7 @@ def test_a_name_that_is_taken_is_told_and_the_job_starts_when_it_is_free(place, 
     place.train()
     eventually(lambda: "NameTaken" in str(place.status()))
     assert place.get(JOBS, "job-0")["metadata"].get("ownerReferences") is None
+    assert "Job job-0" not in str([each["message"] for each in place.about() if each["reason"] == "Planned"])
     place.api.delete(JOBS, place.name, "job-0")
 
     assert place.pods()

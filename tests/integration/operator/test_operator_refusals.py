@@ -38,8 +38,13 @@ def test_pods_that_are_refused_are_told_in_the_words_of_the_api_server(place, st
 
     place.train()
 
-    eventually(lambda: place.status().get("replicas", [{}])[0].get("reason") == "PodsRefused")
-    assert "exceeded quota: none-left" in place.status()["replicas"][0]["message"]
+    [replica] = eventually(lambda: [it for it in place.status().get("replicas", ()) if refused(it)])
+    assert "exceeded quota: none-left" in replica["message"]
+
+
+def refused(replica):
+    """Whether a status says of a replica that its pods are refused."""
+    return replica.get("reason") == "PodsRefused"
 
 
 def test_a_claim_that_is_refused_is_told_and_made_when_there_is_room(place, start):

@@ -21,6 +21,12 @@ from palaestra_sim.protocol.status import SimulatorStatus, Termination, TrainerS
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
+# As small as can be: no decision depends on a world's content, and each makes the worlds of what is missing.
+WORLD = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
+GROUPS = (
+    {"name": "collect", "role": "Collect", "world": WORLD},
+    {"name": "evaluate", "role": "Evaluate", "world": WORLD},
+)
 LISTS = {
     "Job": "jobs",
     "ConfigMap": "config_maps",
@@ -37,7 +43,7 @@ class Scene:
             "apiVersion": "palaestra.dev/v1alpha1",
             "kind": "TrainingJob",
             "metadata": {"name": "job", "namespace": "default", "uid": UID, "generation": 1},
-            "spec": spec,
+            "spec": {"simulators": list(GROUPS), **spec},
         }
         self.now = START
         self.layout = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))

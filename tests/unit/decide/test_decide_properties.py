@@ -19,6 +19,7 @@ from palaestra_sim.protocol.status import (
     Termination,
     TrainerStatus,
 )
+from tests.unit.decide.conftest import GROUPS
 
 LAYOUT = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
@@ -213,7 +214,12 @@ def clusters(draw, planned):
     )
 
 
-SPEC = {"replicas": 2, "activeDeadlineSeconds": 900, "ttlSecondsAfterFinished": 600}
+SPEC = {
+    "replicas": 2,
+    "simulators": list(GROUPS),
+    "activeDeadlineSeconds": 900,
+    "ttlSecondsAfterFinished": 600,
+}
 
 
 def raw(status=None):

@@ -115,7 +115,7 @@ def test_a_trainer_that_drips_does_not_hold_the_others_up():
     silent = threading.Event()
     with trainer(OK + BODY[:20], silent) as slow, trainer(OK + BODY) as quick:
         targets = [slow, Target(key=JOB, uid="quick", host=quick.host, port=quick.port)]
-        with polling(*targets, deadline_s=0.2) as (poller, finished):
+        with polling(*targets, deadline_s=1.0) as (poller, finished):
             finished(1)
 
             assert set(poller.known()) == {"quick"}
