@@ -9,6 +9,9 @@ SOURCES := operator/src trainer/src sim_image/src
 JOB := manifests/examples/move-to-target.yaml
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 
+# Bytecode is kept, whatever the surroundings say: else every process compiles PyTorch and all else anew, for seconds.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup run test check e2e images cluster cluster-down format bench soak golden lock
 
 help: ## list the verbs
@@ -26,11 +29,26 @@ run: setup ## train move-to-target on this machine, from a TrainingJob to a poli
 test: setup ## run every test; also that generated files are current
 	@$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder
 
+# Side by side, what takes longest first; each prints as a whole, and all are told that fail.
+CHECKS := check-mypy check-pyright check-lint check-format check-imports
+.PHONY: $(CHECKS)
+
 check: setup ## lint, format, types and the allowed imports
-	@$(BIN)/ruff check
-	@$(BIN)/ruff format --check --quiet
+	@$(MAKE) --no-print-directory --jobs=2 --keep-going --output-sync $(CHECKS)
+
+check-mypy:
 	@$(BIN)/mypy
+
+check-pyright:
 	@$(BIN)/pyright --warnings
+
+check-lint:
+	@$(BIN)/ruff check
+
+check-format:
+	@$(BIN)/ruff format --check --quiet
+
+check-imports:
 	@$(BIN)/lint-imports
 
 e2e: setup ## test the operator on a real cluster, which is made for it and taken away again
@@ -61,4 +79,5 @@ golden: setup ## record the plans of the examples and other generated files anew
 
 lock: setup ## resolve the dependencies again, within the bounds of the pyproject files
 	@$(COMPILE) --no-emit-package palaestra-sim --group dev $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
+	@$(COMPILE) --group notebook --constraint requirements.lock -o images/notebook/requirements.lock
 	@$(COMPILE) --group checkov -o tests/chart/checkov.lock

@@ -166,8 +166,11 @@ class LocalRun:
         ]
 
     def pid_of(self, program, simulator=""):
-        """Return the one process of a program, that serves one simulator if it is named."""
-        (pid,) = self.pids(program, simulator)
+        """Return the one process of a program, that serves one simulator if it is named.
+
+        A simulator that is recycled just now is waited for.
+        """
+        (pid,) = self.until(lambda: self.pids(program, simulator))
         return pid
 
     def trainer(self):

@@ -6,18 +6,22 @@ import signal
 from tests.local_run import LocalRun
 from tests.soak import resume
 
+STEPS = 900  # `make soak` takes more
+
 
 def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, monkeypatch):
     """Bit for bit: its trainer is asked to end at a third; `make soak` does this for every algorithm."""
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    job = resume.job("DQN", 1)
+    job["spec"]["trainer"]["steps"] = STEPS
     for name in ("whole", "parts"):
         (tmp_path / name).mkdir()
-    whole, parts = (LocalRun(tmp_path / name, resume.job("DQN", 1)) for name in ("whole", "parts"))
+    whole, parts = (LocalRun(tmp_path / name, job) for name in ("whole", "parts"))
     with whole:
         whole.end()
 
     with parts:
-        parts.wait_for_step(resume.STEPS // 3)
+        parts.wait_for_step(STEPS // 3)
         os.kill(parts.trainer(), signal.SIGTERM)
         code, output = parts.end()
 

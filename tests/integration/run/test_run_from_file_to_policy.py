@@ -7,67 +7,163 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from palaestra_sim.world import robots
 from palaestra_trainer.ros.master import Master
-from tests.local_run import is_running
+from tests.local_run import EXAMPLES, LocalRun, is_running
+from tests.soak.jobs import example
 
-EXAMPLES = Path(__file__).parents[3] / "manifests/examples"
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 FEW = {
     "steps": 600,
     "evaluation": {"everySteps": 300, "episodes": 2},
     "checkpoint": {"everySteps": 200, "keep": 2},
 }
+GONE_S = 10.0
 
 
-@pytest.mark.parametrize("example", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
-def test_every_example_runs(run, example):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finished:
+    """A run to its end, the simulator that it collects with killed on the way."""
+
+    run: LocalRun
+    code: int
+    output: str
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """One run for the tests of what a run comes to."""
+    job = example("move-to-target")
+    job["spec"]["trainer"].update(FEW | {"steps": 1000})  # many enough to be met amid them
+    with LocalRun(tmp_path_factory.mktemp("finished"), job) as run:
+        run.wait_for_step(200)
+        os.kill(run.pid_of("palaestra-stub", "collect-0"), signal.SIGKILL)
+        code, output = run.end()
+    return Finished(run=run, code=code, output=output)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Unplugged:
+    """What there was of a run amid its training, and of its processes after its runner was killed.
+
+    Attributes:
+        nodes: the robots that the ROS master knew.
+        named: the robots of its generated worlds.
+        pids: every process below the runner.
+        left: those that stayed.
+    """
+
+    nodes: set[str]
+    named: set[str]
+    pids: list[int]
+    left: list[int]
+
+
+@pytest.fixture(scope="module")
+def unplugged(tmp_path_factory):
+    """One run, with two simulators in a group, for the tests of what is there while it trains."""
+    job = example("two-collectors")
+    job["spec"]["trainer"].update(FEW | {"steps": 50_000})
+    run = LocalRun(tmp_path_factory.mktemp("unplugged"), job)
+    with ExitStack() as stack:
+        stack.callback(run.stop)
+        run.start("-v")
+        run.wait_for_step(100)
+        nodes = registered(run)
+        worlds = sorted((run.directory / "worlds").glob("*.wbt"))
+        pids = [pid for pid, _ in run.processes()]
+        run.process.kill()
+        run.end()
+    return Unplugged(
+        nodes=nodes,
+        named={f"/{robot.ros_name}" for world in worlds for robot in robots(world.read_bytes())},
+        pids=pids,
+        left=left_of(pids),
+    )
+
+
+def registered(run):
+    """Return the names of the robots that the ROS master of a run knows; the run tells where it is."""
+    master = Master("/test")
+    master.uri = re.search("ROS_MASTER_URI=(.+)", run.output())[1]
+    return {name for name in master.node_names() if "robotino" in name}
+
+
+def left_of(pids):
+    """Return those processes that do not end in time."""
+    give_up = time.monotonic() + GONE_S
+    while any(map(is_running, pids)) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    return [pid for pid in pids if is_running(pid)]
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
+def test_every_example_runs(run, name):
     """With few steps here; what people copy must work."""
-    code, output = run(example, **FEW).start().end()
+    code, output = run(name, **FEW).start().end()
 
     assert code == 0, output
     assert "success rate" in output
 
 
-def test_each_simulator_has_a_legal_name_of_its_own(run):
+def test_each_simulator_has_a_legal_name_of_its_own(unplugged):
     """What `rosnode list` shows, and what stands in the generated worlds of the run directory."""
-    training = run("two-collectors", **FEW | {"steps": 50_000}).start("-v")
-    training.wait_for_step(100)
-
-    master = Master("/test")
-    master.uri = re.search("ROS_MASTER_URI=(.+)", training.output())[1]
-    nodes = {name for name in master.node_names() if "robotino" in name}
-
-    worlds = sorted((training.directory / "worlds").glob("*.wbt"))
-    named = {f"/{robot.ros_name}" for world in worlds for robot in robots(world.read_bytes())}
-    assert len(nodes) == 3
-    assert nodes == named
+    assert len(unplugged.nodes) == 3
+    assert unplugged.nodes == unplugged.named
 
 
-def test_a_killed_simulator_is_one_fault_and_training_goes_on(run):
+def test_after_a_sigkill_of_the_runner_nothing_is_left(unplugged):
+    """Pulling the plug on the runner must not leave simulators behind."""
+    assert len(unplugged.pids) >= 8
+    assert unplugged.left == []
+
+
+def test_a_killed_simulator_is_one_fault_and_training_goes_on(finished):
     """It alone is restarted; the run ends as if nothing had been."""
-    training = run(**FEW | {"steps": 1500}).start()
-    training.wait_for_step(200)
-
-    os.kill(training.pid_of("palaestra-stub", "collect-0"), signal.SIGKILL)
-    code, output = training.end()
-
-    assert code == 0, output
-    assert training.summary()["steps"] == 1500
-    assert training.summary()["faults"] == 1
-    assert "faults            1" in output
+    assert finished.code == 0, finished.output
+    assert finished.run.summary()["steps"] == 1000
+    assert finished.run.summary()["faults"] == 1
+    assert "faults            1" in finished.output
 
 
-@pytest.mark.parametrize(("example", "steps"), [("move-to-target", 3000), ("two-collectors", 9000)])
-def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(run, example, steps):
+def test_a_finished_run_is_reported_and_not_repeated(finished):
+    """A second `make run` says what there is, in seconds."""
+    before = (finished.run.directory / "attempts.jsonl").read_text()
+
+    code, output = finished.run.start().end()
+
+    assert code == 0
+    assert "finished already; --fresh begins anew" in output
+    assert (finished.run.directory / "attempts.jsonl").read_text() == before
+
+
+def test_a_policy_can_be_measured_afterwards(finished):
+    """As the runner says at its end."""
+    result = subprocess.run(
+        [EVAL, finished.run.directory, "--episodes", "3"],
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=True,
+    )
+
+    assert json.loads(result.stdout)["episodes"] == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "asked_at", "steps"), [("move-to-target", 500, 1500), ("two-collectors", 1500, 3000)]
+)
+def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(run, name, asked_at, steps):
     """DQN exactly at its steps, PPO at its rollout boundary, as without the interruption."""
     wanted = FEW | {"steps": steps, "evaluation": {"everySteps": 0}}
-    training = run(example, **wanted).start()
-    training.wait_for_step(steps // 3)
+    training = run(name, **wanted).start()
+    training.wait_for_step(asked_at)
     training.process.send_signal(signal.SIGINT)
     code, output = training.end()
     saved = max(int(folder.name) for folder in (training.directory / "checkpoints").iterdir())
@@ -79,46 +175,5 @@ def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(run, example, s
     assert code == 0, output
     assert f"resumed at step {saved}" in training.log()
     # Two simulators with 512 steps each, as the example says.
-    rollout = 2 * 512 if example == "two-collectors" else 1
+    rollout = 2 * 512 if name == "two-collectors" else 1
     assert training.summary()["steps"] == -(-steps // rollout) * rollout
-
-
-def test_a_finished_run_is_reported_and_not_repeated(run):
-    """A second `make run` says what there is, in seconds."""
-    run_ = run(**FEW)
-    run_.start().end()
-    before = (run_.directory / "attempts.jsonl").read_text()
-
-    code, output = run_.start().end()
-
-    assert code == 0
-    assert "finished already; --fresh begins anew" in output
-    assert (run_.directory / "attempts.jsonl").read_text() == before
-
-
-def test_after_a_sigkill_of_the_runner_nothing_is_left(run):
-    """Pulling the plug on the runner must not leave simulators behind."""
-    training = run(**FEW | {"steps": 50_000}).start()
-    training.wait_for_step(50)
-    pids = [pid for pid, _ in training.processes()]
-
-    training.process.kill()
-    training.end()
-
-    assert len(pids) >= 8
-    give_up = time.monotonic() + 10
-    while any(map(is_running, pids)) and time.monotonic() < give_up:
-        time.sleep(0.05)
-    assert [pid for pid in pids if is_running(pid)] == []
-
-
-def test_a_policy_can_be_measured_afterwards(run):
-    """As the runner says at its end."""
-    training = run(**FEW)
-    training.start().end()
-
-    result = subprocess.run(
-        [EVAL, training.directory, "--episodes", "3"], capture_output=True, text=True, timeout=100, check=True
-    )
-
-    assert json.loads(result.stdout)["episodes"] == 3

@@ -1,52 +1,89 @@
 """`palaestra run` of a job whose simulators have a spare."""
 
-import os
-import signal
+from dataclasses import dataclass
 
-import yaml
+import pytest
 
-WITHOUT_EVALUATION = {"evaluation": {"everySteps": 0}, "checkpoint": {"everySteps": 5000, "keep": 2}}
+from tests.local_run import is_running, running
+from tests.soak import recovery
+from tests.soak.jobs import LITTLE_DQN, make_job
+
+SELDOM = {"evaluation": {"everySteps": 500_000, "episodes": 1}, "checkpoint": {"everySteps": 500_000}}
+READY = {"collect-0": "ready", "collect-1": "ready", "evaluate-0": None}
 
 
-def spares(status):
-    """Return the state of each simulator's spare by its name."""
-    return {each["name"]: each["standby"] for each in status["simulators"]}
+def job(steps, **collect):
+    """Return a job of two simulators with spares, and one that evaluates without."""
+    pair = {"count": 2, "standby": True} | collect
+    return make_job(collect=pair, algorithm=LITTLE_DQN, steps=steps, **SELDOM)
 
 
-def test_a_killed_simulator_is_replaced_by_its_spare_and_becomes_the_next_one(run):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replaced:
+    """What came of a simulator that was killed while its spare stood by.
+
+    Attributes:
+        waited: whether the one that is played in now stood by when it was killed.
+        faults: of the run, by kind.
+        took_over: what the trainer's log says of it.
+        spares: what the first place of the pair, which was killed, runs again.
+        left: the simulators that stayed after the run's end.
+    """
+
+    waited: bool
+    faults: dict[str, int]
+    took_over: list[str]
+    spares: list[int]
+    left: list[int]
+
+
+@pytest.fixture(scope="module")
+def replaced():
+    """One run that goes on after the fault until all of its spares are ready again."""
+    with running(job(1_000_000, recycle={"afterResets": 0})) as run:
+        run.wait_for_step(recovery.WARM_STEPS)
+        run.until(lambda: recovery.is_ready(run, standby=True), recovery.SPARE_READY_S)
+        stood_by = run.pids("palaestra-stub", recovery.SIMULATOR)
+        recovery.recovery(run, standby=True)
+        run.until(lambda: {each["name"]: each["standby"] for each in run.ask()["simulators"]} == READY)
+        waited = recovery.in_use(run) in stood_by
+        faults, log = run.faults(), run.log().splitlines()
+        simulators, spares = run.pids("palaestra-stub"), run.pids("palaestra-stub", "collect-0.wbt")
+        run.stop()
+        left = [pid for pid in simulators if is_running(pid)]
+    return Replaced(
+        waited=waited,
+        faults=faults,
+        took_over=[line for line in log if "took over" in line],
+        spares=spares,
+        left=left,
+    )
+
+
+def test_a_crash_waits_for_no_start(replaced):
+    """It costs what a recycled simulator costs: next to nothing, as `make soak` measures."""
+    assert replaced.waited
+
+
+def test_a_killed_simulator_is_replaced_by_its_spare_and_becomes_the_next_one(replaced):
     """One fault, no wait for a start, and the ROS name tells which of the two is played in."""
-    training = run("standby", steps=100_000, **WITHOUT_EVALUATION)
-    training.start().wait_for_step(50)
-    training.until(lambda: spares(training.ask())["collect-0"] == "ready")
-
-    os.kill(training.pid_of("palaestra-stub", "collect-0.wbt"), signal.SIGKILL)
-    training.until(lambda: training.ask()["faults"].get("dead"))
-    (took_over,) = training.until(
-        lambda: [each for each in training.log().splitlines() if "took over" in each]
-    )
-    training.wait_for_step(training.ask()["step"] + 50)
-    training.until(
-        lambda: (
-            spares(training.ask())
-            == dict.fromkeys(["collect-0", "collect-1"], "ready") | {"evaluate-0": None}
-        )
-    )
+    (took_over,) = replaced.took_over
 
     assert "_0b_robotino_" in took_over
-    assert len(training.pids("palaestra-stub", "collect-0.wbt")) == 1
-    training.stop()
-    assert training.pids("palaestra-stub") == []
+    assert replaced.faults == {"dead": 1}
+    assert len(replaced.spares) == 1
 
 
-def test_simulators_with_a_spare_are_recycled_without_a_fault(run):
-    """Often here: every second episode of each."""
-    training = run("standby", steps=800, **WITHOUT_EVALUATION)
-    job = yaml.safe_load(training.file.read_text())
-    job["spec"]["simulators"][0]["recycle"] = {"afterResets": 2}
-    training.file.write_text(yaml.safe_dump(job))
+def test_spares_end_with_their_run(replaced):
+    """As every simulator."""
+    assert replaced.left == []
 
-    code, output = training.start().end()
 
-    assert code == 0, output
-    assert training.summary()["faults"] == 0
-    assert training.log().count("standby took over") >= 2
+def test_simulators_with_a_spare_are_recycled_without_a_fault():
+    """Often here: every fourth episode of each."""
+    with running(job(800, recycle={"afterResets": 4})) as run:
+        code, output = run.end()
+
+        assert code == 0, output
+        assert run.summary()["faults"] == 0
+        assert run.log().count("standby took over") >= 2

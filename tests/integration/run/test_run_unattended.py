@@ -9,6 +9,8 @@ import os
 import random
 import re
 import signal
+from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
@@ -29,6 +31,50 @@ def test_every_fault_that_the_stub_knows_has_its_line_in_the_table_of_what_follo
     assert [fault for fault, _, _ in kinds.rows()] == known
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Troubled:
+    """What came of the troubles of one run, in their order.
+
+    Attributes:
+        resumed: whether it went on from its newest checkpoint, killed while it wrote another.
+        ended: how it ended when it was asked to, as `kills.end` tells.
+        code: that of the trainer that lost its ROS master.
+        again: why the attempt after that began.
+        survived: whether it did without the newest checkpoint, whose networks are damaged.
+    """
+
+    resumed: bool
+    ended: dict[str, Any]
+    code: int
+    again: str
+    survived: bool
+
+
+@pytest.fixture(scope="module")
+def troubled():
+    """One run: each trouble finds what the one before has left, as in a run of days."""
+    moments = random.Random(0)
+    with running(kills.job()) as run:
+        run.until(run.checkpoints)
+        kills.kill(run, moments, while_saving=True)
+        resumed = kills.resumes(run)
+        ended = kills.end(run, moments, hung=True)
+        kills.goes_further(run)
+        code, again = lose_the_master(run)
+        run.stop()
+        survived = damage.is_survived(run, "model.zip", damage.flip)
+    return Troubled(resumed=resumed, ended=ended, code=code, again=again, survived=survived)
+
+
+def lose_the_master(run):
+    """Kill the ROS master; return the trainer's exit code, and why it began again."""
+    ends, attempts = len(kills.ENDED.findall(run.output())), len(run.attempts())
+    os.kill(run.pid_of("rosmaster"), signal.SIGKILL)
+    (code,) = run.until(lambda: kills.ENDED.findall(run.output())[ends:])
+    (again,) = run.until(lambda: run.attempts()[attempts:])
+    return int(code), again
+
+
 @pytest.mark.parametrize("algorithm", [LITTLE_DQN, LITTLE_PPO], ids=["DQN", "PPO"])
 def test_a_run_whose_simulators_break_in_many_ways_succeeds(algorithm):
     """The faults are counted by kind, and cost no more than what they cut."""
@@ -38,49 +84,34 @@ def test_a_run_whose_simulators_break_in_many_ways_succeeds(algorithm):
     assert set(found["faults"]) == {"dead", "wrong_data"}
 
 
-def test_a_simulator_steps_again_soon_after_it_was_killed_and_after_it_hung():
-    """Recovery takes a restart; a hang is noticed by the deadline of the call that meets it."""
+def test_training_steps_again_after_a_simulator_was_killed_and_notices_one_that_hangs():
+    """How soon is measured where nothing else runs: `make soak`."""
     with recovery.training() as run:
-        assert recovery.recovery(run, standby=False) < 10.0
-        assert recovery.noticing(run) < recovery.DEADLINE_S + 1.0
+        recovery.recovery(run, standby=False)
+        recovery.noticing(run)
+
+        assert {kind: count for kind, count in run.faults().items() if count} == {"dead": 1, "hung": 1}
 
 
-def test_a_standby_takes_over_in_less_than_a_second():
-    """It is up already, so that a crash costs what a recycled simulator costs: next to nothing."""
-    with recovery.training(standby=True) as run:
-        assert recovery.recovery(run, standby=True) < 1.0
+def test_a_trainer_that_is_killed_while_it_saves_resumes(troubled):
+    """A half of a checkpoint is none."""
+    assert troubled.resumed
 
 
-def test_a_trainer_that_is_killed_while_it_saves_resumes_and_one_that_is_asked_to_end_saves():
-    """The second is asked amid a call that a hung simulator never answers."""
-    moments = random.Random(0)
-    with running(kills.job()) as run:
-        run.until(run.checkpoints)
-        kills.kill(run, moments, while_saving=True)
-        resumed = kills.resumes(run)
-        ended = kills.end(run, moments, hung=True)
-
-    assert resumed
-    assert kills.is_in_time(ended), ended
+def test_a_trainer_that_is_asked_to_end_in_a_call_that_hangs_saves(troubled):
+    """Within its half of the grace period, though the simulator never answers."""
+    assert kills.is_in_time(troubled.ended), troubled.ended
 
 
-def test_a_lost_ros_master_costs_an_attempt_and_not_the_run():
+def test_a_lost_ros_master_costs_an_attempt_and_not_the_run(troubled):
     """Nothing registers again with a new master, so the pod begins anew, from a checkpoint."""
-    with running(kills.job()) as run:
-        run.until(run.checkpoints)
-        os.kill(run.pid_of("rosmaster"), signal.SIGKILL)
-        (code,) = run.until(lambda: kills.ENDED.findall(run.output()))
-        again = run.until(lambda: run.attempts()[1:])
-
-    assert code == "75"
-    assert "resumed at step" in again[0]
+    assert troubled.code == 75
+    assert "resumed at step" in troubled.again
 
 
-def test_a_damaged_checkpoint_is_noticed_and_the_one_before_is_used(tmp_path):
+def test_a_damaged_checkpoint_is_noticed_and_the_one_before_is_used(troubled):
     """By its checksum; tests of the trainer damage the other files."""
-    run = damage.interrupted(tmp_path)
-
-    assert damage.is_survived(run, "model.zip", damage.flip)
+    assert troubled.survived
 
 
 def test_restarts_of_simulators_leave_nothing_behind():

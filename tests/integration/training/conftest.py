@@ -1,4 +1,4 @@
-"""Runs on fakes: in this process, or as a program of their own."""
+"""Runs on fakes: in this process, or as a program of their own, which has to import PyTorch first."""
 
 from __future__ import annotations
 
@@ -11,7 +11,13 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+import structlog
 import yaml
+
+from palaestra_trainer import training
+from palaestra_trainer.configuration import load
+from palaestra_trainer.logs import configure_logs
+from palaestra_trainer.run_directory import RunDirectory
 
 PROGRAM = Path(__file__).with_name("fakes.py")
 
@@ -51,6 +57,28 @@ def write_job(tmp_path):
         return path
 
     return write
+
+
+@pytest.fixture
+def play(fakes, tmp_path, monkeypatch, capsys):
+    """Play an attempt in this process; return its exit code and its log.
+
+    The first simulator dies at its steps `deaths`; at its step `at`, this process gets a signal.
+    """
+    monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(tmp_path / "word"))
+    configure_logs()
+
+    def attempt(job: Path, deaths=(), at=0, number=0) -> tuple[int, str]:
+        def make_members(given):
+            members = fakes.make_members(given, deaths)
+            fakes.before_step(members[0].robot, at, lambda: os.kill(os.getpid(), number))
+            return members
+
+        code = training.run(load(job), RunDirectory(tmp_path / "run"), make_members)
+        return code, capsys.readouterr().err
+
+    yield attempt
+    structlog.reset_defaults()
 
 
 @pytest.fixture

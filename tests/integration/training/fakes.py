@@ -8,9 +8,10 @@ it does not even come up.
 
 from __future__ import annotations
 
+import itertools
 import sys
 import threading
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,12 @@ def make_members(configuration: Configuration, deaths: Collection[int] = ()) -> 
         FakeSimulator(entry.name, configuration, deaths if entry.name == first else ())
         for entry in configuration.simulators
     ]
+
+
+def before_step(robot: Any, step: int, act: Callable[[], Any]) -> None:
+    """Let `act` be called before that step of a robot, counted from 1; at 0 it is not."""
+    steps, advance = itertools.count(1), robot.advance
+    robot.advance = lambda: (next(steps) == step and act(), advance())[1]
 
 
 def main(config: str, run: str, deaths: str = "") -> int:

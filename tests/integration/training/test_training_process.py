@@ -1,4 +1,7 @@
-"""A trainer as a process: signals, exit codes, resuming."""
+"""A trainer as a process has it: signals, exit codes, resuming.
+
+A process of its own is started where the test ends it; elsewhere the same runs in this one.
+"""
 
 from __future__ import annotations
 
@@ -40,14 +43,14 @@ def summary(folder):
     [(DQN, 1, 600), (PPO, 2, None), (REINFORCE, 2, None)],
     ids=["DQN", "PPO", "REINFORCE"],
 )
-def test_a_run_survives_a_fault(write_job, start, tmp_path, algorithm, collectors, steps):
+def test_a_run_survives_a_fault(write_job, play, tmp_path, algorithm, collectors, steps):
     """It ends with 0 and all of its steps, and says that there was one.
 
     A rollout of two has as many invalid rows as the mending takes steps of the other.
     """
     job = write_job(algorithm=algorithm, collectors=collectors)
 
-    code, log = end(start(job, deaths="77"))
+    code, log = play(job, deaths=[77])
 
     result = summary(tmp_path)
     assert code == 0
@@ -63,26 +66,24 @@ def test_a_run_survives_a_fault(write_job, start, tmp_path, algorithm, collector
     ids=["DQN", "PPO"],
 )
 def test_an_interrupted_run_ends_at_the_total_of_an_uninterrupted_one(
-    write_job, start, tmp_path, algorithm, total, number
+    write_job, play, tmp_path, algorithm, total, number
 ):
     """Ctrl-C at a third, and again: it goes on at the step of its checkpoint."""
     job = write_job(algorithm=algorithm, steps=1200)
-    first = start(job)
-    await_line(first, "step=400" if algorithm is DQN else "evaluated")
-    first.send_signal(number)
-    code, _ = end(first)
+    code, _ = play(job, at=400, number=number)
     word = Termination.from_message((tmp_path / "word").read_text())
 
-    again, log = end(start(job))
+    again, log = play(job)
 
     assert (code, again) == (75, 0)
     assert word.reason == f"Interrupted: {number.name} received"
+    assert 0 < word.last_checkpoint.step < total
     assert f"resumed at step {word.last_checkpoint.step}" in log
     assert summary(tmp_path)["steps"] == total
     assert summary(tmp_path)["attempts"] == 2
 
 
-def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, tmp_path):
+def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, play, tmp_path):
     """A node that dies says nothing before."""
     job = write_job(algorithm=DQN, steps=800)
     first = start(job)
@@ -90,21 +91,21 @@ def test_a_killed_run_goes_on_from_its_newest_checkpoint(write_job, start, tmp_p
     first.kill()
     end(first)
 
-    code, log = end(start(job))
+    code, log = play(job)
 
     assert code == 0
     assert "resumed at step" in log
     assert summary(tmp_path)["steps"] == 800
 
 
-def test_a_run_that_diverges_says_where_and_keeps_its_last_good_checkpoint(write_job, start, tmp_path):
+def test_a_run_that_diverges_says_where_and_keeps_its_last_good_checkpoint(write_job, play, tmp_path):
     """With 81: no attempt from there would do better."""
     wild = {"learning_starts": 100, "learning_rate": float("inf"), "policy_kwargs": {"net_arch": [16]}}
     job = write_job(
         algorithm={"name": "DQN", "hyperparameters": wild}, checkpoint={"everySteps": 100, "keep": 3}
     )
 
-    code, log = end(start(job))
+    code, log = play(job)
 
     word = Termination.from_message((tmp_path / "word").read_text())
     assert code == 81, log
