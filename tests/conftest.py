@@ -9,8 +9,10 @@ from hypothesis import HealthCheck, settings
 # Networks of this size learn faster on one thread than on several, which wait for each other; read by torch.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A property is not about time, and machines are noisy: what is slow is told by --durations.
-settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("unhurried")
+settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# The same examples each time: whoever changes something else does not meet what chance has found.
+settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True)
+settings.load_profile("repeat")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

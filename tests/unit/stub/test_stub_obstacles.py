@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from palaestra_sim.stub.obstacles import Block, Disc, Neighbourhood
@@ -28,6 +28,7 @@ def cast(obstacle, x, y, heading, reach=10.0):
 @given(
     place=st.tuples(places, places), away=st.tuples(nearby, nearby), heading=angles, radius=st.floats(0.05, 1)
 )
+@example(place=(0.0, 0.0), away=(0.0, 2.8e-161), heading=0.0, radius=1.0)  # whose square has few digits
 @pytest.mark.parametrize("block", [False, True], ids=["disc", "block"])
 def test_a_robot_that_was_pushed_out_touches_and_is_not_inside(block, place, away, heading, radius):
     """The push is the shortest way out that the contact tells."""

@@ -15,6 +15,8 @@ Ray = tuple[float, float, float, float]
 # A contact: x and y of the unit normal that points at the robot, depth in metres.
 Contact = tuple[float, float, float]
 
+_SAME_PLACE_M2 = 1e-24  # a square; those of still smaller distances lose their digits
+
 
 class Obstacle(Protocol):
     """A shape on the floor."""
@@ -60,9 +62,9 @@ class Disc:
         squared = dx * dx + dy * dy
         if squared >= reach * reach:
             return None
-        distance = math.sqrt(squared)
-        if distance == 0.0:
+        if squared < _SAME_PLACE_M2:
             return (1.0, 0.0, reach)
+        distance = math.sqrt(squared)
         return (dx / distance, dy / distance, reach - distance)
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
