@@ -39,21 +39,26 @@ def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
     metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
     del metadata["name"]
     made = api.create(TRAINING_JOBS, {**job, "metadata": metadata})["metadata"]
+    succeeded = False
     try:
         _wait(api, made["namespace"], made["name"], within_s, tell)
+        succeeded = True
     finally:
-        _take_away(api, made, tell)
+        _take_away(api, made, tell, or_fail=succeeded)
 
 
-def _take_away(api: Api, made: Object, tell: Tell) -> None:
-    """Delete the job. Where that cannot be for now it is told: how the trial went is the news."""
+def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:
+    """Delete the job. Where that cannot be it is told; for good, with `or_fail`, it is an error.
+
+    How a trial went that did not succeed is the news.
+    """
     namespace, name = made["namespace"], made["name"]
     try:
         api.delete(TRAINING_JOBS, namespace, name, uid=made["uid"])
     except NotFound:
         pass
     except ApiError as error:
-        if not error.retryable:
+        if or_fail and not error.retryable:
             raise
         remedy = f"delete it by hand: `kubectl delete trainingjob -n {namespace} {name}`"
         tell(f"{namespace}/{name}: could not be deleted ({error}); {remedy}")

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from palaestra import Client
 from palaestra.cli import main
 from palaestra.cluster import connect
 from palaestra.doctor import Site
@@ -77,6 +78,15 @@ def test_a_trial_that_may_not_be_deleted_fails(tried, capsys):
     assert capsys.readouterr().err == "Forbidden (403): no\n"
 
 
+def test_a_trial_that_failed_tells_why_although_it_may_not_be_deleted(tried, capsys):
+    """The first thing that is wrong is the one to be mended first."""
+    assert tried("Failed", refusal(403, "Forbidden")) == 1
+
+    said = capsys.readouterr()
+    assert "Failed; Because: so" in said.err
+    assert "delete it by hand" in said.out
+
+
 @pytest.mark.parametrize(("message", "hint"), [(NO_RIGHT, True), (NO_ROOM, False)])
 def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, message, hint):
     """It knows nothing of quotas and policies."""
@@ -108,6 +118,22 @@ def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
 
     assert len(script.of(watches=False)) == 1
     assert said in capsys.readouterr().err
+
+
+def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
+    """Whoever keeps jobs in a repository makes it again at once; the one that was deleted is gone."""
+    script, kubeconfig = server
+    anew = {"metadata": NAMED | {"uid": "another", "resourceVersion": "2"}}
+    script.calls = [
+        reply(obj={"metadata": NAMED}),
+        reply(),
+        reply(obj={"metadata": {"resourceVersion": "2"}, "items": [anew]}),
+    ]
+
+    with Client(kubeconfig=kubeconfig) as client:
+        client.delete("trial", deadline_s=20.0)
+
+    assert len(script.of(watches=True)) == 0
 
 
 def test_a_lease_that_is_given_back_has_no_leader(server):

@@ -48,6 +48,7 @@ class Scene:
         replica: fields of the replica's status.
         reader: status of the pod that is made to read the volume.
         execution: how a command in a container goes.
+        deletion: how deleting the pod is answered.
     """
 
     def __init__(self, address, script, tmp_path):
@@ -56,6 +57,7 @@ class Scene:
         self.replica = {"phase": "Succeeded"}
         self.reader = {"phase": "Running"}
         self.execution = command(*tar(FILES), SUCCESS)
+        self.deletion = reply(200)
         self.ephemeral = False
         self.into = tmp_path / "fetched"
         self._script = script
@@ -111,7 +113,7 @@ class Scene:
         if path.endswith("/exec"):
             self.execution(exchange)
         elif method == "DELETE":
-            reply(200)(exchange)
+            self.deletion(exchange)
         elif path.endswith(RUN_POD) and self.phase is None:
             refusal(404, "NotFound")(exchange)
         else:
@@ -200,6 +202,23 @@ def test_what_is_not_whole_is_not_written_and_the_pod_is_deleted(scene, executio
     assert scene.left() == {}
     assert list(scene.into.rglob(".fetch-*")) == []
     assert len(scene.asked("DELETE", scene.asked("POST", "/pods")[0].body["metadata"]["name"])) == 1
+
+
+def test_a_copy_that_takes_too_long_says_so(scene):
+    """The connection is as it should be, so the remedy is another."""
+    scene.execution = command(tar(FILES)[0], ends="silent")
+
+    with pytest.raises(TookTooLong, match="was not copied in time; allow more time with --timeout"):
+        scene.fetch(deadline_s=2.0)
+    assert scene.left() == {}
+
+
+@pytest.mark.parametrize("code", [403, 503])
+def test_a_pod_that_cannot_be_deleted_spoils_no_copy(scene, code):
+    """It ends by itself, and the same command would be refused: the folder is there."""
+    scene.deletion = refusal(code, "Refused")
+
+    assert scene.fetch() == scene.into / "job" / "0"
 
 
 def test_a_folder_that_is_there_is_left_as_it_is(scene):

@@ -224,7 +224,8 @@ class Client:
         )
         if deadline_s is not None:
             deadline = time.monotonic() + deadline_s
-            for _ in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
+            uid = found["metadata"]["uid"]
+            for _ in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline, uid=uid):
                 pass
 
     def fetch(self, name: str, *, replica: int = 0, into: Path, deadline_s: float = FETCH_S) -> Path:

@@ -22,7 +22,7 @@ from palaestra.api.status import Phase
 from palaestra.client.errors import ClientError, NotFetched, TookTooLong
 from palaestra.client.following import changes
 from palaestra.client.reading_pod import CONTAINER, reading_pod, run_directory
-from palaestra.cluster import Api, ApiError, CommandFailed, NotFound
+from palaestra.cluster import Api, ApiError, CommandFailed, NotFound, Unreachable
 from palaestra.cluster.api import Object
 from palaestra.cluster.resources import JOBS, PODS
 from palaestra.plan.replica import TRAINER
@@ -62,6 +62,13 @@ def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: flo
     with _source(api, job, replica, deadline) as source:
         try:
             _copy(api, source, target, deadline)
+        except Unreachable as error:
+            if time.monotonic() < deadline:
+                raise
+            raise TookTooLong(
+                f"{source.directory} in pod {source.pod}: was not copied in time; "
+                "allow more time with --timeout"
+            ) from error
         except (ApiError, ClientError):  # some of which are OSErrors too
             raise
         except CommandFailed as error:
@@ -211,7 +218,10 @@ def _trainer_ended(status: Object) -> bool:
 
 @contextmanager
 def _reader(api: Api, job: TrainingJob, replica: int, template: Object, deadline: float) -> Iterator[str]:
-    """Lend a pod that reads the volume; it is deleted however this ends, and ends by itself if we do not."""
+    """Lend a pod that reads the volume; it is deleted however this ends.
+
+    If that fails, what came of the copy is still the news: the pod ends by itself at our deadline.
+    """
     name = f"{job.metadata.name}-{replica}-fetch-{secrets.token_hex(3)}"
     lives_s = max(round(deadline - time.monotonic()), 1)
     made = api.create(PODS, reading_pod(job, template, name, lives_s))
@@ -219,7 +229,7 @@ def _reader(api: Api, job: TrainingJob, replica: int, template: Object, deadline
         _await(api, made, deadline)
         yield name
     finally:
-        with suppress(NotFound):
+        with suppress(ApiError):
             api.delete(PODS, job.metadata.namespace, name, uid=made["metadata"]["uid"])
 
 

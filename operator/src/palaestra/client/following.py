@@ -19,7 +19,9 @@ class _Gone(Exception):
     """The object is not there."""
 
 
-def changes(api: Api, resource: Resource, namespace: str, name: str, *, deadline: float) -> Iterator[Object]:
+def changes(
+    api: Api, resource: Resource, namespace: str, name: str, *, deadline: float, uid: str = ""
+) -> Iterator[Object]:
     """Yield the object as it is now, then after each change; ends where there is none, or none any more.
 
     Another object that has taken its name since is not it.
@@ -30,12 +32,13 @@ def changes(api: Api, resource: Resource, namespace: str, name: str, *, deadline
         namespace: where it is.
         name: which one.
         deadline: on the monotonic clock.
+        uid: of the one that is meant; by default the first that is seen.
 
     Raises:
         TookTooLong: the deadline passed.
         ApiError: the API server refuses; what may pass is tried again once the object was seen.
     """
-    uid, told, failures = "", "", 0
+    told, failures = "", 0
     while True:
         try:
             for found in _until_the_watch_ends(api, resource, namespace, name, deadline):
