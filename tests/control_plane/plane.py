@@ -7,23 +7,23 @@ it connects to anything else. The processes end with the one that started them, 
 
 import json
 import shutil
-import socket
 import ssl
 import subprocess
 import threading
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.error import URLError
 
+from palaestra.local.ports import LOOPBACK, HeldPorts
 from tests.control_plane.certificates import Authority, Pair
 from tests.control_plane.programs import programs
 
-ADDRESS = "127.0.0.1"
+ADDRESS = LOOPBACK
 SERVICES = "198.19.0.0/24"  # a range for benchmarks: no route leads there
 # Each of the others would watch a handful of kinds, and ask for more, for nobody.
 CONTROLLERS = (
@@ -113,17 +113,18 @@ def running(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane
         DidNotStart: one of them did not come up in 60 s, or the definitions are refused.
     """
     authority = Authority.create(folder)
-    etcd_port, peer_port, port = free_ports(3)
-    plane = ControlPlane(
-        folder=folder,
-        port=port,
-        authority=authority,
-        kubeconfig=folder / "kubeconfig",
-        binaries=programs(),
-    )
-    _kubeconfig(plane.kubeconfig, plane, "admin", "system:masters")
     with ExitStack() as processes:
-        processes.enter_context(started(folder, _etcd(plane, etcd_port, peer_port)))
+        ports = processes.enter_context(HeldPorts())
+        plane = ControlPlane(
+            folder=folder,
+            port=ports.any(),
+            authority=authority,
+            kubeconfig=folder / "kubeconfig",
+            binaries=programs(),
+        )
+        _kubeconfig(plane.kubeconfig, plane, "admin", "system:masters")
+        etcd_port = ports.any()
+        processes.enter_context(started(folder, _etcd(plane, etcd_port, ports.any())))
         api_server = processes.enter_context(started(folder, _api_server(plane, etcd_port)))
         _wait_ready(plane, api_server)
         if kinds is not None:
@@ -249,14 +250,3 @@ def _kubeconfig(path: Path, plane: ControlPlane, user: str, group: str) -> Path:
     }
     path.write_text(json.dumps(content, indent=1))
     return path
-
-
-def free_ports(count: int) -> list[int]:
-    """Return ports that nobody listens on now."""
-    with ExitStack() as sockets:
-        ports = []
-        for _ in range(count):
-            opened = sockets.enter_context(closing(socket.socket()))
-            opened.bind((ADDRESS, 0))
-            ports.append(opened.getsockname()[1])
-        return ports

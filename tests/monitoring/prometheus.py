@@ -11,14 +11,15 @@ import urllib.error
 import urllib.parse
 import urllib.request
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from tests.control_plane.plane import ADDRESS, free_ports, started
+from palaestra.local.ports import HeldPorts
+from tests.control_plane.plane import ADDRESS, started
 from tests.control_plane.programs import programs
 
 PROGRAMS = ("prometheus", "promtool")
@@ -98,9 +99,10 @@ def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None)
         NotAnswered: it did not come up.
     """
     binaries = programs(PROGRAMS)
-    (port,) = free_ports(1)
-    prometheus = Prometheus(f"{ADDRESS}:{port}")
-    with started(folder, _command(binaries, folder, targets, rules, prometheus.address)) as process:
+    with ExitStack() as running:
+        prometheus = Prometheus(f"{ADDRESS}:{running.enter_context(HeldPorts()).any()}")
+        command = _command(binaries, folder, targets, rules, prometheus.address)
+        process = running.enter_context(started(folder, command))
         ends = time.monotonic() + START_DEADLINE_S
         while not _is_ready(prometheus.address):
             if process.poll() is not None or time.monotonic() > ends:

@@ -1,20 +1,20 @@
 """An operator as a process, with the rights of an installed one, and what it asked of the API server."""
 
 import signal
-import socket
 import subprocess
 import sys
 import time
 import urllib.request
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.error import URLError
 
 from prometheus_client.parser import text_string_to_metric_families
 
+from palaestra.local.ports import LOOPBACK, HeldPorts
 from tests.control_plane.plane import ControlPlane
 
 USER = "system:serviceaccount:palaestra-system:palaestra-operator"
@@ -95,23 +95,24 @@ def asked(plane: ControlPlane) -> list[Asked]:
 @contextmanager
 def operator(plane: ControlPlane, log: Path) -> Iterator[Installed]:
     """Run an operator until the block ends; its log goes to a file."""
-    port = _free_port()
-    kubeconfig = str(plane.kubeconfig_of(USER))
-    options = ("--kubeconfig", kubeconfig, "--metrics-address", f"127.0.0.1:{port}")
-    with log.open("ab") as written:
-        process = subprocess.Popen(
-            ["setpriv", "--pdeathsig", "KILL", "--", str(PROGRAM), "operator", *options],
-            stdin=subprocess.DEVNULL,
-            stdout=written,
-            stderr=subprocess.STDOUT,
-        )
-    running = Installed(plane=plane, process=process, port=port)
-    try:
-        wait_for(lambda: _ready(port), READY_S, lambda: log.read_text()[-3000:])
-        yield running
-    finally:
-        process.kill()
-        process.wait()
+    with HeldPorts() as ports:
+        port = ports.any()
+        kubeconfig = str(plane.kubeconfig_of(USER))
+        options = ("--kubeconfig", kubeconfig, "--metrics-address", f"{LOOPBACK}:{port}")
+        with log.open("ab") as written:
+            process = subprocess.Popen(
+                ["setpriv", "--pdeathsig", "KILL", "--", str(PROGRAM), "operator", *options],
+                stdin=subprocess.DEVNULL,
+                stdout=written,
+                stderr=subprocess.STDOUT,
+            )
+        running = Installed(plane=plane, process=process, port=port)
+        try:
+            wait_for(lambda: _ready(port), READY_S, lambda: log.read_text()[-3000:])
+            yield running
+        finally:
+            process.kill()
+            process.wait()
 
 
 def wait_for(claim: Callable[[], bool], deadline_s: float, told: Callable[[], object]) -> None:
@@ -127,9 +128,3 @@ def _ready(port: int) -> bool:
         urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=2).close()
         return True
     return False
-
-
-def _free_port() -> int:
-    with closing(socket.socket()) as opened:
-        opened.bind(("127.0.0.1", 0))
-        return opened.getsockname()[1]

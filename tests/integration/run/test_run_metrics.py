@@ -68,7 +68,7 @@ def test_a_run_tells_numbers_that_fit_together(texts):
     taken = values["palaestra_simulator_step_duration_seconds_count", "collect-0"]
     simulated_s = values["palaestra_simulator_simulated_seconds_total", "collect-0"]
 
-    assert 0 <= taken - steps <= 100  # read one after the other, while it steps
+    assert steps <= taken < 2 * steps  # read one after the other, while it steps
     assert simulated_s >= 0.192 * steps  # and the steps of each reset
     episodes = values["palaestra_trainer_episodes_total",]
     assert 0 <= values["palaestra_trainer_episode_return_bucket", "+Inf"] - episodes <= 3

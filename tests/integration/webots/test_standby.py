@@ -20,10 +20,11 @@ from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode
+from tests.integration.sidecar.conftest import eventually
 
 PATIENCE_S = 60.0
 START_DEADLINE_S = 60.0
-LONG_S = 5.0  # a thousand times what a change of roles takes here
+LONG_S = 30.0  # a change of roles takes milliseconds, a start that is waited for 60 s
 
 
 class Pair:
@@ -206,7 +207,7 @@ def test_a_spare_that_does_not_come_up_within_its_budget_is_told_when_it_is_want
 
 def test_a_spare_is_waited_for_as_long_as_a_simulator_may_take_to_start(pair):
     """Not longer: whoever waits holds up the others."""
-    it = pair("--fault=slow_start:latency_ms=20000,start=2").begin()
+    it = pair("--fault=slow_start:latency_ms=600000,start=2").begin()
     it.member.restart()
     it.first.start_deadline_s = 0.5
 
@@ -243,13 +244,13 @@ def test_a_simulator_that_takes_too_much_memory_is_due(pair):
 
 def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
     """A run may end at any moment, and its end must not wait for a start."""
-    it = pair("--fault=slow_start:latency_ms=20000,start=2").begin()
+    it = pair("--fault=slow_start:latency_ms=600000,start=2").begin()
     it.member.restart()
 
     begin = time.monotonic()
     it.member.stop()
 
-    assert time.monotonic() - begin < 2 * LONG_S
+    assert time.monotonic() - begin < LONG_S
     for simulator in (it.first, it.second):
         state = simulator.sidecar.state()
         assert (state.state in {SidecarState.IDLE, SidecarState.FAILED}, state.pid) == (True, None)
@@ -258,7 +259,7 @@ def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
 
 def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandoned(pair):
     """However large the budget: a run that ends gives each of its simulators a few seconds."""
-    held = [f"--fault=slow_start:latency_ms=20000,start={start}" for start in range(2, 60)]
+    held = [f"--fault=slow_start:latency_ms=600000,start={start}" for start in range(2, 60)]
     it = pair(*held, care=Care(restart_limit=1000)).begin()
     it.member.restart()
     keeper = Keeper(it.member, Care(restart_limit=1000))
@@ -286,6 +287,11 @@ def test_what_was_stopped_can_be_started_again(pair):
     assert it.plays_in(it.second)
 
 
+def descriptors():
+    """Return how many files this process has open."""
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
 def test_changing_places_again_and_again_leaves_no_file_open(pair):
     """A run of a week changes places ten thousand times."""
     it = pair().begin()
@@ -295,6 +301,6 @@ def test_changing_places_again_and_again_leaves_no_file_open(pair):
         it.member.env.reset(seed=1)
         it.member.env.step(0)
         it.wait_for_spare()
-        opened.append(len(list(Path("/proc/self/fd").iterdir())))
+        opened.append(descriptors())
 
-    assert opened[-1] <= opened[1]
+    eventually(lambda: descriptors() <= opened[1])  # a master may still be telling our node
