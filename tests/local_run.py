@@ -19,6 +19,8 @@ from pathlib import Path
 
 import yaml
 
+from tests.json_lines import whole_lines
+
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "manifests/examples"
 PALAESTRA = Path(sys.executable).with_name("palaestra")
@@ -124,7 +126,7 @@ class LocalRun:
     def lines(self, name):
         """Return the JSON lines of a file of the run directory, none while it is not there."""
         path = self.directory / name
-        return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+        return whole_lines(path) if path.exists() else []
 
     def attempts(self):
         """Return why each attempt began, e.g. `resumed at step 400`."""

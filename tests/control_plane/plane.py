@@ -22,6 +22,7 @@ from urllib.error import URLError
 from palaestra.local.ports import LOOPBACK, HeldPorts
 from tests.control_plane.certificates import Authority, Pair
 from tests.control_plane.programs import programs
+from tests.json_lines import whole_lines
 
 ADDRESS = LOOPBACK
 SERVICES = "198.19.0.0/24"  # a range for benchmarks: no route leads there
@@ -79,8 +80,7 @@ class ControlPlane:
 
     def audit(self) -> list[dict[str, Any]]:
         """Return what was asked so far, in order; the last line of the log may not be whole yet."""
-        lines = self.audit_log.read_bytes().splitlines(keepends=True)
-        return [json.loads(line) for line in lines if line.endswith(b"\n")]
+        return whole_lines(self.audit_log)
 
     def kubectl(self, *arguments: str, sent: str = "") -> "subprocess.CompletedProcess[str]":
         """Run kubectl as the administrator, with `sent` as its standard input; 60 s at most."""

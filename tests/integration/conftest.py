@@ -11,7 +11,8 @@ from palaestra_trainer.simulators.master import ensure_master
 from tests.chart.installation import installed as installation
 from tests.control_plane.fixture import running_or_skipped
 from tests.control_plane.plane import ControlPlane
-from tests.integration.operator.cluster import Place, eventually, served
+from tests.integration.operator.cluster import Place, served
+from tests.waiting import eventually
 
 KINDS = Path(__file__).parents[2] / "manifests" / "crd.yaml"
 UNNAMESPACED = {"Namespace", "ClusterRole", "ClusterRoleBinding"}

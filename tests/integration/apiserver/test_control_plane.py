@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from palaestra.cluster import connect
-from tests.integration.operator.cluster import eventually
+from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
 PROGRAMS = {"etcd", "kube-apiserver", "kube-controller-manager"}

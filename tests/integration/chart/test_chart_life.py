@@ -12,8 +12,9 @@ from tests.chart import installation
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
 from tests.chart.modes import MODES
 from tests.integration.chart.conftest import DEFINITION
-from tests.integration.operator.cluster import eventually, served, training_job
+from tests.integration.operator.cluster import served, training_job
 from tests.integration.operator.operators import RunningOperator
+from tests.waiting import eventually
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from tests.chart.helm import ROOT, rendered
 from tests.chart.modes import MODES
-from tests.integration.operator.cluster import eventually
+from tests.waiting import eventually
 
 PLATFORM = sorted((ROOT / "manifests" / "examples" / "platform").glob("*.yaml"))
 DRY = ("apply", "--server-side", "--force-conflicts", "--dry-run=server", "--validate=strict", "-f", "-")

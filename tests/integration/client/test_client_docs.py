@@ -8,8 +8,8 @@ from pathlib import Path
 import yaml
 
 from palaestra.cluster.resources import TRAINING_JOBS
-from tests.integration.operator.cluster import eventually
 from tests.unit.cli.test_cli_cluster import COMMANDS
+from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/tools.md").read_text()

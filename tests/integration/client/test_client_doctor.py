@@ -11,7 +11,7 @@ from palaestra.doctor import Site, Verdict, examine
 from palaestra.doctor.installation import trainer_image
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
-from tests.integration.operator.cluster import eventually
+from tests.waiting import eventually
 
 POLICIES = Resource(
     api_version="admissionregistration.k8s.io/v1",

@@ -10,7 +10,8 @@ from palaestra.client import EndedOtherwise, NoPod, NoSuchJob, TookTooLong
 from palaestra.cluster import Invalid
 from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from palaestra.errors import SpecErrors
-from tests.integration.operator.cluster import eventually, training_job
+from tests.integration.operator.cluster import training_job
+from tests.waiting import eventually
 
 SOON_S = 30.0
 

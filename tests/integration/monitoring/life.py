@@ -1,8 +1,9 @@
 """What happens in the cluster that is scraped."""
 
 from palaestra_sim.protocol.status import Termination
-from tests.integration.operator.cluster import Place, eventually
+from tests.integration.operator.cluster import Place
 from tests.integration.operator.operators import RunningOperator
+from tests.waiting import eventually
 
 
 def address(operator: RunningOperator) -> str:

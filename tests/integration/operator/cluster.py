@@ -2,8 +2,6 @@
 
 import itertools
 import json
-import time
-from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Any
 
@@ -20,32 +18,13 @@ from palaestra.cluster.resources import (
 )
 from palaestra_sim.protocol.status import Termination
 from palaestra_sim.world import builtin
+from tests.waiting import DEADLINE_S, TooLate, eventually
 
-DEADLINE_S = 30.0
-PACE_S = 0.05
 BINDINGS = Resource(api_version="v1", kind="Binding", plural="bindings")
 KINDS = (NETWORK_POLICIES, CONFIG_MAPS, CLAIMS, JOBS)
 
 Object = dict[str, Any]
 numbers = itertools.count(1)
-
-
-class TooLate(AssertionError):
-    """What was waited for did not come."""
-
-
-def eventually(seen: Callable[[], Any], deadline_s: float = DEADLINE_S) -> Any:
-    """Return the first true thing that `seen` returns.
-
-    Raises:
-        TooLate: there was none within `deadline_s`.
-    """
-    ends = time.monotonic() + deadline_s
-    while not (found := seen()):
-        if time.monotonic() > ends:
-            raise TooLate(f"not within {deadline_s} s; last seen: {found!r}")
-        time.sleep(PACE_S)
-    return found
 
 
 def served(api: Api) -> bool:

@@ -1,6 +1,5 @@
 """Operators as processes: started with the rights of an installation, killed in any way."""
 
-import json
 import signal
 import subprocess
 import sys
@@ -8,7 +7,8 @@ import urllib.request
 from pathlib import Path
 from typing import Any
 
-from tests.integration.operator.cluster import eventually
+from tests.json_lines import whole_lines
+from tests.waiting import eventually
 
 PROGRAM = Path(__file__).with_name("mortal.py")
 END_S = 10.0
@@ -43,8 +43,7 @@ class RunningOperator:
 
     def lines(self) -> list[dict[str, Any]]:
         """Return its log lines, but for one that is being written."""
-        lines = self._log.read_bytes().splitlines(keepends=True)
-        return [json.loads(line) for line in lines if line.endswith(b"\n")]
+        return whole_lines(self._log)
 
     def said(self, event: str) -> list[dict[str, Any]]:
         """Return its log lines with a message."""

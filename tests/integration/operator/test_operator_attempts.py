@@ -4,7 +4,7 @@ import pytest
 
 from palaestra.cluster.resources import PODS
 from palaestra_sim.protocol.status import FaultRecord, Termination
-from tests.integration.operator.cluster import eventually
+from tests.waiting import eventually
 
 FAULT = FaultRecord(
     time="2026-01-31T11:59:00Z", simulator="collect-0", kind="hung", fact="no answer within 5 s", step=7

@@ -9,7 +9,7 @@ from palaestra.cluster.resources import JOBS, LEASES, PODS
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from palaestra_sim.protocol.status import Termination
-from tests.integration.operator.cluster import eventually
+from tests.waiting import eventually
 
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 WRITES = 7  # of one replica that succeeds: accepted, policy, worlds, claim, Job, running, succeeded

@@ -2,7 +2,8 @@
 
 from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, TRAINING_JOBS
 from palaestra_sim.protocol.status import Termination
-from tests.integration.operator.cluster import eventually, stranger, world_map, world_of
+from tests.integration.operator.cluster import stranger, world_map, world_of
+from tests.waiting import eventually
 
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 

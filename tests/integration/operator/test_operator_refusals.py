@@ -7,7 +7,7 @@ from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINI
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from tests.chart.installation import SECRETS_ROLE
-from tests.integration.operator.cluster import eventually
+from tests.waiting import eventually
 
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
 BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")

@@ -5,8 +5,9 @@ from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from tests.chart.installation import installed
 from tests.chart.rights import Right, granted, uses
-from tests.integration.operator.cluster import eventually, stranger, world_map, world_of
+from tests.integration.operator.cluster import stranger, world_map, world_of
 from tests.integration.operator.test_operator_refusals import limited, quota
+from tests.waiting import eventually
 
 # Asked for beside a request, and not written down: with OwnerReferencesPermissionEnforcement, who makes
 # an owner wait for what it owns must be allowed to change the owner's finalizers.

@@ -11,8 +11,8 @@ import pytest
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
-from tests.integration.operator.cluster import eventually
 from tests.metrics import complaints, documented, served
+from tests.waiting import eventually
 
 USER = f"system:serviceaccount:{NAMESPACE}:{NAME}"
 PORT = 9090  # a trainer's own

@@ -6,8 +6,8 @@ import pytest
 
 from palaestra.cli import main
 from palaestra.cluster.resources import TRAINING_JOBS
-from tests.integration.operator.cluster import DEADLINE_S, eventually
 from tests.integration.operator.test_operator_lifecycle import DONE
+from tests.waiting import DEADLINE_S, eventually
 
 JOB = """\
 apiVersion: palaestra.dev/v1alpha1

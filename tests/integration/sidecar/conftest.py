@@ -8,28 +8,25 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
 
 from palaestra_sim.protocol.control import SidecarState, SimulatorState
+from palaestra_sim.sidecar.signals import EXIT_HUNG
 from palaestra_sim.world import builtin
+from tests import waiting
 
 PROGRAM = str(Path(sys.executable).with_name("palaestra-sidecar"))
 ADDRESSES = re.compile(r"^palaestra-sidecar: control=(\S+) health=(\S+)$")
 DEADLINE_S = 20.0  # of whatever ought to take milliseconds, on a busy machine
+ENDS = {0, EXIT_HUNG}  # exit codes after a signal: of its own accord, or by its alarm
 PACE_S = 0.005  # between two looks at what has no event to wait for
 
 
 def eventually(seen, deadline_s=DEADLINE_S):
-    """Return what `seen()` returns as soon as that is true; fail at the deadline."""
-    give_up = time.monotonic() + deadline_s
-    while not (result := seen()):
-        if time.monotonic() > give_up:
-            pytest.fail(f"not seen within {deadline_s:g} s")
-        time.sleep(PACE_S)
-    return result
+    """Return the first true thing that `seen` returns; fail at the deadline."""
+    return waiting.eventually(seen, deadline_s, PACE_S)
 
 
 def processes_with(mark):

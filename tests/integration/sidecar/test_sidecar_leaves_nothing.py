@@ -10,11 +10,10 @@ import pytest
 
 from palaestra_sim.protocol.control import LastExit, SidecarState
 from palaestra_sim.sidecar.keeper import children
-from palaestra_sim.sidecar.signals import EXIT_HUNG, SHUTDOWN_S
+from palaestra_sim.sidecar.signals import SHUTDOWN_S
 from palaestra_sim.sidecar.simulator import SHUTDOWN_GRACE_S
-from tests.integration.sidecar.conftest import DEADLINE_S
+from tests.integration.sidecar.conftest import DEADLINE_S, ENDS
 
-ENDS = {0, EXIT_HUNG}  # exit codes after a signal
 IN_A_NAMESPACE = ["unshare", "--pid", "--fork", "--mount-proc", "--kill-child"]
 
 

@@ -10,9 +10,8 @@ import pytest
 
 from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar.keeper import children
-from palaestra_sim.sidecar.signals import EXIT_HUNG
 from palaestra_sim.world import RunIdentity, robots, ros_name
-from tests.integration.sidecar.conftest import was_seen
+from tests.integration.sidecar.conftest import ENDS, was_seen
 
 IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
 FIRST, SECOND = "", "/standby"
@@ -130,7 +129,7 @@ def test_a_signal_ends_both(two, request, left, eventually_true, what) -> None:
     it.start(FIRST)
     it.start(SECOND)
 
-    assert it.it.end() in {0, EXIT_HUNG}
+    assert it.it.end() in ENDS
     eventually_true(lambda: not left())
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.ros import RosService
-from tests.integration.sidecar.conftest import eventually
 from tests.integration.stub_faults.conftest import DEADLINE_S
+from tests.waiting import eventually
 
 
 def up(process):

@@ -23,7 +23,7 @@ from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
-from tests.integration.sidecar.conftest import eventually
+from tests.waiting import eventually
 
 STAND = np.zeros(1, dtype=np.int64)
 PATIENCE_S = 60.0

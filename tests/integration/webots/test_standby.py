@@ -20,7 +20,7 @@ from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode
-from tests.integration.sidecar.conftest import eventually
+from tests.waiting import eventually
 
 PATIENCE_S = 60.0
 START_DEADLINE_S = 60.0

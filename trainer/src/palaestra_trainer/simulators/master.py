@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from urllib.parse import urlsplit
 
 from palaestra_trainer.errors import MasterLost
 from palaestra_trainer.ros import Master
@@ -25,4 +24,4 @@ def ensure_master() -> None:
         if not uri.startswith("http://"):
             raise MasterLost("a ROS master could not be started; start rosmaster by hand") from None
         os.environ["ROS_MASTER_URI"] = uri
-        os.environ["ROS_HOSTNAME"] = urlsplit(uri).hostname or ""
+        os.environ["ROS_HOSTNAME"] = "localhost"

@@ -1,0 +1,26 @@
+"""Waiting for what tells nobody that it has come."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+DEADLINE_S = 30.0
+PACE_S = 0.05  # an API server that is polled must have time for its work
+
+
+class TooLate(AssertionError):
+    """What was waited for did not come."""
+
+
+def eventually(seen: Callable[[], Any], deadline_s: float = DEADLINE_S, pace_s: float = PACE_S) -> Any:
+    """Return the first true thing that `seen` returns, asked every `pace_s`.
+
+    Raises:
+        TooLate: there was none within `deadline_s`.
+    """
+    ends = time.monotonic() + deadline_s
+    while not (found := seen()):
+        if time.monotonic() > ends:
+            raise TooLate(f"not within {deadline_s} s; last seen: {found!r}")
+        time.sleep(pace_s)
+    return found
