@@ -4,6 +4,7 @@
 waited for is asked for: no watch.
 """
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +15,10 @@ from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 
 PERIOD_S = 2.0
+
+# What a trial leaves behind that was killed ends and goes by itself; long after whoever tries has looked.
+SLACK_S = 60
+TTL_S = 3600
 
 Object = dict[str, Any]
 Tell = Callable[[str], None]
@@ -36,15 +41,21 @@ def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
         TrialFailed: it failed, or had not ended in time.
         ApiError: the API server refused something.
     """
-    metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
-    del metadata["name"]
-    made = api.create(TRAINING_JOBS, {**job, "metadata": metadata})["metadata"]
+    made = api.create(TRAINING_JOBS, _passing(job, within_s))["metadata"]
     succeeded = False
     try:
         _wait(api, made["namespace"], made["name"], within_s, tell)
         succeeded = True
     finally:
         _take_away(api, made, tell, or_fail=succeeded)
+
+
+def _passing(job: Object, within_s: float) -> Object:
+    """Return the job without a name, and with ends of its own where its author has set none."""
+    metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
+    del metadata["name"]
+    ends = {"activeDeadlineSeconds": math.ceil(within_s) + SLACK_S, "ttlSecondsAfterFinished": TTL_S}
+    return {**job, "metadata": metadata, "spec": {**ends, **job["spec"]}}
 
 
 def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:

@@ -6,9 +6,11 @@ import pytest
 
 from palaestra.cli import main
 from palaestra.cluster.resources import TRAINING_JOBS
+from palaestra.trial import TTL_S
 from tests.integration.operator.test_operator_lifecycle import DONE
 from tests.waiting import DEADLINE_S, eventually
 
+WITHIN_S = 60
 JOB = """\
 apiVersion: palaestra.dev/v1alpha1
 kind: TrainingJob
@@ -26,7 +28,9 @@ def trial(place, control_plane, tmp_path):
     def carry_out(meanwhile):
         with ThreadPoolExecutor(1) as threads:
             done = threads.submit(meanwhile)
-            code = main(["try", str(file), f"--kubeconfig={control_plane.kubeconfig}", "--within=60"])
+            code = main(
+                ["try", str(file), f"--kubeconfig={control_plane.kubeconfig}", f"--within={WITHIN_S}"]
+            )
             done.result(DEADLINE_S)
         return code
 
@@ -62,3 +66,19 @@ def test_a_trial_that_fails_says_why_and_leaves_nothing(place, trial, pod, capsy
     assert trial(lambda: place.end(pod(), 2)) == 1
     assert "Failed; ConfigurationRefused: " in capsys.readouterr().err
     assert place.all(TRAINING_JOBS) == []
+
+
+def test_the_job_of_a_trial_that_is_killed_ends_and_goes_by_itself(place, trial, pod):
+    """SIGKILL leaves nobody who could delete it; what its author has set stays as it is."""
+    seen = []
+
+    def look():
+        found = pod()
+        seen.extend(place.all(TRAINING_JOBS))
+        place.end(found, word=DONE)
+
+    trial(look)
+    [spec] = [job["spec"] for job in seen]
+    assert WITHIN_S <= spec["activeDeadlineSeconds"] <= 2 * WITHIN_S
+    assert spec["ttlSecondsAfterFinished"] == TTL_S
+    assert spec["backoffLimit"] == 0

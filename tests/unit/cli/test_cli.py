@@ -166,16 +166,33 @@ def test_a_replica_that_the_job_does_not_have_is_refused(job, tmp_path, fails):
     assert line == "--replica 2: the job has 2; use 0 to 1, or raise spec.replicas"
 
 
+def test_an_operator_that_cannot_be_is_not_started(fails):
+    """Before anything is connected to."""
+    told = "--metrics-address: '8080' is no address; write it as 0.0.0.0:8080"
+    assert fails("operator", "--metrics-address=8080") == [told]
+
+
 @pytest.mark.parametrize(
-    ("option", "line"),
+    ("command", "wrong"),
     [
-        ("--workers=0", "--workers and --resync: must be above 0; leave them out for the defaults"),
-        ("--metrics-address=8080", "--metrics-address: '8080' is no address; write it as 0.0.0.0:8080"),
+        ("run FILE --ros-port=65536", "--ros-port: 65536 is refused; give 1 to 65535"),
+        ("run FILE --replica=-1", "--replica: -1 is refused; give 0 or more"),
+        ("world FILE --job=a --group=collect --index=-1", "--index: -1 is refused; give 0 or more"),
+        ("operator --workers=0", "--workers: 0 is refused; give 1 or more"),
+        ("operator --resync=nan", "--resync: nan is refused; give a finite number"),
+        ("try FILE --within=0", "--within: 0 is refused; give more than 0"),
+        ("delete a --timeout=soon", "--timeout: 'soon' is no number"),
+        ("logs a --tail=-3", "--tail: -3 is refused; give 0 or more"),
+        ("fetch a --replica=1.5", "--replica: '1.5' is no whole number"),
     ],
 )
-def test_an_operator_that_cannot_be_is_not_started(option, line, fails):
-    """Before anything is connected to."""
-    assert fails("operator", option) == [line]
+def test_a_number_that_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsys):
+    """Before a file is read or a cluster asked: FILE does not exist."""
+    with pytest.raises(SystemExit) as ended:
+        main(command.split())
+
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.splitlines()[-1].endswith(f"error: argument {wrong}")
 
 
 def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):

@@ -14,6 +14,7 @@ from typing import Any
 import structlog
 
 from palaestra_sim.protocol.status import ExitCode, Termination
+from palaestra_sim.typed import whole
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.interruption import leaving_when_asked
@@ -100,7 +101,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-eval`; return its exit code."""
     parser = _parser("palaestra-eval", EVAL, EVAL_EXIT_CODES)
     parser.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
-    parser.add_argument("--episodes", type=_positive, default=100, help="how many (default: 100)")
+    parser.add_argument("--episodes", type=whole(1), default=100, help="how many (default: 100)")
     parser.add_argument(
         "--seeds",
         default="B",
@@ -131,13 +132,6 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
 
     members = connect_members if in_pod else partial(connect_here, run=directory.path)
     return measure(configuration, directory.model, members, episodes=episodes, stream=stream)
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{number} is refused; give 1 or more")
-    return number
 
 
 def _parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentParser:

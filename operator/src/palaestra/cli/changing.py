@@ -7,6 +7,7 @@ from palaestra.api.storage import Retain
 from palaestra.cli.cluster import cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client
+from palaestra_sim.typed import seconds
 
 SUSPEND = """\
 Sets spec.suspend of TrainingJobs: their pods are deleted after a checkpoint. A job with a queue is refused,
@@ -33,7 +34,7 @@ def add(commands: Commands) -> None:
         parser = cluster_command(commands, name, work, summary, description)
         parser.add_argument("names", metavar="NAME", nargs="+", help="of the jobs")
     parser.add_argument(
-        "--timeout", metavar="S", type=float, default=GONE_S, help="seconds to wait for each; default: 300"
+        "--timeout", metavar="S", type=seconds, default=GONE_S, help="seconds to wait for each; default: 300"
     )
 
 

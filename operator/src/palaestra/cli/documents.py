@@ -11,6 +11,7 @@ from palaestra.cli.parsing import Commands, command
 from palaestra.local.rundir import job_directory, uid_of
 from palaestra.plan import ClusterLayout, Images, Layout, LocalLayout, identified, plan
 from palaestra.plan.text import as_yaml
+from palaestra_sim.typed import whole
 from palaestra_sim.world import RunIdentity, generate
 
 UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # stands for the uid that a cluster gives
@@ -84,7 +85,7 @@ def _add_world(commands: Commands) -> None:
     parser.add_argument("--job", metavar="NAME", required=True, help="name of the job")
     parser.add_argument("--namespace", default="default", help="namespace of the job")
     parser.add_argument("--uid", default="", help="uid of the job in its cluster")
-    parser.add_argument("--replica", type=int, default=0, help="number of the replica")
+    parser.add_argument("--replica", type=whole(), default=0, help="number of the replica")
     parser.add_argument("--group", required=True, help="name of the group of simulators")
-    parser.add_argument("--index", type=int, default=0, help="number in the group")
+    parser.add_argument("--index", type=whole(), default=0, help="number in the group")
     parser.add_argument("--clock", action="store_true", help="keep a --clock that the world has")

@@ -8,6 +8,7 @@ from palaestra.cli.parsing import Commands
 from palaestra.client import Client
 from palaestra.client.client import FETCH_S
 from palaestra.local.outcome import typed
+from palaestra_sim.typed import seconds, whole
 
 FETCH = """\
 Copies policy, evaluations and TensorBoard data of a run to <dir>/<job>/<replica>/, which must not be there
@@ -21,10 +22,10 @@ def add(commands: Commands) -> None:
     """Add the command."""
     parser = cluster_command(commands, "fetch", _fetch, "copy the results of a run", FETCH)
     parser.add_argument("name", metavar="NAME", help="of the job")
-    parser.add_argument("--replica", metavar="N", type=int, default=0, help="default: 0")
+    parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="default: 0")
     parser.add_argument("--dir", type=Path, default=Path("fetched"), help="default: fetched")
     parser.add_argument(
-        "--timeout", metavar="S", type=float, default=FETCH_S, help="seconds for all of it; default: 600"
+        "--timeout", metavar="S", type=seconds, default=FETCH_S, help="seconds for all of it; default: 600"
     )
 
 

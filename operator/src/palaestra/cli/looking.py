@@ -13,6 +13,7 @@ from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 from palaestra.plan.text import as_yaml
 from palaestra.view import describe, happened, server_table
+from palaestra_sim.typed import seconds, whole
 
 READS = "Reads the cluster; writes nothing but its output.\n"
 GET = f"""\
@@ -53,7 +54,7 @@ def _add_get(commands: Commands) -> None:
 def _add_logs(commands: Commands) -> None:
     parser = cluster_command(commands, "logs", _logs, "print the log of a container", LOGS)
     parser.add_argument("name", metavar="NAME", help="of the job")
-    parser.add_argument("--replica", metavar="N", type=int, default=0, help="default: 0")
+    parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="default: 0")
     parser.add_argument(
         "-c",
         "--container",
@@ -62,9 +63,9 @@ def _add_logs(commands: Commands) -> None:
         help="trainer, ros-master or sim-<group>-<number>; default: trainer",
     )
     parser.add_argument("-f", "--follow", action="store_true", help="wait for more until the container ends")
-    parser.add_argument("--tail", metavar="N", type=int, help="the last N lines only")
+    parser.add_argument("--tail", metavar="N", type=whole(), help="the last N lines only")
     parser.add_argument(
-        "--timeout", metavar="S", type=float, default=LOG_S, help="seconds to follow; default: a day"
+        "--timeout", metavar="S", type=seconds, default=LOG_S, help="seconds to follow; default: a day"
     )
 
 

@@ -5,10 +5,10 @@ from importlib.metadata import version
 
 from palaestra.cli.parsing import Commands, command
 from palaestra.cluster import own_namespace
-from palaestra.errors import PalaestraError
 from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
 from palaestra.operator.run import run
 from palaestra.plan import Images
+from palaestra_sim.typed import seconds, whole
 
 OPERATOR = """\
 Watches the TrainingJobs of a cluster, makes what they need, and writes their status. Reads the
@@ -29,12 +29,12 @@ def add(commands: Commands) -> None:
         help="look after this namespace only; may be repeated; default: all",
     )
     parser.add_argument(
-        "--workers", metavar="N", type=int, default=4, help="jobs looked at at once; default: 4"
+        "--workers", metavar="N", type=whole(1), default=4, help="jobs looked at at once; default: 4"
     )
     parser.add_argument(
         "--resync",
         metavar="S",
-        type=float,
+        type=seconds,
         default=600.0,
         help="seconds after which every job is looked at again; default: 600",
     )
@@ -80,8 +80,6 @@ def _add_images(parser: argparse.ArgumentParser) -> None:
 
 
 def _operator(options: argparse.Namespace) -> int:
-    if options.workers < 1 or options.resync <= 0:
-        raise PalaestraError("--workers and --resync: must be above 0; leave them out for the defaults")
     images = Images(trainer=options.trainer_image, stub=options.stub_image, webots=options.webots_image)
     return run(
         Options(

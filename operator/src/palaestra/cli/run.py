@@ -7,6 +7,7 @@ from pathlib import Path
 from palaestra.cli.files import add_dir, job
 from palaestra.cli.parsing import Commands, command
 from palaestra.local.run import Options, run
+from palaestra_sim.typed import MOST_PORT, whole
 
 RUN = """\
 Reads the TrainingJob in FILE and writes <dir>/<job name>/<replica>/: checkpoints/, tensorboard/,
@@ -21,10 +22,13 @@ def add(commands: Commands) -> None:
     parser = command(commands, "run", _run, "train on this machine", RUN)
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     add_dir(parser)
-    parser.add_argument("--replica", metavar="N", type=int, help="this replica only")
+    parser.add_argument("--replica", metavar="N", type=whole(), help="this replica only")
     parser.add_argument("--fresh", action="store_true", help="begin anew; what was there is moved aside")
     parser.add_argument(
-        "--ros-port", metavar="PORT", type=int, help="port of the ROS master; default: a free one"
+        "--ros-port",
+        metavar="PORT",
+        type=whole(1, MOST_PORT),
+        help="port of the ROS master; default: a free one",
     )
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="show all logs, each line with its container"

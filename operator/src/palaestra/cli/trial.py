@@ -10,6 +10,7 @@ from palaestra.cli.parsing import Commands
 from palaestra.client import Client
 from palaestra.errors import PalaestraError, SpecErrors
 from palaestra.trial import TrialFailed, attempt
+from palaestra_sim.typed import seconds
 
 TRY = """\
 Creates the TrainingJob in FILE under a name of its own, waits until it has ended, and deletes it,
@@ -25,7 +26,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--within",
         metavar="S",
-        type=float,
+        type=seconds,
         default=900.0,
         help="seconds in which it has to succeed, image pulls included; default: 900",
     )

@@ -14,6 +14,7 @@ from palaestra.cli.parsing import Commands
 from palaestra.client import Client, why
 from palaestra.client.reading import current
 from palaestra.view import History, live, progress
+from palaestra_sim.typed import seconds
 
 WATCH = """\
 Shows a TrainingJob as it moves, with a line for each figure of each replica, until it has ended; then says
@@ -29,7 +30,7 @@ def add(commands: Commands) -> None:
     parser = cluster_command(commands, "watch", _watch, "show a job as it moves", WATCH)
     parser.add_argument("name", metavar="NAME", help="of the job")
     parser.add_argument(
-        "--timeout", metavar="S", type=float, default=WATCH_S, help="seconds to watch; default: a week"
+        "--timeout", metavar="S", type=seconds, default=WATCH_S, help="seconds to watch; default: a week"
     )
 
 

@@ -8,6 +8,7 @@ from typing import NoReturn
 from palaestra_sim.sidecar.drivers import Driver
 from palaestra_sim.sidecar.preparation import located
 from palaestra_sim.sidecar.server import Address
+from palaestra_sim.typed import whole
 
 EXIT_WRONG = 2
 
@@ -76,9 +77,9 @@ def _add_identity(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--job", metavar="NAME")
     group.add_argument("--namespace", default="default", metavar="NAME")
     group.add_argument("--uid", default="", metavar="UID")
-    group.add_argument("--replica", type=int, default=0, metavar="N")
+    group.add_argument("--replica", type=whole(), default=0, metavar="N")
     group.add_argument("--group", default="collect", metavar="NAME")
-    group.add_argument("--index", type=int, default=0, metavar="N")
+    group.add_argument("--index", type=whole(), default=0, metavar="N")
     group.add_argument("--work", type=Path, metavar="DIR", help="where the named world is written")
     group.add_argument(
         "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"

@@ -18,6 +18,7 @@ from palaestra_sim.stub.options import StubOptions
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.simulation import Mode
 from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.typed import milliseconds
 
 log = logging.getLogger(__name__)
 
@@ -167,8 +168,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--version", action="version", version=version("palaestra-sim"))
     add("world", type=Path, help="the .wbt file to load")
     add("--mode", choices=_MODES, default="fast", help="how time passes at first (default: %(default)s)")
-    add("--step-sleep-ms", type=float, default=0.0, help="real time that each step takes at least")
-    add("--publish-delay-ms", type=float, default=0.0, help="from the end of a step to its messages")
+    add("--step-sleep-ms", type=milliseconds, default=0.0, help="real time that each step takes at least")
+    add("--publish-delay-ms", type=milliseconds, default=0.0, help="from the end of a step to its messages")
     add("--lost-wakeup", action="store_true", help="lose the messages of a step that comes too early")
     faults.add_options(add)
     return parser

@@ -1,0 +1,51 @@
+"""Numbers that people type behind options of a program: what each may be is refused there, not later."""
+
+from __future__ import annotations
+
+import math
+from argparse import ArgumentTypeError
+from collections.abc import Callable
+
+MOST_PORT = 65535
+
+
+def whole(least: int = 0, most: int | None = None) -> Callable[[str], int]:
+    """Return what reads a whole number from `least` to `most`, for argparse's `type`."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            raise ArgumentTypeError(f"{text!r} is no whole number") from None
+        if number < least or (most is not None and number > most):
+            wanted = f"{least} or more" if most is None else f"{least} to {most}"
+            raise ArgumentTypeError(f"{number} is refused; give {wanted}")
+        return number
+
+    return read
+
+
+def seconds(text: str) -> float:
+    """Return a time that somebody can wait, for argparse's `type`: finite, and more than nothing."""
+    number = _finite(text)
+    if number <= 0.0:
+        raise ArgumentTypeError(f"{text} is refused; give more than 0")
+    return number
+
+
+def milliseconds(text: str) -> float:
+    """Return a delay, for argparse's `type`: finite, and 0 for none."""
+    number = _finite(text)
+    if number < 0.0:
+        raise ArgumentTypeError(f"{text} is refused; give 0 or more")
+    return number
+
+
+def _finite(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is no number") from None
+    if not math.isfinite(number):
+        raise ArgumentTypeError(f"{text} is refused; give a finite number")
+    return number

@@ -1,0 +1,43 @@
+"""Numbers that people type: which are taken, and what is said of the others."""
+
+import math
+from argparse import ArgumentTypeError
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_sim.typed import milliseconds, seconds, whole
+
+
+@given(st.integers(), st.integers(-5, 5), st.none() | st.integers(5, 10))
+def test_a_whole_number_is_taken_if_and_only_if_it_is_within_its_bounds(number, least, most):
+    """Whatever the option it stands behind."""
+    within = least <= number and (most is None or number <= most)
+    try:
+        assert whole(least, most)(str(number)) == number
+    except ArgumentTypeError:
+        assert not within
+    else:
+        assert within
+
+
+@given(st.floats())
+def test_times_are_finite_and_only_a_delay_may_be_nothing(number):
+    """A wait that never ends, or one of less than nothing, is a slip of the finger."""
+    for read, allowed in ((seconds, number > 0.0), (milliseconds, number >= 0.0)):
+        try:
+            assert read(repr(number)) == number
+        except ArgumentTypeError:
+            assert not (allowed and math.isfinite(number))
+        else:
+            assert allowed
+            assert math.isfinite(number)
+
+
+@pytest.mark.parametrize("text", ["", "many", "1e999999x", "0x10"])
+def test_what_is_no_number_is_said_to_be_none(text):
+    """As it was typed, so that it can be found again."""
+    for read in (whole(), seconds, milliseconds):
+        with pytest.raises(ArgumentTypeError, match=f"^{text!r} is no "):
+            read(text)
