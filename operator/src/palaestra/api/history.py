@@ -27,7 +27,7 @@ class Fault(ApiModel):
     """Group and number: `collect-0`."""
 
     kind: Word
-    """`dead`, `hung`, `slow` or `wrong_data`."""
+    """`dead`, `hung` or `wrong_data`."""
 
     fact: Line = ""
     """What happened, in a sentence."""
@@ -99,7 +99,8 @@ class Goodput(ApiModel):
     """Seconds until the first step of each attempt."""
 
     recovering: Seconds = 0
-    """Seconds in which every simulator was broken, or a resumed run was brought back to where it was."""
+    """Seconds in which every simulator was broken, one was being recycled, or a resumed run was brought
+    back to where it was."""
 
 
 class MemoryKills(ApiModel):

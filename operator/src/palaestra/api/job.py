@@ -115,8 +115,9 @@ class Spec(ApiModel):
     counts them for each replica, anew each time it is started."""
 
     stall_deadline_seconds: Seconds = Field(default=600, json_schema_extra={MAY_CHANGE: True})
-    """Seconds without a step that is learned from or evaluated after which a replica counts as
-    stalled and is tried again. A trainer goes by the value it was started with."""
+    """Seconds without a step that is learned from or evaluated after which a trainer ends itself and
+    is tried again. It goes by the value that its replica was started with; the operator ends a
+    replica for good whose step count stands two minutes longer than the value of now."""
 
     ttl_seconds_after_finished: Annotated[int, Field(ge=0, le=315_360_000)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}

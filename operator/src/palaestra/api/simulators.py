@@ -127,7 +127,8 @@ class Restart(ApiModel):
     """How many faults of one simulator are survived."""
 
     limit: Annotated[int, Field(ge=0, le=1000)] = 10
-    """Restarts after faults within the window; one more ends the replica (exit code 80)."""
+    """Restarts after faults within the window; one more ends the replica (exit code 80), or with
+    `minSimulators` left only this simulator."""
 
     within_seconds: Seconds = 600
     """Length of the window in seconds."""

@@ -225,8 +225,8 @@ class ReplicaStatus(ApiModel):
     """What the time was spent on, in seconds; absent: not known yet."""
 
     steps_lost: Count | None = None
-    """Environment steps of training and evaluation that were played in vain, for faults and
-    interruptions, over all attempts; absent: not known yet."""
+    """Environment steps of episodes that a fault cut, and of those played again after an
+    interruption, over all attempts; absent: not known yet."""
 
 
 class Release(ApiModel):

@@ -34,7 +34,7 @@ class Cause(StrEnum):
     STEPPING: simulators computed a step that training waited for. TRANSPORT: the rest of a step:
     asking, reading, the environment. LEARNING: all that the algorithm does besides. EVALUATING,
     CHECKPOINTING: as named. STARTING: until the first step. RECOVERING: every simulator was broken,
-    or a resumed run was brought back to where it had been.
+    one was being recycled, or a resumed run was brought back to where it had been.
     """
 
     STEPPING = "stepping"
