@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "manifests/examples"
 PALAESTRA = Path(sys.executable).with_name("palaestra")
 PATIENCE_S = 120.0
+GONE_S = 10.0  # for the kernel to end what was killed
 LOOK_EVERY_S = 0.02
 FAULT = re.compile(r"simulator fault .*kind=(\w+)")
 
@@ -209,6 +210,14 @@ def is_running(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (OSError, IndexError):
         return False
+
+
+def left_of(pids):
+    """Return those processes that do not end in time."""
+    give_up = time.monotonic() + GONE_S
+    while any(map(is_running, pids)) and time.monotonic() < give_up:
+        time.sleep(0.05)
+    return [pid for pid in pids if is_running(pid)]
 
 
 def send(pid, number):

@@ -15,6 +15,7 @@ PARTS = {
     "stepping": stepping.measure,
     "parallel": parallel.measure,
     "recovery": runs.measure_recovery,
+    "shutdown": runs.measure_shutdown,
     "memory": runs.measure_memory,
     "learning": learning.measure,
 }

@@ -1,4 +1,4 @@
-"""Whole local runs: how soon training goes on after a kill, and what the processes take."""
+"""Whole local runs: how soon training goes on after a kill and a sidecar ends, and what processes take."""
 
 import os
 import re
@@ -6,7 +6,7 @@ import signal
 import time
 from pathlib import Path
 
-from tests.local_run import running
+from tests.local_run import is_running, running
 from tests.soak.jobs import example
 
 WARM_STEPS = 1500
@@ -23,6 +23,17 @@ def measure_recovery():
         os.kill(stub, signal.SIGKILL)
         run.until(lambda: recovered(run.status(), before), PATIENCE_S, look_every_s=0.05)
         return {"seconds_to_training_again": round(time.monotonic() - killed, 1)}
+
+
+def measure_shutdown():
+    """Return the seconds from a SIGTERM of the collecting sidecar to its end and that of its stub."""
+    with running(example("move-to-target")) as run:
+        run.wait_for_step(WARM_STEPS, PATIENCE_S)
+        sidecar, stub = (run.pid_of(it, "collect-0.wbt") for it in ("palaestra-sidecar", "palaestra-stub"))
+        asked = time.monotonic()
+        os.kill(sidecar, signal.SIGTERM)
+        run.until(lambda: not any(map(is_running, (sidecar, stub))), PATIENCE_S, look_every_s=0.01)
+        return {"seconds_to_the_end": round(time.monotonic() - asked, 2)}
 
 
 def measure_memory():

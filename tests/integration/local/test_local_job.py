@@ -29,6 +29,8 @@ POLICY = {
 }
 FORK = "setsid bash -c 'trap \"\" TERM HUP INT; echo $$ >> {pids}; sleep 300' &"
 
+TRAIN = "touch $FOLDER/training; while :; do sleep 0.02; done"
+
 
 class Play:
     """One Job that is run by a process of its own."""
@@ -149,9 +151,8 @@ def test_a_killed_runner_leaves_no_process_behind(play, eventually):
 
 def test_the_first_ctrl_c_lets_the_trainer_save_and_ends_with_75(play, eventually):
     """A person's Ctrl-C reaches the runner alone, and the run can be resumed."""
-    save = "trap 'echo saved > $FOLDER/saved; exit 75' TERM; while :; do sleep 0.02; done"
-    runner = play.start(save)
-    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+    runner = play.start(f"trap 'echo saved > $FOLDER/saved; exit 75' TERM; {TRAIN}")
+    eventually((play.folder / "training").exists)
 
     os.kill(runner.pid, signal.SIGINT)
     out, _ = runner.communicate(timeout=20)
@@ -164,8 +165,8 @@ def test_the_first_ctrl_c_lets_the_trainer_save_and_ends_with_75(play, eventuall
 @pytest.mark.parametrize("code", [1, 80, 81])
 def test_ctrl_c_does_not_hide_that_the_trainer_failed(play, eventually, code):
     """75 promises a checkpoint, and a divergence must not be resumed."""
-    runner = play.start(f"trap 'exit {code}' TERM; while :; do sleep 0.02; done")
-    eventually(lambda: play.pids.exists() and len(play.pids.read_text().split()) == 2)
+    runner = play.start(f"trap 'exit {code}' TERM; {TRAIN}")
+    eventually((play.folder / "training").exists)
 
     os.kill(runner.pid, signal.SIGINT)
     out, _ = runner.communicate(timeout=20)
@@ -176,7 +177,7 @@ def test_ctrl_c_does_not_hide_that_the_trainer_failed(play, eventually, code):
 @pytest.mark.parametrize(
     "trainer",
     [
-        pytest.param("trap 'exit 75' TERM; while :; do sleep 0.02; done", id="trains"),
+        pytest.param(f"trap 'exit 75' TERM; {TRAIN}", id="trains"),
         pytest.param("exit 82", id="is waited for between two pods"),
     ],
 )

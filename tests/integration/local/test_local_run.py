@@ -1,6 +1,7 @@
 """`palaestra run` with the real ROS master and the real sidecars, and small programs as trainers."""
 
 import fcntl
+import importlib.util
 import os
 import pty
 import signal
@@ -11,6 +12,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+
+from palaestra.local.preflight import ROS
+from tests.local_run import below, left_of
 
 PALAESTRA = Path(sys.executable).with_name("palaestra")
 PATIENCE_S = 60
@@ -32,6 +36,23 @@ print("waiting", file=sys.stderr)
 while True:
     signal.pause()
 """
+START = """\
+import os, pathlib, yaml
+from palaestra_trainer.simulators.sidecar import Sidecar
+config = yaml.safe_load(pathlib.Path(os.environ["PALAESTRA_CONFIG"]).read_text())
+for simulator in config["simulators"]:
+    sidecar = Sidecar(simulator["control"], simulator["name"])
+    sidecar.first_state(deadline_s=60)
+    sidecar.start()
+"""
+TRAIN = START + WAIT
+# What `palaestra` does, by an interpreter that does not look where Debian puts rospy.
+WITHOUT = """\
+import sys
+sys.path.remove(sys.argv.pop(1))
+from palaestra.cli import main
+sys.exit(main())
+"""
 
 
 class Desk:
@@ -41,6 +62,7 @@ class Desk:
         self.folder = folder
         self.job = folder / "job.yaml"
         self.run_directory = folder / "runs" / "desk" / "0"
+        self._started: list[subprocess.Popen] = []
 
     def write(self, program: str, **spec) -> None:
         """Write a job whose trainer is a Python program."""
@@ -57,7 +79,22 @@ class Desk:
     def start(self, *options: str, **how) -> subprocess.Popen:
         """Start `palaestra run`."""
         how = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, **how}
-        return subprocess.Popen([PALAESTRA, "run", self.job, *options], cwd=self.folder, **how)
+        self._started.append(subprocess.Popen([PALAESTRA, "run", self.job, *options], cwd=self.folder, **how))
+        return self._started[-1]
+
+    def clear(self) -> None:
+        """Kill the runs that a failed test has left, with all that is theirs."""
+        for process in (each for each in self._started if each.poll() is None):
+            process.kill()
+            process.communicate()
+
+    def training(self, eventually, program: str) -> tuple[subprocess.Popen, list[int]]:
+        """Start a run whose trainer starts its simulators; return it and its processes once all are there."""
+        self.write(program)
+        process = self.start()
+        eventually((self.run_directory / "begun").exists)
+        eventually(lambda: sum("palaestra-stub" in command for _, command in below(process.pid)) >= 2)
+        return process, [pid for pid, _ in below(process.pid)]
 
     def run(self, *options: str) -> tuple[int, str]:
         """Return exit code and output of `palaestra run`."""
@@ -69,7 +106,9 @@ class Desk:
 @pytest.fixture
 def desk(tmp_path):
     """A person's desk."""
-    return Desk(tmp_path)
+    desk = Desk(tmp_path)
+    yield desk
+    desk.clear()
 
 
 def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
@@ -124,17 +163,32 @@ def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):
     assert first.returncode == 75
 
 
-def test_ctrl_c_ends_with_75_and_says_how_to_go_on(desk, eventually):
-    """The same command resumes."""
-    desk.write(WAIT)
-    process = desk.start()
-    eventually((desk.run_directory / "begun").exists)
+def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, eventually):
+    """The same command resumes, on a machine as it was before."""
+    process, pids = desk.training(eventually, TRAIN)
 
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=PATIENCE_S)
 
     assert process.returncode == 75
     assert "the same command goes on" in out
+    assert not _processes_that_name(desk.folder)
+    assert left_of(pids) == []
+
+
+def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(desk, eventually):
+    """Whoever types it again has no time for a checkpoint; the simulators don't stay behind for that."""
+    process, pids = desk.training(eventually, TRAIN.replace("sys.exit(75)", "(run / 'asked').touch()"))
+    process.send_signal(signal.SIGINT)
+    eventually((desk.run_directory / "asked").exists)
+
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=PATIENCE_S)
+
+    assert process.returncode == 130
+    assert "killed; the same command goes on" in out
+    assert not _processes_that_name(desk.folder)
+    assert left_of(pids) == []
 
 
 def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(desk, eventually):
@@ -166,13 +220,12 @@ def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
 
 def test_a_killed_run_leaves_neither_process_nor_lock(desk, eventually):
     """The master, the sidecars and their simulators die with the runner, and the run can go on."""
-    desk.write(WAIT)
-    process = desk.start()
-    eventually((desk.run_directory / "begun").exists)
+    process, pids = desk.training(eventually, TRAIN)
 
     process.kill()
     process.communicate()
 
+    assert left_of(pids) == []
     eventually(lambda: not _processes_that_name(desk.folder))
     with (desk.run_directory.parent / "0.lock").open() as lock:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -238,6 +291,26 @@ def test_a_port_in_use_is_one_line_and_nothing_is_written(desk):
     assert out.startswith(f"port {port}: ")
     assert len(out.splitlines()) == 1
     assert not desk.run_directory.exists()
+
+
+def test_a_missing_rospy_is_one_line_and_nothing_is_written(desk):
+    """A ROS master alone is not enough: who would notice is the trainer, a minute later."""
+    desk.write(ASK)
+    before = sorted(desk.folder.rglob("*"))
+    where = str(Path(importlib.util.find_spec("rospy").origin).parents[1])
+
+    refused = subprocess.run(
+        [sys.executable, "-c", WITHOUT, where, "run", desk.job],
+        cwd=desk.folder,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+    )
+
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert refused.stderr == f"rospy: cannot be imported by {sys.executable}; {ROS}\n"
+    assert sorted(desk.folder.rglob("*")) == before
 
 
 def test_replicas_run_one_after_another(desk):

@@ -1,11 +1,35 @@
 """Services over a real master and real sockets: they answer, or the fault has a kind."""
 
+import json
+import subprocess
+import sys
+
 import pytest
 
 from palaestra_trainer import patience
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
 from palaestra_trainer.waits import waited_s
+
+PROGRAM_WITH_A_NODE = """\
+import json, os, sys
+import rospy
+
+rospy.init_node("RobotinoAgent", anonymous=False)
+
+from palaestra_trainer.ros import Master, RosService, RosSubscriber, ensure_node
+
+peer = sys.argv[1]
+subscriber = RosSubscriber(f"{peer}/ir1/value", "sensor_msgs/Range")
+subscriber.connect()
+print(json.dumps({
+    "value": RosService(f"{peer}/get_time", "webots_ros/get_float")(ask=True).value,
+    "connected": subscriber.connected,
+    "node": ensure_node(),
+    "listed": sorted(Master("/test").node_names()),
+    "pid": os.getpid(),
+}))
+"""
 
 
 @pytest.fixture
@@ -138,6 +162,19 @@ def test_the_node_is_listed_by_the_master(peer):
     names = Master(ensure_node()).node_names()
 
     assert f"/{peer.name}" in names
+
+
+def test_a_program_that_is_a_node_already_stays_the_one_it_is(peer):
+    """A process has one node: scripts begin with an `init_node` of their own, and are found by its name."""
+    program = [sys.executable, "-c", PROGRAM_WITH_A_NODE, f"/{peer.name}"]
+
+    answer = subprocess.run(program, capture_output=True, text=True, timeout=60, check=False)
+
+    assert answer.returncode == 0, answer.stderr
+    said = json.loads(answer.stdout)
+    assert (said["node"], said["value"], said["connected"]) == ("/RobotinoAgent", 1.25, True)
+    assert "/RobotinoAgent" in said["listed"]
+    assert not [name for name in said["listed"] if name.endswith(f"_{said['pid']}")]
 
 
 def test_a_node_that_ends_in_good_order_is_unregistered(peer):

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 
 from palaestra_sim.world import robots
 from palaestra_trainer.ros.master import Master
-from tests.local_run import EXAMPLES, LocalRun, is_running
+from tests.local_run import EXAMPLES, LocalRun, left_of
 from tests.soak.jobs import example
 
 EVAL = Path(sys.executable).with_name("palaestra-eval")
@@ -24,7 +23,6 @@ FEW = {
     "evaluation": {"everySteps": 300, "episodes": 2},
     "checkpoint": {"everySteps": 200, "keep": 2},
 }
-GONE_S = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,14 +93,6 @@ def registered(run):
     return {name for name in master.node_names() if "robotino" in name}
 
 
-def left_of(pids):
-    """Return those processes that do not end in time."""
-    give_up = time.monotonic() + GONE_S
-    while any(map(is_running, pids)) and time.monotonic() < give_up:
-        time.sleep(0.05)
-    return [pid for pid in pids if is_running(pid)]
-
-
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
 def test_every_example_runs(run, name):
     """With few steps here; what people copy must work."""
@@ -160,16 +150,23 @@ def test_a_policy_can_be_measured_afterwards(finished):
     ("name", "asked_at", "steps"), [("move-to-target", 500, 1500), ("two-collectors", 1500, 3000)]
 )
 def test_an_interrupted_run_goes_on_and_ends_where_it_would_have(run, name, asked_at, steps):
-    """DQN exactly at its steps, PPO at its rollout boundary, as without the interruption."""
+    """DQN exactly at its steps, PPO at its rollout boundary, as without the interruption.
+
+    In between nothing of it runs: no simulator, no sidecar, no master.
+    """
     wanted = FEW | {"steps": steps, "evaluation": {"everySteps": 0}}
     training = run(name, **wanted).start()
     training.wait_for_step(asked_at)
+    pids = [pid for pid, _ in training.processes()]
     training.process.send_signal(signal.SIGINT)
     code, output = training.end()
+    left = left_of(pids)
     saved = max(int(folder.name) for folder in (training.directory / "checkpoints").iterdir())
 
     assert code == 75, output
     assert "the same command goes on" in output
+    assert len(pids) >= 8
+    assert left == []
     code, output = training.start().end()
 
     assert code == 0, output

@@ -1,0 +1,48 @@
+"""What `make setup` does for somebody who may not install ROS, on a machine that has none."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[3] / "tools/setup.sh"
+PACKAGES = "python3-rospy python3-rosmaster python3-netifaces python3-venv"
+NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
+
+
+@pytest.fixture
+def checkout():
+    """A folder with the script alone, that anybody may write into, and a rospy that cannot be imported."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        for name in ("tools", "modules"):
+            (path / name).mkdir()
+        shutil.copy(SCRIPT, path / "tools/setup.sh")
+        (path / "modules/rospy.py").write_text("raise ImportError\n")
+        for each in (path, *path.rglob("*")):
+            each.chmod(0o777)
+        yield path
+
+
+def test_without_root_and_ros_it_prints_the_one_line_to_type_and_stops(checkout):
+    """Nothing is installed behind the back of a person, and nothing is half done."""
+    before = sorted(checkout.rglob("*"))
+
+    setup = subprocess.run(
+        [*(NOBODY if os.geteuid() == 0 else ()), checkout / "tools/setup.sh"],
+        env={**os.environ, "PYTHONPATH": str(checkout / "modules"), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+    assert (setup.returncode, setup.stderr) == (1, "")
+    assert setup.stdout.splitlines() == [
+        "ROS is missing. Type this line, then repeat the command:",
+        f"  sudo apt-get update && sudo apt-get install -y --no-install-recommends {PACKAGES}",
+    ]
+    assert sorted(checkout.rglob("*")) == before
