@@ -79,7 +79,7 @@ say "installing Palaestra"
 install_palaestra
 say "running the end-to-end tests"
 # In the background, so that a signal is acted on at once; a shell makes such a process deaf to Ctrl-C, env mends that.
-export PALAESTRA_E2E=1 PALAESTRA_REQUIRE_CLUSTER=1
+export PALAESTRA_E2E=1 PALAESTRA_REQUIRE_CLUSTER=1 PALAESTRA_E2E_IMAGES=$CACHE/e2e-images
 env --default-signal=INT .venv/bin/pytest tests/e2e --durations=15 "$@" &
 tests=$!
 wait "$tests"

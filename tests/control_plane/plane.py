@@ -42,7 +42,15 @@ AUDIT = {
     "apiVersion": "audit.k8s.io/v1",
     "kind": "Policy",
     "omitStages": ["RequestReceived"],
-    "rules": [{"level": "Metadata"}],
+    "rules": [
+        # Of Secrets what was answered too: a request does not tell whether it asks for their content.
+        {
+            "level": "RequestResponse",
+            "userGroups": ["system:serviceaccounts"],
+            "resources": [{"group": "", "resources": ["secrets"]}],
+        },
+        {"level": "Metadata"},
+    ],
 }
 
 

@@ -2,6 +2,7 @@
 
 import random
 import threading
+from datetime import UTC, datetime
 from typing import Self
 
 from tests.e2e.cluster import CommandFailed, Object
@@ -11,7 +12,9 @@ NAME = "move-to-target"
 REPLICAS = 2
 KILLS = 10
 SEED = 20
-GAP_S = (5.0, 40.0)  # between two kills: so short that some hit an operator that has only just begun
+# Between two kills, in turn: so long that an operator leads again, 15 s after the last renewal of the one
+# before it, and so short that it has only just begun. In all less than the training takes on fast machines.
+GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
 # So little that there is room beside it, and that others come before it where the processors are short.
 SIMULATOR = {"requests": {"cpu": "5m", "memory": "160Mi"}}
@@ -30,11 +33,11 @@ for entry in pathlib.Path("/proc").glob("[0-9]*"):
 
 
 class LongRun:
-    """The long run: `namespace` it is in, and how often its operator was killed: `kills`."""
+    """The long run: `namespace` it is in, and when its operator was killed: `kills`."""
 
     def __init__(self, namespace: Namespace) -> None:
         self.namespace = namespace
-        self.kills = 0
+        self.kills: list[datetime] = []
         self._ended = threading.Event()
         self._killer = threading.Thread(target=self._kill_again_and_again, daemon=True)
 
@@ -79,9 +82,12 @@ class LongRun:
 
     def _kill_again_and_again(self) -> None:
         moments = random.Random(SEED)
-        while self.kills < KILLS and not self._ended.wait(moments.uniform(*GAP_S)):
+        while len(self.kills) < KILLS and not self._ended.wait(moments.uniform(*self._gap_s())):
             if kill_operator(self.namespace):
-                self.kills += 1
+                self.kills.append(datetime.now(UTC))
+
+    def _gap_s(self) -> tuple[float, float]:
+        return GAPS_S[len(self.kills) % len(GAPS_S)]
 
 
 def make_killable(namespace: Namespace) -> None:

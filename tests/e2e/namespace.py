@@ -223,6 +223,12 @@ def trains(pod: Object) -> bool:
     return any("running" in each["state"] for each in pod["status"].get("containerStatuses", []))
 
 
+def statuses(content: Object) -> list[Object]:
+    """Return the statuses of all containers of a pod, in their order; other objects have none."""
+    status = content.get("status", {})
+    return [*status.get("initContainerStatuses", []), *status.get("containerStatuses", [])]
+
+
 def example(name: str) -> Object:
     """Return a TrainingJob of manifests/examples."""
     job: Object = yaml.safe_load((EXAMPLES / f"{name}.yaml").read_text())

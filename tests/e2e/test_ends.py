@@ -9,6 +9,10 @@ pytestmark = pytest.mark.timeout(600)
 INTERRUPTED_ONCE = (
     "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen; exit 75"
 )
+# Each attempt adds a line to what the earlier ones have left in the run directory, and says them all.
+FAILS = (
+    "mkdir -p $PALAESTRA_RUN; echo $PALAESTRA_POD_UID >>$PALAESTRA_RUN/pods; cat $PALAESTRA_RUN/pods; exit 70"
+)
 MOST_IGNORED = 10  # more pods than that without a step are not borne
 GIVEN_UP = {
     "refuses": (2, "ConfigurationRefused"),
@@ -35,14 +39,17 @@ def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
 @pytest.mark.after_the_kills
 def test_an_unexpected_end_is_tried_as_often_as_backoff_limit_says(namespace, job):
     """Limit n: n failures are tried again, so n + 1 pods, which are attempts 1 to n + 1."""
-    namespace.apply(job("fails", script="exit 70", backoffLimit=2))
+    namespace.apply(job("fails", script=FAILS, backoffLimit=2))
 
     assert namespace.wait_for_end("fails", LONG_S) == "Failed"
 
     replica = namespace.replica("fails")
-    pods = [named(pod) for pod in namespace.pods("fails", live=False)]
+    found = namespace.pods("fails", live=False)
+    pods = [named(pod) for pod in found]
+    attempts = namespace.cluster.kubectl("logs", pods[-1], "-c=trainer", "-n", namespace.name).split()
     assert namespace.pods_made("fails") == len(pods) == 3
-    assert replica["attempt"] == 3
+    assert attempts == [pod["metadata"]["uid"] for pod in found]
+    assert replica["attempt"] == len(attempts)
     assert replica["pod"]["name"] == pods[-1]
     assert replica["reason"] == "BackoffLimitSpent"
     assert replica["restarts"]["trainer"] == 2

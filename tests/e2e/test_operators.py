@@ -8,7 +8,7 @@ import pytest
 
 from tests.e2e.jobs import WAIT
 from tests.e2e.long_run import kill_operator, make_killable, operators
-from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, named
+from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, named, statuses
 
 pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(600)]
 
@@ -98,6 +98,16 @@ def test_an_upgrade_of_the_operator_touches_no_running_pod(deployment, namespace
 
 
 def fingerprint(namespace, kind):
-    """Return UID and generation of the objects of the job: neither changes if nobody touches them."""
+    """Return UID and generation of the objects of the job, and of a pod what runs in it.
+
+    Nothing of it changes if nobody touches them.
+    """
     found = namespace.select(kind, "stays")
-    return {(each["metadata"]["uid"], each["metadata"].get("generation")) for each in found}
+    return {
+        (each["metadata"]["uid"], each["metadata"].get("generation"), *containers(each)) for each in found
+    }
+
+
+def containers(content):
+    """Return id and restarts of each container that an object's status tells of."""
+    return [(each.get("containerID"), each["restartCount"]) for each in statuses(content)]

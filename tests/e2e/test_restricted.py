@@ -7,7 +7,7 @@ import pytest
 from tests.e2e.askers import plain_pod
 from tests.e2e.cluster import CommandFailed, Refused
 from tests.e2e.jobs import WAIT
-from tests.e2e.namespace import LONG_S
+from tests.e2e.namespace import LONG_S, statuses
 
 # A program that has not begun to listen to signals yet is ended by SIGKILL, after the pod's grace.
 ENDS_WHEN_ALL_IS_UP = "until (: </dev/tcp/127.0.0.1/7200) 2>/dev/null; do sleep 0.2; done"
@@ -59,11 +59,6 @@ def test_a_pod_ends_with_its_trainer(namespace, job):
     (pod,) = namespace.pods("ends", live=False)
     ended = {each["name"]: moment(each["state"]["terminated"]) for each in statuses(pod)}
     assert max(ended.values()) - ended["trainer"] < timedelta(seconds=10)
-
-
-def statuses(pod):
-    """Return the statuses of all containers of a pod."""
-    return [*pod["status"]["initContainerStatuses"], *pod["status"]["containerStatuses"]]
 
 
 def moment(terminated):

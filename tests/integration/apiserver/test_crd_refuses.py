@@ -86,7 +86,7 @@ WRONG = [
     (
         "spec.simulators",
         [COLLECT | {"count": 16}, EVALUATE | {"count": 16}, COLLECT | {"name": "more"}],
-        "more than 32 simulators in one pod; lower the counts or use replicas",
+        "spec.simulators: Invalid value.*more than 32 simulators in one pod; lower the counts",
     ),
     ("spec.simulators", [COLLECT], "spec.trainer.evaluation.*no simulator evaluates; add a group"),
     ("spec.simulators.0", {"name": "collect"}, "spec.simulators[0].role: Required value"),
@@ -97,7 +97,11 @@ WRONG = [
     ("spec.simulators.0.driver", "gazebo", "spec.simulators[0].driver: Unsupported value"),
     ("spec.simulators.0.image", "two words", "spec.simulators[0].image"),
     ("spec.simulators.0.command", ["run"], "spec.simulators[0].command.*belongs to driver command"),
-    ("spec.simulators.0.driver", "command", "driver command has no image of its own; name the one"),
+    (
+        "spec.simulators.0.driver",
+        "command",
+        "spec.simulators[0].image.*driver command has no image of its own; name the one",
+    ),
     ("spec.simulators.0.world", {}, "spec.simulators[0].world.*needs exactly one of inline, configMap"),
     (
         "spec.simulators.0.world",

@@ -1,5 +1,7 @@
 """What others refuse, what is not there, and what a job may not open; each is told with its reason."""
 
+from http import HTTPStatus
+
 import pytest
 
 from palaestra.cluster import Resource
@@ -7,11 +9,18 @@ from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINI
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from tests.chart.installation import SECRETS_ROLE
+from tests.integration.operator.installed import USER
 from tests.waiting import eventually
 
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
 BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")
 TOKEN = {"name": "TOKEN", "secretKeyRef": {"name": "token", "key": "token"}}
+SECRET = {
+    "apiVersion": "v1",
+    "kind": "Secret",
+    "metadata": {"name": "token", "labels": {"palaestra.dev/for-jobs": "true"}},
+    "stringData": {"token": "x"},
+}
 
 
 def quota(**hard):
@@ -66,11 +75,38 @@ def test_a_claim_that_is_refused_is_told_and_made_when_there_is_room(place, star
 def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed):
     """RBAC knows no labels, so a person binds the role where jobs may use Secrets."""
     start()
-    secret = {"metadata": {"name": "token", "labels": {"palaestra.dev/for-jobs": "true"}}}
-    place.create(SECRETS, {"apiVersion": "v1", "kind": "Secret", "stringData": {"token": "x"}, **secret})
+    place.create(SECRETS, SECRET)
     place.train(trainer={"env": [TOKEN]})
     eventually(lambda: place.condition("Accepted").get("reason") == "SecretNotForJobs")
 
+    open_secrets(installed, place)
+
+    [pod] = place.pods(deadline_s=60)
+    assert "valueFrom" in str(pod["spec"]["containers"][0]["env"])
+
+
+def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, control_plane):
+    """What is not read cannot leak: by the API server's record it has answered with metadata."""
+    open_secrets(installed, place)
+    place.create(SECRETS, SECRET)
+    start()
+    place.train(trainer={"env": [TOKEN]})
+    place.pods(deadline_s=60)
+
+    asked = [
+        each
+        for each in control_plane.audit()
+        if each["user"].get("username") == USER
+        and {"resource": "secrets", "namespace": place.name}.items() <= each.get("objectRef", {}).items()
+    ]
+    answers = [each["responseObject"] for each in asked if each["responseStatus"]["code"] == HTTPStatus.OK]
+    assert {(each["verb"], each["objectRef"]["name"]) for each in asked} == {("get", "token")}
+    assert {answer["kind"] for answer in answers} == {"PartialObjectMetadata"}
+    assert "data" not in set().union(*answers)
+
+
+def open_secrets(installed, place):
+    """Let the operator look at the Secrets of a namespace, as a person does there."""
     installed.create(
         BINDINGS,
         {
@@ -81,19 +117,6 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
             "subjects": [{"kind": "ServiceAccount", "name": NAME, "namespace": NAMESPACE}],
         },
     )
-
-    [pod] = place.pods(deadline_s=60)
-    assert "valueFrom" in str(pod["spec"]["containers"][0]["env"])
-
-
-def test_the_content_of_a_secret_is_never_asked_for(place, start, control_plane):
-    """What is not read cannot leak: the API server is asked for metadata."""
-    del control_plane
-    start()
-    place.train(trainer={"env": [TOKEN]})
-
-    eventually(lambda: place.condition("Accepted").get("reason") in {"SecretMissing", "SecretNotForJobs"})
-    assert place.all(JOBS, "job") == []
 
 
 @pytest.fixture

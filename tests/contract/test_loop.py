@@ -1,0 +1,31 @@
+"""The operator's loop stays what its page says: short, and a place where nothing is built."""
+
+import ast
+import inspect
+from importlib import import_module
+from pathlib import Path
+
+import palaestra.operator
+from palaestra.operator.controller import Controller
+
+MOST_LINES = 60
+SOURCES = sorted(Path(palaestra.operator.__file__).parent.glob("*.py"))
+
+
+def test_the_loop_is_read_in_one_screen():
+    """Whoever looks after a cluster must be able to say what the operator does next."""
+    assert len(inspect.getsource(Controller.reconcile).splitlines()) <= MOST_LINES
+
+
+def test_the_operator_makes_no_object():
+    """It carries out what was decided; a function of the plan in it would be a second place for that."""
+    taken = {
+        (node.module, each.name)
+        for source in SOURCES
+        for node in ast.walk(ast.parse(source.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("palaestra.plan")
+        for each in node.names
+    }
+
+    assert taken
+    assert [name for module, name in taken if inspect.isfunction(getattr(import_module(module), name))] == []

@@ -1,0 +1,73 @@
+"""The images as they were built: how large they are, what they say of themselves, who runs in them."""
+
+import json
+import os
+import tarfile
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.long_run import operators
+from tests.e2e.namespace import OPERATOR, SYSTEM, named
+
+pytestmark = pytest.mark.timeout(600)
+
+ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each; tests/cluster/e2e.sh sets it
+MOST_MB = {"stub": 500, "operator": 200, "trainer": 2500, "notebook": 2500}
+LABEL = "org.opencontainers.image."
+NOBODY = "65532:65532"
+
+
+@pytest.fixture(scope="module")
+def archives():
+    """Archives by image; of the operator, which is there under two tags, the last."""
+    if ARCHIVES not in os.environ:
+        pytest.skip("nobody says where the images' archives are; `make e2e` does")
+    lines = Path(os.environ[ARCHIVES]).read_text().splitlines()
+    return {name: Path(archive) for name, _, archive in (line.partition("=") for line in lines)}
+
+
+def configuration(archive):
+    """Return the configuration of the image in a docker archive."""
+    with tarfile.open(archive) as opened:
+        (described,) = member(opened, "manifest.json")
+        return member(opened, described["Config"])["config"]
+
+
+def member(archive, name):
+    """Return what a file of JSON in an archive holds."""
+    found = archive.extractfile(name)
+    assert found, name
+    return json.load(found)
+
+
+@pytest.mark.parametrize("name", MOST_MB)
+def test_an_image_holds_no_more_than_it_needs(name, archives):
+    """Each node pulls it, and each new node again; docs/decisions/0005 has the sizes that were measured."""
+    assert archives[name].stat().st_size / 1e6 < MOST_MB[name]
+
+
+@pytest.mark.parametrize("name", MOST_MB)
+def test_an_image_says_what_it_is_and_is_run_by_nobody(name, archives):
+    """`runAsNonRoot` admits it although no pod names a user."""
+    config = configuration(archives[name])
+
+    assert config["User"] == NOBODY
+    labels = {key.removeprefix(LABEL): value for key, value in config["Labels"].items()}
+    assert labels["title"] == f"palaestra-{name}"
+    assert labels["version"] == version("palaestra")
+    assert labels["licenses"] == "Apache-2.0"
+    assert labels["revision"]
+    assert labels["description"]
+
+
+@pytest.mark.after_the_kills
+def test_the_operator_s_image_is_of_this_release(namespace, cluster):
+    """Whoever reports a mistake says which release it was."""
+    cluster.rolled_out(SYSTEM, OPERATOR)
+    pod, *_ = namespace.wait(lambda: operators(namespace))
+
+    said = cluster.execute(SYSTEM, named(pod), "operator", "palaestra", "--version")
+
+    assert said.split() == ["palaestra", version("palaestra")]

@@ -1,0 +1,171 @@
+"""What `make e2e` leaves behind: its own script, among programs that write down that they were called."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from tests.waiting import eventually
+
+CLUSTER = Path(__file__).parents[2] / "cluster"
+END_S = 30
+CLEANING_S = 0.3  # of tests that are interrupted, in which nothing else may be removed
+INTERRUPTED = 130
+TOLD = 'echo "$(basename "$0")" >>"$CALLS"\n'
+PROGRAMS = {
+    "tests/cluster/programs.sh": 'echo "$PWD/bin"',
+    "tests/cluster/up.sh": TOLD + 'mkdir -p "$PALAESTRA_CACHE/kind"; touch "$PALAESTRA_CACHE/kind/way"',
+    "tests/cluster/down.sh": TOLD + 'rm -rf "$PALAESTRA_CACHE/kind"',
+    "tests/cluster/load.sh": "",
+    "tools/images.sh": "echo stub=stub.tar",
+    "bin/kubectl": "",
+}
+# As pytest, it is interrupted by Ctrl-C only where that was not shut off, and then cleans up.
+TESTS = f"""#!{sys.executable} -IS
+import os, signal, sys, time
+
+def tell(what):
+    with open(os.environ["CALLS"], "a") as calls:
+        print(what, file=calls)
+
+try:
+    tell("tests")
+    if code := os.environ["TESTS_END"]:
+        sys.exit(int(code))
+    signal.pause()
+except KeyboardInterrupt:
+    time.sleep({CLEANING_S})
+    tell("cleaned")
+    sys.exit(2)
+"""
+
+
+class E2e:
+    """A copy of the script, in a folder of its own; `calls` are what it called, in order."""
+
+    def __init__(self, folder):
+        self.cache = folder / "cache"
+        self._folder = folder
+        self._calls = folder / "calls"
+        for name, does in PROGRAMS.items():
+            self._write(name, f"#!/usr/bin/env bash\nset -e\n{does}\n")
+        self._write(".venv/bin/pytest", TESTS)
+        for name in ("e2e.sh", "settings.sh"):
+            shutil.copy(CLUSTER / name, folder / "tests/cluster" / name)
+
+    @contextmanager
+    def started(self, tests_end, **environment):
+        """Have it run; the tests end with this code, or go on where it is empty. Nothing of it stays."""
+        kept = {name: value for name, value in os.environ.items() if name in {"PATH", "HOME", "LANG"}}
+        own = {"PALAESTRA_CACHE": str(self.cache), "CALLS": str(self._calls), "TESTS_END": tests_end}
+        with subprocess.Popen(
+            [self._folder / "tests/cluster/e2e.sh"],
+            env=kept | own | environment,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        ) as process:
+            try:
+                yield process
+            finally:
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+
+    def run(self, tests_end="0", **environment):
+        """Return its exit code."""
+        with self.started(tests_end, **environment) as process:
+            return process.wait(END_S)
+
+    @property
+    def calls(self):
+        """What was called, in order."""
+        return self._calls.read_text().split() if self._calls.exists() else []
+
+    def stands(self, *, by_e2e):
+        """Let a cluster stand, of a person or of a run of the script that was killed."""
+        state = self.cache / "kind"
+        state.mkdir(parents=True)
+        (state / "way").touch()
+        if by_e2e:
+            (state / "by-e2e").touch()
+
+    def _write(self, name, text):
+        path = self._folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        path.chmod(0o755)
+
+
+@pytest.fixture
+def e2e(tmp_path):
+    """The script, with nothing there yet."""
+    return E2e(tmp_path)
+
+
+@pytest.mark.parametrize("code", ["0", "1"])
+def test_the_cluster_goes_however_the_tests_end(e2e, code):
+    """And whoever called it is told how."""
+    assert e2e.run(code) == int(code)
+
+    assert e2e.calls == ["up.sh", "tests", "down.sh"]
+    assert not (e2e.cache / "kind").exists()
+
+
+def ctrl_c(process):
+    """Interrupt all that a terminal has in its foreground."""
+    os.killpg(process.pid, signal.SIGINT)
+
+
+def terminate(process):
+    """Ask the script alone to end, as a machine does that shuts down."""
+    process.terminate()
+
+
+@pytest.mark.parametrize("stop", [ctrl_c, terminate])
+def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop):
+    """Once: a second interruption of the tests would cut their own cleaning up short."""
+    with e2e.started(tests_end="") as process:
+        eventually(lambda: "tests" in e2e.calls)
+        stop(process)
+        assert process.wait(END_S) == INTERRUPTED
+
+    assert e2e.calls == ["up.sh", "tests", "cleaned", "down.sh"]
+
+
+def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
+    """What was brought up meanwhile goes too."""
+    (tmp_path / "tools/images.sh").write_text("#!/bin/sh\nexit 1\n")
+
+    assert e2e.run() == 1
+
+    assert e2e.calls == ["up.sh", "down.sh"]
+
+
+def test_what_a_killed_run_left_behind_goes_first(e2e):
+    """Its mark says that nobody wanted that cluster for longer."""
+    e2e.stands(by_e2e=True)
+
+    assert e2e.run() == 0
+
+    assert e2e.calls == ["down.sh", "up.sh", "tests", "down.sh"]
+
+
+def test_a_cluster_that_stood_before_is_left(e2e):
+    """A person has made it."""
+    e2e.stands(by_e2e=False)
+
+    assert e2e.run("1") == 1
+
+    assert e2e.calls == ["up.sh", "tests"]
+
+
+def test_a_cluster_that_is_to_be_kept_is_not_taken_by_the_next_run(e2e):
+    """KEEP=1 makes it the person's own."""
+    assert e2e.run(KEEP="1") == 0
+    assert e2e.run() == 0
+
+    assert e2e.calls == ["up.sh", "tests", "up.sh", "tests"]
