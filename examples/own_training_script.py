@@ -38,9 +38,9 @@ def make() -> gymnasium.Env:
 
 envs = DummyVecEnv([make] * len(job.with_role("Collect")))
 if saved.exists():
-    model = PPO.load(saved, envs, device="cpu")
+    model = PPO.load(saved, envs, device=job.device)
 else:
-    settings = {"n_steps": 512, "batch_size": 128, "gamma": 0.97, "seed": job.seed, "device": "cpu"}
+    settings = {"n_steps": 512, "batch_size": 128, "gamma": 0.97, "seed": job.seed, "device": job.device}
     model = PPO("MlpPolicy", envs, tensorboard_log=str(run / "tensorboard"), **settings)
 missing = max(0, job.steps - model.num_timesteps)
 model.learn(missing, lambda *_: not interrupted.is_set(), reset_num_timesteps=False)

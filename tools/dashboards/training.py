@@ -48,7 +48,7 @@ def _returns() -> Panel:
         question="What do episodes return?",
         says=(
             "Quantiles of the last 100 training episodes: 0.5 is the median. All rise: it learns. The best "
-            "rise and the worst do not: some starts are never solved; look at the evaluation's videos."
+            "rise and the worst do not: some starts are never solved; see how the returns are spread."
         ),
         unit=units.Short,
         queries=(Query(of_run("palaestra_trainer_episode_return_quantile"), f"{RUN} q{{{{rank}}}}"),),

@@ -155,7 +155,9 @@ def test_a_directory_without_a_readable_outcome_is_not_finished(directory, conte
 
 def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     """What nobody measured is left out."""
-    (directory / "model.zip").touch()
+    for name in ("model.zip", "attempts.jsonl"):
+        (directory / name).touch()
+    (directory / "tensorboard").mkdir()
 
     ended = Outcome(exit_code=0, steps=50_000, success_rate=0.951, trained_share=0.934)
 
@@ -167,3 +169,12 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     assert lines[2].endswith("93% of the wall clock")
     assert lines[4].endswith(f"tensorboard --logdir {directory}/tensorboard")
     assert lines[5].endswith(f"palaestra-eval {directory}")
+
+
+def test_the_summary_of_a_program_of_one_s_own_promises_nothing_that_it_did_not_write(directory):
+    """palaestra-eval reads models of the built-in loop, and TensorBoard what is there."""
+    (directory / "model.zip").touch()
+
+    lines = summary(Outcome(exit_code=0), directory)
+
+    assert [line.split() for line in lines] == [["run", "directory", str(directory)]]

@@ -29,7 +29,7 @@ def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
     assert all(selected.items() <= labels.items() for labels in templates)
 
 
-def test_metrics_status_and_live_views_are_open_to_the_operator_and_to_monitoring(make_job):
+def test_metrics_status_and_states_are_open_to_the_operator_and_to_monitoring(make_job):
     """To pods of the operator, not to all of its namespace; ROS and the control ports to nobody."""
     layout = ClusterLayout(images=IMAGES, operator_namespace="ops", monitoring_namespace="eyes")
     (rule,) = plan(make_job(), layout).network_policy["spec"]["ingress"]

@@ -86,3 +86,26 @@ def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):
     read = read_back(make_job(simulators=[COLLECT | {"recycle": {"afterResets": 0}}, EVALUATE]))
 
     assert read.simulators[0].recycle is None
+
+
+@pytest.mark.parametrize(
+    ("resources", "device"),
+    [
+        ({}, "cpu"),
+        ({"limits": {"cpu": 4, "memory": "8Gi"}}, "cpu"),
+        ({"limits": {"nvidia.com/gpu": 1}}, "cuda"),
+        ({"requests": {"amd.com/gpu": "2"}}, "cuda"),
+        ({"limits": {"nvidia.com/gpu": 0}}, "cpu"),
+        ({"limits": {"nvidia.com/gpu-memory": 1, "gpu.example.com/card": 1}}, "cpu"),
+    ],
+)
+def test_a_gpu_that_the_trainer_asks_for_is_what_it_trains_on(make_job, resources, device):
+    """Else it would be reserved and paid for, and idle."""
+    assert read_back(make_job(trainer={"resources": resources})).device == device
+
+
+def test_the_file_of_a_job_without_a_gpu_says_nothing_of_devices(make_job):
+    """Its ConfigMap is named after its content, and older trainers refuse words that they don't know."""
+    planned = plan(identified(make_job(), "uid"), LAYOUT).replicas[0]
+
+    assert "device" not in yaml.safe_load(planned.config_map["data"]["training.yaml"])

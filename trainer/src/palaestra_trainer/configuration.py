@@ -27,6 +27,7 @@ CONFIG_VARIABLE = "PALAESTRA_CONFIG"
 Positive = Annotated[int, Field(ge=1)]
 Role = Literal["Collect", "Evaluate"]
 Reward = Literal["Dense", "Sparse"]
+Device = Literal["cpu", "cuda"]
 
 
 class _Section(BaseModel):
@@ -163,6 +164,7 @@ class Configuration(_Section):
 
     Attributes:
         seed: the job's seed plus the replica's index; every other seed follows from it.
+        device: where the model lives; cuda: on the GPU that the job asked for, if PyTorch sees one.
         steps: valid environment steps that the run lasts, of all simulators together.
         resume_from: the run directory of another job; a run that has no checkpoint of its own goes on
             from the newest one there.
@@ -178,6 +180,7 @@ class Configuration(_Section):
     seed: Annotated[int, Field(ge=0)] = 0
     environment: Environment
     algorithm: Algorithm = Field(default_factory=Algorithm)
+    device: Device = "cpu"
     steps: Positive
     evaluation: Evaluation = Field(default_factory=Evaluation)
     checkpoint: Checkpoint = Field(default_factory=Checkpoint)

@@ -45,7 +45,9 @@ def measure(
         stack.callback(fleet.stop)
         fleet.start()
         env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
-        trained = algorithms.make_model(configuration.algorithm, env, configuration.seed)
+        trained = algorithms.make_model(
+            configuration.algorithm, env, configuration.seed, configuration.device
+        )
         checkpoint.load_tensors(model, trained)
         seeds = episode_seeds(configuration.seed, stream, episodes)
         evaluation = evaluate_on_all(algorithms.policy_of(trained), fleet.evaluating, seeds)

@@ -214,7 +214,8 @@ class Attempt:
         use_threads(self._around.environment)
         env = SimulatorsVecEnv(run.fleet.collecting, self._configuration.seed, check=run.interruption.check)
         stack.callback(env.close)
-        model = algorithms.make_model(self._configuration.algorithm, env, self._configuration.seed)
+        wanted = self._configuration
+        model = algorithms.make_model(wanted.algorithm, env, wanted.seed, wanted.device)
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
         logger = configure(str(self._directory.tensorboard), ["tensorboard"])

@@ -282,12 +282,14 @@ ROWS: dict[Reason, Row] = {
         "{what}; read the simulator's log",
         "the trainer waited for a simulator for `stallDeadlineSeconds` (exit code 82); it is tried again "
         "while `backoffLimit` allows",
-        "`kubectl logs POD -c sim-GROUP-N`; raise the deadline if a step may take that long",
+        "`kubectl logs POD -c sim-GROUP-N`; raise the deadline, in a new TrainingJob, "
+        "if a step may take that long",
     ),
     Reason.STALLED: Row(
         "{what}; read the stacks in the trainer's log",
         "no step was learned from for `stallDeadlineSeconds`, by the trainer's word, though it may answer",
-        "`kubectl logs POD -c trainer`; raise the deadline if a step may take that long",
+        "`kubectl logs POD -c trainer`; raise the deadline, in a new TrainingJob, "
+        "if a step may take that long",
     ),
     Reason.DEADLINE_EXCEEDED: Row(
         "the job was active for {seconds} s, as long as activeDeadlineSeconds allows; "

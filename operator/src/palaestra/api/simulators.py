@@ -155,8 +155,8 @@ class SimulatorGroup(ApiModel):
     `palaestra run`."""
 
     driver: Driver = Field(default=Driver.STUB, strict=False)
-    """`stub`: the simulator that ships with Palaestra. `webots`: Webots. `command`: any program
-    that speaks the same ROS interface."""
+    """`stub`: the simulator that ships with Palaestra. `webots`: Webots; its image is not built here
+    yet, so give `image` one of yours. `command`: any program that speaks the same ROS interface."""
 
     command: Words = ()
     """The program and its arguments, for driver `command` only."""

@@ -239,7 +239,7 @@ class Release(ApiModel):
     """Image of the stub simulator."""
 
     webots: Image
-    """Image of Webots."""
+    """Image of Webots, which is not built here yet."""
 
 
 class Status(ApiModel):

@@ -183,7 +183,8 @@ class Trainer(ApiModel):
     """Environment variables of the trainer's container."""
 
     resources: Resources = Resources()
-    """CPU, memory and GPUs of the trainer."""
+    """CPU, memory and GPUs of the trainer. Where `limits` or `requests` name a GPU (`nvidia.com/gpu`,
+    `amd.com/gpu`), the built-in loop trains on it, if the image's PyTorch sees it; else on the CPU."""
 
     rules = (
         Rule(

@@ -7,7 +7,7 @@ from palaestra.cli.cluster import cleaned_up, cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client
 from palaestra.client.client import FETCH_S
-from palaestra.local.outcome import typed
+from palaestra.local.outcome import uses
 from palaestra_sim.typed import seconds, whole
 
 FETCH = """\
@@ -34,8 +34,5 @@ def _fetch(client: Client, options: argparse.Namespace) -> int:
         folder = client.fetch(
             options.name, replica=options.replica, into=options.dir, deadline_s=options.timeout
         )
-    say([str(folder)])
-    say([f"  {'look at it':<18}{typed('tensorboard')} --logdir {folder / 'tensorboard'}"])
-    if (folder / "model.zip").exists():
-        say([f"  {'try the policy':<18}{typed('palaestra-eval')} {folder}"])
+    say([str(folder), *uses(folder)])
     return 0

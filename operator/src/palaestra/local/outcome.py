@@ -3,6 +3,7 @@
 import json
 import shutil
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Self
@@ -58,7 +59,6 @@ def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
 
     What nobody measured is left out: a program of the user's own need not measure anything.
     """
-    trained = (run_directory / "model.zip").exists()
     facts = {
         "success rate": _shown(outcome.success_rate, "{:.0%}"),
         "steps": _shown(outcome.steps, "{:,}"),
@@ -66,10 +66,23 @@ def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
         "trained": _shown(outcome.trained_share, "{:.0%} of the wall clock"),
         "faults": _shown(outcome.faults, "{}"),
         "run directory": str(run_directory),
-        "look at it": f"{typed('tensorboard')} --logdir {run_directory / 'tensorboard'}",
-        "try the policy": f"{typed('palaestra-eval')} {run_directory}" if trained else "",
     }
-    return tuple(f"  {name:<18}{value}" for name, value in facts.items() if value)
+    return (*_lines(facts), *uses(run_directory))
+
+
+def uses(run_directory: Path) -> tuple[str, ...]:
+    """Return the lines that say what to do with what a run has written.
+
+    palaestra-eval reads models of the built-in loop, which records its attempts; that of a program of
+    the user's own may be any other.
+    """
+    curves = run_directory / "tensorboard"
+    measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))
+    ways = {
+        "look at it": f"{typed('tensorboard')} --logdir {curves}" if curves.exists() else "",
+        "try the policy": f"{typed('palaestra-eval')} {run_directory}" if measurable else "",
+    }
+    return _lines(ways)
 
 
 def typed(program: str) -> str:
@@ -79,6 +92,10 @@ def typed(program: str) -> str:
         return program
     here = Path.cwd()
     return str(beside.relative_to(here)) if beside.is_relative_to(here) else str(beside)
+
+
+def _lines(facts: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(f"  {name:<18}{value}" for name, value in facts.items() if value)
 
 
 def _shown(value: float | None, form: str) -> str:

@@ -1,8 +1,8 @@
 """Who may talk to the pods of a job: the second layer behind loopback, as ROS 1 has no authentication.
 
-Ingress: metrics, status and live view, from the operator's pods and from the monitoring namespace. What
-the containers of a pod say to each other is on loopback, which no policy sees; a node always reaches the
-pods on it, for their probes. Egress is free unless the job closes it.
+Ingress: metrics, the trainer's status and the simulators' states, from the operator's pods and from the
+monitoring namespace. What the containers of a pod say to each other is on loopback, which no policy sees;
+a node always reaches the pods on it, for their probes. Egress is free unless the job closes it.
 """
 
 from typing import Any

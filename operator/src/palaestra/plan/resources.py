@@ -68,6 +68,12 @@ def threads(planned: Planned) -> int:
     return max(math.ceil(float(number) * CORES[unit]), 1)
 
 
+def asks_for_gpu(wanted: Resources) -> bool:
+    """Return whether requests or limits name a GPU, such as nvidia.com/gpu, and more than none of it."""
+    quantities = (*wanted.requests.items(), *wanted.limits.items())
+    return any(name.endswith("/gpu") and Decimal(_split(quantity)[0]) > 0 for name, quantity in quantities)
+
+
 def _split(quantity: str) -> tuple[str, str]:
     """Return number and unit of a quantity."""
     number = quantity.rstrip("mkMGTPKi")

@@ -5,7 +5,7 @@ from typing import Any
 
 from palaestra.api.simulators import Recycle
 from palaestra.plan.replica import Replica, Simulator
-from palaestra.plan.resources import in_bytes
+from palaestra.plan.resources import asks_for_gpu, in_bytes
 from palaestra.plan.text import as_yaml
 from palaestra.plan.worlds import world_path
 from palaestra_sim.world import name_prefix
@@ -37,6 +37,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "seed": spec.seed + replica.index,
         "environment": trainer["environment"],
         "algorithm": trainer["algorithm"],
+        "device": "cuda" if asks_for_gpu(spec.trainer.resources) else None,
         "steps": spec.trainer.steps,
         "evaluation": trainer["evaluation"],
         "checkpoint": trainer["checkpoint"],

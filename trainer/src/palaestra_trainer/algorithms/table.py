@@ -21,10 +21,11 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
+from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
-from palaestra_trainer.configuration import Algorithm, nearest
+from palaestra_trainer.configuration import Algorithm, Device, nearest
 from palaestra_trainer.errors import ConfigurationError
 
 # Arguments of the classes that the training loop itself gives, or that valid-row buffers
@@ -133,8 +134,8 @@ def check(algorithm: Algorithm) -> Entry:
     return entry
 
 
-def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
-    """Return a new model of the algorithm for `env`, its networks drawn from `seed`.
+def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:
+    """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
 
     Where the algorithm is to normalize, the model's own environment does, see `normalization`.
 
@@ -156,7 +157,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int) -> BaseAlgorithm:
     if algorithm.normalize:
         env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
     try:
-        return entry.cls("MlpPolicy", env, seed=seed, device="cpu", **chosen)
+        return entry.cls("MlpPolicy", env, seed=seed, device=usable(device), **chosen)
     except (AssertionError, TypeError, ValueError) as error:
         # Stable-Baselines3 checks values and spaces by assertions.
         raise ConfigurationError(

@@ -13,39 +13,48 @@ from gymnasium import spaces
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Generators:
-    """Where Python's, NumPy's, PyTorch's and the action space's generator stand."""
+    """Where Python's, NumPy's, PyTorch's and the action space's generator stand.
+
+    Attributes:
+        gpu: PyTorch's other one, of the GPU that the model lives on; None: it lives on the CPU.
+    """
 
     python: tuple[Any, ...]
     numpy: dict[str, Any]
-    torch: torch.Tensor
+    pytorch: torch.Tensor
     action_space: dict[str, Any]
+    gpu: torch.Tensor | None = None
 
     @classmethod
-    def now(cls, action_space: spaces.Space[Any]) -> Generators:
+    def now(cls, action_space: spaces.Space[Any], device: torch.device) -> Generators:
         """Return where they stand now."""
         return cls(
             python=random.getstate(),
             numpy=np.random.get_state(legacy=False),  # noqa: NPY002 - the one that Stable-Baselines3 draws from
-            torch=torch.get_rng_state(),
+            pytorch=torch.get_rng_state(),
             action_space=dict(action_space.np_random.bit_generator.state),
+            gpu=torch.cuda.get_rng_state(device) if device.type == "cuda" else None,
         )
 
-    def put_back(self, action_space: spaces.Space[Any]) -> None:
-        """Let them go on from here."""
+    def put_back(self, action_space: spaces.Space[Any], device: torch.device) -> None:
+        """Let them go on from here; that of a GPU only if the model lives on one still."""
         random.setstate(self.python)
         np.random.set_state(self.numpy)  # noqa: NPY002 - see now()
-        torch.set_rng_state(self.torch)
+        torch.set_rng_state(self.pytorch)
         action_space.np_random.bit_generator.state = self.action_space
+        if self.gpu is not None and device.type == "cuda":
+            torch.cuda.set_rng_state(self.gpu, device)
 
     def to_json(self) -> dict[str, Any]:
         """Return them as JSON data."""
         twister = self.numpy["state"]
-        return {
+        content = {
             "python": self.python,
             "numpy": self.numpy | {"state": twister | {"key": twister["key"].tolist()}},
-            "torch": self.torch.numpy().tobytes().hex(),
+            "torch": _as_text(self.pytorch),
             "action_space": self.action_space,
         }
+        return content if self.gpu is None else content | {"gpu": _as_text(self.gpu)}
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> Generators:
@@ -56,6 +65,15 @@ class Generators:
         return cls(
             python=(version, tuple(words), gauss),
             numpy=numpy | {"state": numpy["state"] | {"key": key}},
-            torch=torch.frombuffer(bytearray.fromhex(content["torch"]), dtype=torch.uint8),
+            pytorch=_from_text(content["torch"]),
             action_space=content["action_space"],
+            gpu=_from_text(content["gpu"]) if "gpu" in content else None,
         )
+
+
+def _as_text(state: torch.Tensor) -> str:
+    return state.numpy().tobytes().hex()
+
+
+def _from_text(text: str) -> torch.Tensor:
+    return torch.frombuffer(bytearray.fromhex(text), dtype=torch.uint8)

@@ -77,7 +77,7 @@ class State:
         seen = normalizer.old_obs if normalizer else model._last_obs  # noqa: SLF001 - Stable-Baselines3 keeps it there
         return cls(
             numbers={name: getattr(model, name) for name in _NUMBERS if hasattr(model, name)},
-            generators=Generators.now(model.action_space),
+            generators=Generators.now(model.action_space, model.device),
             observation=np.asarray(seen),
             episode_starts=np.asarray(model._last_episode_starts),  # noqa: SLF001 - as above
             episodes=tuple(model.ep_info_buffer or ()),
@@ -95,7 +95,7 @@ class State:
         """Let the model go on from here; its other tensors and its experience are as they were here."""
         for name, value in self.numbers.items():
             setattr(model, name, value)
-        self.generators.put_back(model.action_space)
+        self.generators.put_back(model.action_space, model.device)
         self._show_observation(model)
         model._last_episode_starts = self.episode_starts  # noqa: SLF001 - see of()
         model.ep_info_buffer = deque(self.episodes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
@@ -104,7 +104,7 @@ class State:
         if buffer and self.positions:
             buffer.positions = self.positions
         for name, matrix in self.noise.items():
-            setattr(_noise_of(model), name, matrix)
+            setattr(_noise_of(model), name, matrix.to(model.device))
         with torch.no_grad():
             for parameter, copy in zip(_targets(model), self.targets, strict=False):
                 parameter.copy_(copy)
@@ -127,7 +127,7 @@ class State:
         for index, member in enumerate(self.members):
             if member.actions is not None:
                 arrays[f"actions-{index}"] = member.actions
-        arrays |= {name: matrix.detach().numpy() for name, matrix in self.noise.items()}
+        arrays |= {name: matrix.detach().cpu().numpy() for name, matrix in self.noise.items()}
         np.savez(folder / ARRAYS, allow_pickle=False, **arrays)
         content = {
             "numbers": self.numbers,

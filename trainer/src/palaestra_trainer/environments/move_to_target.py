@@ -115,6 +115,9 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     `is_success`, `outcome` (running, reached, collided, time_up), `reward_terms` (by name,
     weighted), `extra_steps` (control periods that a late sensor made necessary).
 
+    `render()` is not implemented: it raises NotImplementedError. `close()` leaves the simulator
+    running: its pod ends it, or else whoever started it.
+
     Args:
         robot: what is driven.
         scene: where episodes are arranged.

@@ -1,0 +1,25 @@
+"""`examples/own_training_script.py` in `palaestra run`, with real simulators."""
+
+from pathlib import Path
+
+from stable_baselines3 import PPO
+
+SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
+ROLLOUT = 512  # steps that the script's PPO learns from at once
+
+
+def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job(run):
+    """What people copy must work where they run it; what is told at the end is what there is."""
+    training = run(
+        "tiny", command=["python", str(SCRIPT)], steps=300, evaluation={"everySteps": 300, "episodes": 2}
+    )
+
+    code, output = training.start().end()
+
+    assert code == 0, output
+    assert PPO.load(training.directory / "model.zip", device="cpu").num_timesteps == ROLLOUT
+    said = output.splitlines()[-3:]
+    assert "mean return" in said[0]
+    assert said[0].endswith("over 2 episodes")
+    assert said[1].split() == ["run", "directory", str(training.directory)]
+    assert said[2].endswith(f"tensorboard --logdir {training.directory / 'tensorboard'}")
