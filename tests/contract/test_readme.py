@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import yaml
+
 import palaestra.api
 
 ROOT = Path(__file__).parents[2]
@@ -36,6 +38,20 @@ def test_the_script_shown_is_the_facade_example():
     script = (ROOT / "examples/facade.py").read_text()
 
     assert script.endswith(block("python") + "\n")
+
+
+def test_what_is_typed_for_a_cluster_fits_together():
+    """Cluster, operator, job, end: each line needs what those before it have made."""
+    shown = re.search(r"```console\n(make cluster\b.*?)\n```", README, re.DOTALL)[1]
+    cluster, operator, job, end = (line.partition("#")[0].split() for line in shown.splitlines())
+
+    installed = {each["kind"] for each in yaml.safe_load_all((ROOT / operator[-1]).read_text())}
+    trained = palaestra.api.load((ROOT / job[-1]).read_text(), job[-1])
+    assert cluster == ["make", "cluster"]
+    assert operator[:-1] == job[:-1] == ["kubectl", "apply", "-f"]
+    assert {"CustomResourceDefinition", "Deployment"} <= installed
+    assert end[:4] == ["kubectl", "wait", "--for=condition=Succeeded", f"tj/{trained.metadata.name}"]
+    assert "\ncluster:" in (ROOT / "Makefile").read_text()
 
 
 def test_every_verb_of_the_makefile_is_documented():

@@ -57,7 +57,6 @@ class Player:
         """Start the simulator and connect to it."""
         self.webots.start()
         self.webots.supervisor.set_mode(Mode.FAST)
-        self.robot.connect()
         self.memory_mib.append(self.resident_mib())
 
     def step(self):

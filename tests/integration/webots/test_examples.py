@@ -2,11 +2,13 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
+ROOT = Path(__file__).parents[3]
+EXAMPLES = ROOT / "examples"
 
 
 def carried_out(*program):
@@ -28,6 +30,18 @@ def test_the_facade_example_drives_and_reads():
 
     assert result.stdout.startswith("Pose(x_m=0.03")
     assert "free" in result.stdout
+    assert result.stderr == ""
+
+
+def test_the_blocks_of_the_page_about_facades_are_one_script():
+    """In a process of its own: it wants to start the ROS master too."""
+    page = (ROOT / "docs/facades.md").read_text()
+    blocks = re.findall(r"^```python with-a-simulator\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+
+    result = carried_out("-c", "\n".join(blocks))
+
+    assert "# robotino is paused; step inside `with webots:`" in page
+    assert "\nrobotino is paused; step inside `with webots:`\n" in result.stdout
     assert result.stderr == ""
 
 

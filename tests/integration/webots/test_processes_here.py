@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_trainer.errors import SimulatorHung
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.simulators.child import drain, end_child, first_line, start_child
 from palaestra_trainer.webots import Webots
 
@@ -93,6 +93,25 @@ def test_after_an_interrupted_call_the_next_answer_is_its_own(arena, monkeypatch
 def _interrupted(_wire, ahead=0):
     del ahead
     raise KeyboardInterrupt
+
+
+def test_a_simulator_takes_options_of_its_own(master):
+    """Those of its command line, as in a TrainingJob."""
+    del master
+    webots = Webots("robotino", "arena", options=["--fault=start_refused:code=7"])
+
+    with pytest.raises(SimulatorDead, match="ended with code 7"):
+        webots.start()
+
+    webots.close()
+
+
+def test_a_simulator_that_is_not_known_is_refused_at_once(master):
+    """In the words of whoever would have to start it."""
+    del master
+
+    with pytest.raises(ConfigurationError, match="gazebo"):
+        Webots("robotino", "arena", driver="gazebo")
 
 
 def test_a_simulator_that_does_not_come_is_told_by_its_deadline(master):

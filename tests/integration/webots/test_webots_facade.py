@@ -76,10 +76,8 @@ def test_a_killed_simulator_is_dead_and_comes_back_with_the_same_objects(arena):
     arena.launcher.wait_stopped(60.0)
 
     arena.webots()
-    arena.webots.supervisor.set_mode(Mode.FAST)
-    arena.robot.connect()
 
-    assert arena.robot.advance() == 0
+    assert arena.webots.run(arena.robot.advance) == 0
     assert arena.launcher.state().faults == 1
 
 

@@ -8,7 +8,7 @@ from palaestra_trainer.errors import WrongData
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import wheel_speeds
 from palaestra_trainer.turns import take_turns
-from palaestra_trainer.webots import Mode, Motor, set_velocities
+from palaestra_trainer.webots import Motor, set_velocities
 from palaestra_trainer.webots.services import Services
 
 START = Pose(-1.5, 0.0, 0.0)
@@ -100,8 +100,6 @@ def test_after_a_restart_it_is_sent_again(arena, stranger):
     arena.robot.drive(*CURVE)
     stranger.close()
     arena.webots()
-    arena.webots.supervisor.set_mode(Mode.FAST)
-    arena.robot.connect()
 
     arena.robot.drive(*CURVE)
 

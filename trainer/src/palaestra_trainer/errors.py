@@ -6,6 +6,7 @@ TrainerError
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a number of the learner's is none; don't retry       exit 81
 ├── NoSuchSensor         this robot does not have it
+├── Paused               a step was asked for while the simulation is paused
 └── SimulatorFault       one simulator broke; restart it and go on
     ├── SimulatorDead    its connections are refused or were closed
     ├── SimulatorHung    it is connected and does not answer in time
@@ -41,6 +42,13 @@ class Diverged(TrainerError, ArithmeticError):
 
 class NoSuchSensor(TrainerError, NotImplementedError):
     """The robot has no such sensor, e.g. no camera."""
+
+
+class Paused(TrainerError, RuntimeError):
+    """The simulation is paused, and a step would block its controller for ever.
+
+    A mistake of the caller: the simulator is well, and restarting it cannot help.
+    """
 
 
 class SimulatorFault(TrainerError):

@@ -19,7 +19,8 @@ from palaestra_trainer.errors import NoSuchSensor
 
 RADIUS_M = 0.2266  # of the body's cylinder, as in Webots' model of the Robotino 3
 SENSORS = 9  # infrared, one every 40 degrees
-SENSOR_RANGE_M = (0.03, 0.40)  # of the GP2Y0A41: both ends are what it says beyond them
+# Both ends are what it says beyond them. Source: lookup table of the GP2Y0A41 in that model.
+SENSOR_RANGE_M = (0.03, 0.40)
 SPEED_M_S = 0.5  # Source: ~max_linear_vel as launched by robotino_node
 TURN_RAD_S = 1.0  # Source: default of ~max_angular_vel in robotino_node
 

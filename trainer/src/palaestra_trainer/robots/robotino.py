@@ -19,6 +19,7 @@ _WHEEL_DISTANCE_M = 0.1826
 _SIN_60 = math.sqrt(0.75)
 
 # Metres from volts for the GP2Y0A41, the default sensor of the model: a * V**b + c.
+# Source: the sample controller of that model, R2023b.
 _RANGE_SCALE, _RANGE_EXPONENT, _RANGE_OFFSET_M = 0.1594, -0.8533, -0.02916
 _LEAST_VOLTS = 0.05  # below the sensor's range; keeps the power finite
 
@@ -27,7 +28,8 @@ class Robotino(RobotinoAbc):
     """A Robotino in Webots, or in any simulator that speaks its interface.
 
     Args:
-        webots: the simulator; it need not run yet, `connect` must be called once it does.
+        webots: the simulator. Each of its starts connects this robot, the newest of its name; if it runs
+            already, `connect` must be called.
         node_name: the ROS name of the robot's controller; by default the robot is its own supervisor.
         definition: the DEF name of the robot in the world.
         period_ms: simulated milliseconds in one `advance`.
@@ -52,6 +54,7 @@ class Robotino(RobotinoAbc):
         self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, period_ms)
         self.simulation.track(definition)
         self.simulation.add((*self._infrared, self._bumper), self._wheels)
+        webots.at_start(name, self.connect)
 
     @property
     def period_s(self) -> float:
@@ -59,7 +62,9 @@ class Robotino(RobotinoAbc):
         return self.simulation.period_ms / 1000.0
 
     def connect(self) -> None:
-        """Enable the sensors and take hold of the wheels; after each start of the simulator.
+        """Enable the sensors and take hold of the wheels; each start of the simulator does it by itself.
+
+        To be called when it runs already as the robot is made, and after its world was loaded anew.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData
@@ -85,7 +90,12 @@ class Robotino(RobotinoAbc):
         set_velocities(zip(self._wheels, wheel_speeds(vx, vy, omega), strict=True))
 
     def advance(self) -> int:
-        """Simulate one control period; return how many extra ones it took, normally 0."""
+        """Simulate one control period; return how many extra ones it took, normally 0.
+
+        Raises:
+            Paused: time stands; nothing was sent.
+            SimulatorDead, SimulatorHung, WrongData: as `Simulation.step`.
+        """
         return self.simulation.step()
 
     def close(self) -> None:
@@ -109,7 +119,15 @@ class RobotinoScene:
         self.resets = 0
 
     def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
-        """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings."""
+        """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings.
+
+        All chance until the next reset follows from `seed`, in [0, 2**31).
+
+        Raises:
+            Paused: time stands; nothing was changed.
+            SimulatorDead, SimulatorHung
+            WrongData: also when the world lacks the robot's node or the mark's.
+        """
         self.resets += 1
         self._robot.simulation.reset(seed)
         self._supervisor.place(self._robot.definition, start.x_m, start.y_m, start.heading_rad)

@@ -73,6 +73,10 @@ class Sidecar:
         """Tell that the simulator has answered a real round trip."""
         self._ask("POST", "/ready", {})
 
+    def ready(self) -> bool:
+        """Return whether the simulator runs, and was confirmed to be ready."""
+        return self.state().state is SidecarState.READY
+
     def expect_stop(self, deadline_s: float) -> None:
         """Announce that the simulator will end; it is killed after `deadline_s` seconds."""
         self._ask("POST", "/stop", StopRequest(deadline_s=deadline_s).to_json())

@@ -83,9 +83,8 @@ class Simulator:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: it does not come up in time.
         """
-        self.webots.start()
+        self.webots.start()  # connects the robot too
         self.run()
-        self.robot.connect()
         self.scene.resets = 0
         self.wear.begin()
 

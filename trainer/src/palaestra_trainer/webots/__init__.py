@@ -4,7 +4,14 @@ What is peculiar to that controller is handled here and nowhere else: the wake-u
 that blocks for ever while paused, what a reset restores and what not.
 """
 
-from palaestra_trainer.webots.devices import DistanceSensor, Motor, Sensor, TouchSensor, set_velocities
+from palaestra_trainer.webots.devices import (
+    DistanceSensor,
+    Motor,
+    PositionSensor,
+    Sensor,
+    TouchSensor,
+    set_velocities,
+)
 from palaestra_trainer.webots.facade import Launcher, Webots
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.simulation import Simulation
@@ -16,6 +23,7 @@ __all__ = [
     "Mode",
     "Motor",
     "Observer",
+    "PositionSensor",
     "Sensor",
     "Simulation",
     "Supervisor",

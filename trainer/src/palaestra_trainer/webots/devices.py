@@ -103,7 +103,11 @@ class Sensor:
         return not self._late
 
     def disable(self) -> None:
-        """Stop the sensor and unsubscribe."""
+        """Stop the sensor and unsubscribe.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`; it stays subscribed then.
+        """
         self._enable(value=0)
         self.close()
 
@@ -161,18 +165,30 @@ class Motor:
         self.velocity_service = services.get(f"{name}/set_velocity", "set_float")
 
     def set_velocity(self, velocity: float) -> None:
-        """Turn at `velocity` rad/s from the next step on."""
+        """Turn at `velocity` rad/s from the next step on.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`; it will be sent again.
+        """
         self.velocity = None
         self.velocity_service(value=velocity)
         self.velocity = velocity
 
     def set_position(self, position: float) -> None:
-        """Turn to `position` rad; infinity means velocity control."""
+        """Turn to `position` rad; infinity means velocity control.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
         self.velocity = None  # a backward one, set before, was confirmed and yet refused
         self._position(value=position)
 
     def release(self) -> None:
-        """Stand still under velocity control, as needed at the start and after every reset."""
+        """Stand still under velocity control, as needed at the start and after every reset.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
         self.set_position(math.inf)
         self.set_velocity(0.0)
 

@@ -1,10 +1,14 @@
-"""Webots, started on demand: the paper's facade."""
+"""Webots, started on demand: the paper's facade.
+
+Time passes inside of `with webots:` and of `webots.run(...)`, and stands everywhere else, whichever program
+simulates: between steps a simulator that is not paused takes a whole core for nothing.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
@@ -18,6 +22,7 @@ Result = TypeVar("Result")
 
 _PROBE_S = 1.0
 _POLL_S = 0.02
+_STOP_DEADLINE_S = 5.0  # the longest time it may take to quit by itself
 
 
 class Launcher(Protocol):
@@ -29,6 +34,10 @@ class Launcher(Protocol):
 
     def confirm_ready(self) -> None:
         """Tell that it has answered a real round trip."""
+        ...
+
+    def ready(self) -> bool:
+        """Return whether it runs, and was confirmed to be ready."""
         ...
 
     def expect_stop(self, deadline_s: float) -> None:
@@ -63,8 +72,12 @@ class Webots:
         supervisor_node_name: the ROS name of the world's supervisor.
         world_path: the world to load; or the name of a world that ships, e.g. "arena".
         launcher: what starts the process; by default a process on this machine.
+        driver: of that process: "stub", the simulator that ships, or "webots".
+        options: command-line options of that process, e.g. ["--step-sleep-ms=5"].
         start_deadline_s: the longest time until it answers.
-        stop_deadline_s: the longest time it may take to quit by itself.
+
+    Raises:
+        ConfigurationError: the process on this machine refused the world or the driver.
     """
 
     def __init__(
@@ -73,15 +86,16 @@ class Webots:
         world_path: str | Path,
         *,
         launcher: Launcher | None = None,
+        driver: str = "stub",
+        options: Sequence[str] = (),
         start_deadline_s: float = 60.0,
-        stop_deadline_s: float = 5.0,
     ) -> None:
         self._own: Owned | None = None
         if launcher is None:
             # The launcher talks to a sidecar, which this layer knows nothing of.
             from palaestra_trainer.simulators.process import ProcessLauncher  # noqa: PLC0415
 
-            launcher = self._own = ProcessLauncher(world_path)
+            launcher = self._own = ProcessLauncher(world_path, driver, options)
         self.supervisor_node_name = supervisor_node_name
         self.world_path = world_path
         self.observer = Observer(supervisor_node_name)
@@ -90,19 +104,33 @@ class Webots:
         # Its own connection, with a shorter patience: a simulator that hangs is not available.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
-        self._stop_deadline_s = stop_deadline_s
+        self._at_start: dict[str, Callable[[], None]] = {}
+        self._entered = 0
+
+    def at_start(self, name: str, connect: Callable[[], None]) -> None:
+        """Have `connect` called after each start from now on, in place of what `name` had called before."""
+        self._at_start[name] = connect
 
     def start(self) -> None:
-        """Start the simulator and return when it answers.
+        """Start the simulator and return when it answers and its robots are connected.
+
+        One that runs is connected to anew, one that hangs is restarted. Time stands then, except inside of
+        `with webots:`.
 
         Raises:
             SimulatorDead: its process ended.
             SimulatorHung: it did not answer in time.
+            WrongData: it refuses to be paused, or a robot what it wants of its devices.
         """
+        if self._launcher.ready() and not self.available():
+            self.stop()  # it hangs, and as long as it is there no other can be started
         self._disconnect()
         self._launcher.start()
         self.wait_available()
         self._launcher.confirm_ready()
+        self.supervisor.set_mode(Mode.FAST if self._entered else Mode.PAUSE)
+        for connect in self._at_start.values():
+            connect()
 
     def wait_available(self) -> None:
         """Return when the simulator answers, after a start or a reload.
@@ -132,10 +160,14 @@ class Webots:
             self._end()
         finally:
             self._disconnect()
-        self._launcher.wait_stopped(self._stop_deadline_s + _PROBE_S)
+        self._launcher.wait_stopped(_STOP_DEADLINE_S + _PROBE_S)
 
     def __call__(self) -> None:
-        """Restart the simulator."""
+        """Restart the simulator, however it is; afterwards all is as after `start`.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `stop` and `start`.
+        """
         self.stop()
         self.start()
 
@@ -153,6 +185,10 @@ class Webots:
         Args:
             callback: what needs the simulation.
             restart: whether the simulator is started anew before.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: it cannot be started, run or paused.
+            Any error of `callback`, which hides that it cannot be paused.
         """
         if restart:
             self()
@@ -163,6 +199,7 @@ class Webots:
         if not self.available():
             self.start()
         self.supervisor.set_mode(Mode.FAST)
+        self._entered += 1
         return self
 
     def __exit__(
@@ -171,6 +208,9 @@ class Webots:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._entered -= 1
+        if self._entered:
+            return  # the block around this one goes on
         try:
             self.supervisor.set_mode(Mode.PAUSE)
         except TrainerError:
@@ -179,7 +219,11 @@ class Webots:
                 raise
 
     def close(self) -> None:
-        """Drop all connections, and end the process if it was started for this facade alone."""
+        """Drop all connections, and end the process if it was started for this facade alone.
+
+        Raises:
+            subprocess.TimeoutExpired: that process does not end; no other error, whatever the simulator does.
+        """
         self._disconnect()
         if self._own is not None:
             self._own.close()
@@ -188,7 +232,7 @@ class Webots:
         if not self.available():
             self._launcher.expect_stop(0.0)
             return
-        self._launcher.expect_stop(self._stop_deadline_s)
+        self._launcher.expect_stop(_STOP_DEADLINE_S)
         # It may break before it quits; the announced deadline ends it then.
         with contextlib.suppress(SimulatorFault):
             self.supervisor.quit()

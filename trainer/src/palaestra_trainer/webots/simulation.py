@@ -3,13 +3,16 @@
 One step lasts one period, for all robots of the world at once, and brings one message of every sensor. The
 controller can miss its own wake-up and then sends nothing for that step; so a missing message is awaited for
 a bounded time, and then the simulation steps once more, which is no fault but is counted.
+
+A step that is asked for while time stands is not sent: the controller would wait for time to pass, and hear
+nobody who wants to let it pass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from palaestra_trainer.errors import SimulatorHung, WrongData
+from palaestra_trainer.errors import Paused, SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
 from palaestra_trainer.turns import let_others
 from palaestra_trainer.webots.devices import Motor, Sensor
@@ -55,7 +58,12 @@ class Simulation:
         self._tracked[name] = None
 
     def pose(self, name: str) -> tuple[float, float, float]:
-        """Return x, y (metres) and heading (radians) of a tracked node after the last step."""
+        """Return x, y (metres) and heading (radians) of a tracked node after the last step.
+
+        Raises:
+            KeyError: the node is not tracked.
+            SimulatorDead, SimulatorHung, WrongData: before the first step, when the simulator is asked.
+        """
         return self._tracked[name] or self._observer.pose(name)
 
     def connect(self) -> None:
@@ -73,9 +81,12 @@ class Simulation:
         """Simulate one period and read every sensor; return the extra steps it took, normally 0.
 
         Raises:
+            Paused: time stands; nothing was sent.
             SimulatorDead, SimulatorHung: also when a sensor stays silent.
             WrongData: the simulator refused the period, or a reading cannot be right.
         """
+        if self._supervisor.paused:
+            raise self._paused()
         silent = self._advance_and_read()
         extra_steps = 0
         while silent is not None:
@@ -89,8 +100,11 @@ class Simulation:
         """Bring the simulation back to its start, with that seed; what the scene moves is placed afterwards.
 
         Raises:
+            Paused: time stands; nothing was sent.
             SimulatorDead, SimulatorHung, WrongData
         """
+        if self._supervisor.paused:
+            raise self._paused()
         self._supervisor.set_seed(seed)
         self._supervisor.reset()
         self.step()
@@ -138,6 +152,9 @@ class Simulation:
         if not all(answer.success for answer in answers):
             raise WrongData(self._supervisor.node_name, f"refused a step of {self.period_ms} ms")
         self.simulated_s += self.period_ms / 1000.0
+
+    def _paused(self) -> Paused:
+        return Paused(f"{self._supervisor.node_name} is paused; step inside `with webots:`")
 
     def _release_motors(self) -> None:
         for motor in self._motors:

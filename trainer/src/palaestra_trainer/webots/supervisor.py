@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 
-from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.services import Services
@@ -23,16 +23,27 @@ class Supervisor:
     Args:
         node_name: the ROS name of the supervisor.
         observer: where node and field handles are looked up.
+
+    Attributes:
+        paused: whether time stands, as the simulator has confirmed it; False while that is not known.
     """
 
     def __init__(self, node_name: str, observer: Observer) -> None:
         self.node_name = node_name
+        self.paused = False
         self._observer = observer
         self._services = Services(node_name)
 
     def set_mode(self, mode: Mode) -> None:
-        """Let time pass as `mode` says. Never step while paused: the controller would block for ever."""
-        self._services.get("supervisor/simulation_set_mode", "set_int")(value=int(mode))
+        """Let time pass as `mode` says.
+
+        Raises:
+            WrongData: also when the simulator refuses the mode.
+        """
+        self.paused = False
+        if not self._services.get("supervisor/simulation_set_mode", "set_int")(value=int(mode)).success:
+            raise WrongData(self.node_name, f"refuses mode {int(mode)}; use Webots R2021a or later")
+        self.paused = mode == Mode.PAUSE
 
     def reset(self) -> None:
         """Bring the simulation back to its start within the next step; enabled sensors stay enabled."""
@@ -87,7 +98,8 @@ class Supervisor:
         service(node=self._observer.node(name))
 
     def close(self) -> None:
-        """Drop the connections."""
+        """Drop the connections, and what was confirmed over them."""
+        self.paused = False
         self._services.close()
 
 

@@ -1,0 +1,26 @@
+"""Building blocks of robots, for worlds with robots of one's own."""
+
+import pytest
+
+from palaestra_trainer.webots import Motor, PositionSensor
+
+WHEEL_RAD_S = 5.0
+
+
+def test_a_position_sensor_tells_how_far_its_joint_has_turned(arena):
+    """In radians, over all turns; by the next step it goes on from there."""
+    wheel, sensor = Motor("robotino", "wheel0_joint"), PositionSensor("robotino", "wheel0_joint_sensor")
+    arena.robot.simulation.add([sensor], [wheel])
+    arena.robot.connect()
+    arena.robot.advance()
+    rest = sensor.value
+
+    wheel.set_velocity(WHEEL_RAD_S)
+    arena.robot.advance()
+    begun = sensor.value
+    for _ in range(10):
+        arena.robot.advance()
+
+    assert rest == 0.0
+    assert 0.0 < begun < WHEEL_RAD_S * 0.192
+    assert sensor.value - begun == pytest.approx(10 * WHEEL_RAD_S * 0.192, rel=0.05)

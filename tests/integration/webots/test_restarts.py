@@ -1,0 +1,81 @@
+"""What a restart leaves to be done: nothing."""
+
+import os
+import signal
+
+import gymnasium
+import pytest
+
+import palaestra_trainer.environments  # noqa: F401 - registers the environment
+from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.webots import Webots
+
+STANDS = 0
+
+
+def environment(robot, scene):
+    """Return the task on a robot that is given."""
+    return gymnasium.make("MoveToTargetEnv-v0", robot=robot, scene=scene)
+
+
+def test_an_episode_can_be_begun_after_each_restart(arena):
+    """The paper's loop: its simulator broke at the 25th reset, so it restarts before that."""
+    env = environment(arena.robot, arena.scene)
+
+    began = [arena.webots.run(lambda: env.reset(seed=1), restart=True)[0].tolist() for _ in range(2)]
+
+    assert began[0] == began[1]
+    assert arena.launcher.state().starts == 3
+
+
+def test_a_robot_that_was_made_before_the_simulator_needs_no_connect(master):
+    """Listings 3 and 4 of the paper: the first reset starts Webots, and everything else follows."""
+    del master
+    webots = Webots("robotino", "arena")
+    robot = Robotino(webots)
+    env = environment(robot, RobotinoScene(webots, robot))
+
+    webots.run(lambda: env.reset(seed=1))
+    collected = webots.run(lambda: [env.step(STANDS) for _ in range(3)])
+    with webots:
+        env.reset(seed=2)
+        evaluated = env.step(STANDS)
+
+    robot.close()
+    webots.stop()
+    webots.close()
+    assert [step[4]["outcome"] for step in (*collected, evaluated)] == ["running"] * 4
+
+
+def test_the_newest_robot_of_a_name_is_connected_and_no_other(arena):
+    """A notebook's cell that is carried out again makes another one; the first may have been a mistake."""
+    Robotino(arena.webots, period_ms=50)  # which the simulator would refuse
+    robot = Robotino(arena.webots)
+
+    arena.webots()
+
+    with arena.webots:
+        assert robot.advance() == 0
+    robot.close()
+
+
+@pytest.mark.parametrize("begin", [Webots.start, Webots.__enter__])
+def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(arena, begin):
+    """Its sidecar takes it for ready, and would let nobody start a second one."""
+    hung = arena.pid
+    os.kill(hung, signal.SIGSTOP)
+
+    begin(arena.webots)
+
+    assert arena.webots.available()
+    assert arena.pid != hung
+
+
+def test_a_simulator_that_is_on_its_way_is_not_restarted(arena):
+    """It does not answer either, and only needs its time."""
+    arena.webots.stop()
+    arena.launcher.start()
+
+    arena.webots.start()
+
+    assert arena.launcher.state().starts == 2

@@ -1,0 +1,78 @@
+"""Simulators that rest while a policy is updated: what happens to them then is a fault, never a mistake."""
+
+import os
+import signal
+
+import gymnasium
+import numpy as np
+import pytest
+
+import palaestra_trainer.environments  # noqa: F401 - registers the environment
+from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.simulators.simulator import Simulator
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.webots import Mode
+from tests.waiting import eventually
+
+STAND = np.zeros(1, dtype=np.int64)
+PATIENCE_S = 60.0
+
+
+class Rested:
+    """One simulator in a vector environment, started."""
+
+    def __init__(self):
+        def make(robot, scene):
+            return gymnasium.make("MoveToTargetEnv-v0", disable_env_checker=True, robot=robot, scene=scene)
+
+        self.launcher = ProcessLauncher("arena")
+        self.simulator = Simulator("collect-0", self.launcher, make, PATIENCE_S)
+        self.keeper = Keeper(self.simulator)
+        self.keeper.begin_start()
+        await_one([self.keeper])
+        self.env = SimulatorsVecEnv([self.keeper], 0)
+        self.env.reset()
+
+    def step(self):
+        """Take a step; return its info."""
+        return self.env.step(STAND)[3][0]
+
+    def close(self):
+        """End everything."""
+        self.env.close()
+        self.keeper.stop()
+        self.launcher.close()
+
+
+@pytest.fixture
+def rested(master):
+    """A simulator that was stepped and rests now."""
+    del master
+    rested = Rested()
+    rested.step()
+    rested.env.pause()
+    yield rested
+    rested.close()
+
+
+def test_what_has_rested_goes_on(rested):
+    """At the next rollout."""
+    mode = rested.simulator.webots.observer.mode()
+
+    rested.env.run()
+
+    assert mode is Mode.PAUSE
+    assert rested.step()["valid"]
+
+
+@pytest.mark.parametrize(("number", "kind"), [(signal.SIGKILL, "dead"), (signal.SIGSTOP, "hung")])
+def test_what_broke_while_it_rested_is_mended(rested, number, kind):
+    """Its rest could not be ended; that it was once paused is held against nobody."""
+    os.kill(rested.launcher.state().pid, number)
+
+    rested.env.run()
+    fault = rested.step()["sim_fault"]
+
+    assert fault["kind"] == kind
+    eventually(lambda: rested.step()["valid"], PATIENCE_S)
