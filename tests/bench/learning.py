@@ -10,12 +10,14 @@ import yaml
 
 from palaestra_trainer.environments import baselines
 from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.seeds import episode_seeds
 from tests.bench.arena import running
 from tests.local_run import PALAESTRA
 from tests.soak.jobs import example
 
 SEEDS = (1, 2, 3, 4, 5)
 EPISODES = 100
+STREAM = "bench"
 MOVEMENTS = example("move-to-target")["spec"]["trainer"]["environment"]["options"]["movements"]
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 
@@ -44,7 +46,7 @@ def train_and_measure(seed):
             stderr=subprocess.DEVNULL,
         )
         result = subprocess.run(
-            [EVAL, Path(folder) / "move-to-target/0", f"--episodes={EPISODES}", "--seeds=bench"],
+            [EVAL, Path(folder) / "move-to-target/0", f"--episodes={EPISODES}", f"--seeds={STREAM}"],
             check=True,
             capture_output=True,
             text=True,
@@ -53,10 +55,10 @@ def train_and_measure(seed):
 
 
 def measure_baselines():
-    """Return the success rates of chance and of driving straight at the target."""
+    """Return the success rates of chance and of driving straight at the target, on such episodes."""
     with running() as (robot, scene, _):
         env = make(robot, scene, movements=MOVEMENTS)
         return {
-            name: baselines.success_rate(env, policy, range(EPISODES))
+            name: baselines.success_rate(env, policy, episode_seeds(SEEDS[0], STREAM, EPISODES))
             for name, policy in baselines.BASELINES.items()
         }

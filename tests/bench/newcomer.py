@@ -1,0 +1,32 @@
+"""A newcomer's first minutes: from a clone to the trained policy, with nothing cached."""
+
+import os
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+CACHES = {"PALAESTRA_CACHE", "PIP_CACHE_DIR", "UV_CACHE_DIR", "VIRTUAL_ENV", "XDG_CACHE_HOME"}
+
+
+def measure():
+    """Return the seconds that installing takes, and the whole until `make run` has ended."""
+    with tempfile.TemporaryDirectory() as folder:
+        clone, home = Path(folder, "palaestra"), Path(folder, "home")
+        home.mkdir()
+        subprocess.run(["git", "clone", "--quiet", ROOT, clone], check=True)
+        began = time.monotonic()
+        make("setup", clone, home)
+        installed = time.monotonic()
+        make("run", clone, home)
+        ended = time.monotonic()
+    return {"seconds_installing": round(installed - began), "seconds_to_the_policy": round(ended - began)}
+
+
+def make(verb, clone, home):
+    """Have a verb of the clone's Makefile carried out, as if this machine had nothing of it yet."""
+    kept = {name: value for name, value in os.environ.items() if name not in CACHES}
+    subprocess.run(
+        ["make", verb], cwd=clone, env={**kept, "HOME": home}, check=True, stdout=subprocess.DEVNULL
+    )
