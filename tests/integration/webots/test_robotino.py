@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from palaestra_trainer.errors import NoSuchSensor, WrongData
+from palaestra_trainer.errors import NoReading, NoSuchSensor, WrongData
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.robotino import Robotino, metres
 
@@ -122,3 +122,13 @@ def test_a_world_with_a_separate_supervisor_works_too(start):
         pair.robot.advance()
 
     assert 0.4 < pair.robot.pose().y_m < 0.5
+
+
+@pytest.mark.parametrize("ask", [Robotino.distances, Robotino.bumped])
+def test_readings_are_asked_for_in_vain_before_the_first_period(arena, ask):
+    """That nothing is touched would be a guess, and a TypeError of some arithmetic no answer."""
+    with pytest.raises(NoReading, match=r"let a period pass by advance\(\)"):
+        ask(arena.robot)
+
+    arena.robot.advance()
+    ask(arena.robot)

@@ -6,6 +6,7 @@ TrainerError
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a number of the learner's is none; don't retry       exit 81
 ├── NoSuchSensor         this robot does not have it
+├── NoReading            a robot was asked before its sensors have told anything
 ├── Paused               a step was asked for while the simulation is paused
 └── SimulatorFault       one simulator broke; restart it and go on
     ├── SimulatorDead    its connections are refused or were closed
@@ -42,6 +43,10 @@ class Diverged(TrainerError, ArithmeticError):
 
 class NoSuchSensor(TrainerError, NotImplementedError):
     """The robot has no such sensor, e.g. no camera."""
+
+
+class NoReading(TrainerError, RuntimeError):
+    """A sensor has told nothing yet; the first readings come with the first period."""
 
 
 class Paused(TrainerError, RuntimeError):

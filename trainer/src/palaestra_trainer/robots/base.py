@@ -67,7 +67,8 @@ _TWISTS: dict[Movement, Twist] = {
 class RobotinoAbc(ABC):
     """A Robotino. Any call may raise `SimulatorFault` where a simulator is behind it.
 
-    Readings change in `advance` only: between two calls all of them describe the same moment.
+    Readings change in `advance` only: between two calls all of them describe the same moment. Before the
+    first there are none: `distances` and `bumped` raise `NoReading`.
     """
 
     @property

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from palaestra_trainer.errors import NoReading
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, Pose, RobotinoAbc
 from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, TouchSensor, Webots, set_velocities
 
@@ -75,10 +76,15 @@ class Robotino(RobotinoAbc):
 
     def distances(self) -> NDArray[np.float32]:
         """Return metres to the nearest obstacle, shape (9,), forward first, counter-clockwise."""
-        return np.array([metres(sensor.value) for sensor in self._infrared], dtype=np.float32)
+        volts = [sensor.value for sensor in self._infrared]
+        if None in volts:
+            raise self._no_reading()
+        return np.array([metres(each) for each in volts], dtype=np.float32)
 
     def bumped(self) -> bool:
         """Return whether the bumper touches something."""
+        if self._bumper.value is None:
+            raise self._no_reading()
         return bool(self._bumper.value)
 
     def pose(self) -> Pose:
@@ -101,6 +107,11 @@ class Robotino(RobotinoAbc):
     def close(self) -> None:
         """Drop all connections."""
         self.simulation.close()
+
+    def _no_reading(self) -> NoReading:
+        return NoReading(
+            f"{self.definition}: its sensors have told nothing yet; let a period pass by advance()"
+        )
 
 
 class RobotinoScene:
