@@ -78,7 +78,9 @@ def holdings(run):
     """Return what the trainer and each sidecar hold now."""
     found = {}
     for program in WATCHED:
-        for number, pid in enumerate(sorted(run.pids(program))):
+        pids = set(run.pids(program))
+        forked = {pid for each in pids for pid, _ in below(each)}  # for a moment they bear its name
+        for number, pid in enumerate(sorted(pids - forked)):
             found[f"{program} {number}"] = held_by(pid)
     return found
 
