@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 import palaestra.api
+from tests.pages import fenced
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/**/*.md")])
-BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
 def blocks(language, pages=PAGES):
@@ -17,7 +17,7 @@ def blocks(language, pages=PAGES):
     return [
         pytest.param(text, id=f"{page.stem}-{number}")
         for page in pages
-        for number, (kind, text) in enumerate(BLOCK.findall(page.read_text()))
+        for number, (kind, text) in enumerate(fenced(page.read_text()))
         if kind == language
     ]
 

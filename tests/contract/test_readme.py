@@ -6,6 +6,7 @@ from pathlib import Path
 import yaml
 
 import palaestra.api
+from tests.pages import blocks
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
@@ -14,7 +15,7 @@ README = (ROOT / "README.md").read_text()
 def block(language):
     """Return the first block of a language."""
     """Return the first block of a language."""
-    return re.search(rf"```{language}\n(.*?)\n```", README, re.DOTALL)[1]
+    return blocks(README, language)[0].removesuffix("\n")
 
 
 def test_the_first_command_stands_within_25_lines():
@@ -42,7 +43,7 @@ def test_the_script_shown_is_the_facade_example():
 
 def test_what_is_typed_for_a_cluster_fits_together():
     """Cluster, operator, job, end: each line needs what those before it have made."""
-    shown = re.search(r"```console\n(make cluster\b.*?)\n```", README, re.DOTALL)[1]
+    (shown,) = (block for block in blocks(README, "console") if block.startswith("make cluster "))
     cluster, operator, job, end = (line.partition("#")[0].split() for line in shown.splitlines())
 
     installed = {each["kind"] for each in yaml.safe_load_all((ROOT / operator[-1]).read_text())}

@@ -5,7 +5,6 @@ is, and the image under its own name, so that a cluster which reaches the regist
 """
 
 import os
-import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from tests.cluster.images import version_of
 from tests.cluster.kueue import REPOSITORY
 from tests.e2e.cluster import Cluster, Object
 from tests.e2e.namespace import Namespace
+from tests.pages import blocks
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "queues.md").read_text()
@@ -63,14 +63,14 @@ class Kueue:
         made = _said("kueue.sh")
         _said("load.sh", f"{made}/image.tar")
         self._chart = f"{made}/chart"
-        for block in _blocks(DOING, "sh"):
+        for block in blocks(DOING, "sh"):
             typed = self._type("-euc", block)
             assert typed.returncode == 0, typed.stdout + typed.stderr
         return Namespace(self._cluster, NAMESPACE, there=True)
 
     def remove(self) -> None:
         """Type the last section, whatever there is to take away; nothing may be left."""
-        said = [self._type("-uc", block) for block in _blocks(UNDOING, "sh")]
+        said = [self._type("-uc", block) for block in blocks(UNDOING, "sh")]
         assert self.taken() == "", "".join(each.stdout + each.stderr for each in said)
 
     def _kinds(self) -> str:
@@ -87,7 +87,7 @@ class Kueue:
 
 def scheduling(priority: str | None = None) -> Object:
     """Return the `scheduling` that the page gives a job, of a priority class or of none."""
-    found: list[Object] = [yaml.safe_load(block)["spec"]["scheduling"] for block in _blocks(DOING, "yaml")]
+    found: list[Object] = [yaml.safe_load(block)["spec"]["scheduling"] for block in blocks(DOING, "yaml")]
     return next(each for each in found if each.get("priorityClassName") == priority)
 
 
@@ -137,10 +137,6 @@ def _looked_at(queue: Object | None) -> int | None:
     """Return the generation of a ClusterQueue that Kueue has taken in."""
     conditions = queue["status"].get("conditions", []) if queue else []
     return next((each["observedGeneration"] for each in conditions if each["type"] == "Active"), None)
-
-
-def _blocks(text: str, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
 def _said(script: str, *arguments: str) -> str:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import yaml
 
 from tests.e2e.cluster import Cluster, CommandFailed, Object
+from tests.waiting import TooLate, eventually
 
 T = TypeVar("T")
 
@@ -155,12 +156,10 @@ class Namespace:
         Raises:
             NeverHeld: there was none in time.
         """
-        give_up = time.monotonic() + within_s
-        while not (value := claim()):
-            if time.monotonic() > give_up:
-                raise NeverHeld(f"not within {within_s:.0f} s: {_source(claim)}")
-            time.sleep(LOOK_EVERY_S)
-        return value
+        try:
+            return eventually(claim, within_s, LOOK_EVERY_S)
+        except TooLate as late:
+            raise NeverHeld(f"not within {within_s:.0f} s: {_source(claim)}") from late
 
     def wait_for_reason(self, name: str, reason: str, within_s: float = SHORT_S) -> Object:
         """Wait until the status gives a reason for the only replica; return what it says of it then."""

@@ -21,6 +21,7 @@ import yaml
 from palaestra.local.ports import HeldPorts
 from tests.control_plane.plane import ADDRESS, started
 from tests.control_plane.programs import programs
+from tests.waiting import TooLate, eventually
 
 PROGRAMS = ("prometheus", "promtool")
 SCRAPE_S = 1
@@ -65,12 +66,10 @@ class Prometheus:
         Raises:
             NotAnswered: there was none within `deadline_s`.
         """
-        ends = time.monotonic() + deadline_s
-        while not (value := claim()):
-            if time.monotonic() > ends:
-                raise NotAnswered(f"not within {deadline_s:g} s; targets up: {self.query('up')}")
-            threading.Event().wait(LOOK_EVERY_S)
-        return value
+        try:
+            return eventually(claim, deadline_s, LOOK_EVERY_S)
+        except TooLate as late:
+            raise NotAnswered(f"{late}; targets up: {self.query('up')}") from late
 
     def _ask(self, what: str, **parameters: Any) -> list[dict[str, Any]]:
         sent = urllib.parse.urlencode(parameters).encode()

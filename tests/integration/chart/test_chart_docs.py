@@ -9,9 +9,10 @@ import pytest
 from tests.chart.helm import NAMESPACE, ROOT
 from tests.control_plane.programs import programs
 from tests.integration.chart.conftest import DEFINITION
+from tests.pages import blocks
 
 PAGE = (ROOT / "docs" / "install.md").read_text()
-BLOCKS = re.findall(r"^```sh\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+BLOCKS = blocks(PAGE, "sh")
 # Without nodes no job ends: `palaestra try` is tested with the operator, and `helm test` by `make e2e`.
 NO_NODES = 'helm() { [[ $1 == test ]] || command helm "$@"; }\n'
 AWAY = f"""

@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from palaestra.cluster.resources import TRAINING_JOBS
+from tests.pages import blocks
 from tests.unit.cli.test_cli_cluster import COMMANDS
 from tests.waiting import eventually
 
@@ -17,7 +18,7 @@ PAGE = (ROOT / "docs/tools.md").read_text()
 
 def test_the_script_of_the_page_runs(control_plane, place, tell, tmp_path, monkeypatch, capsys):
     """From apply to delete, in the namespace of the context; the operator's word is the test's."""
-    [script] = re.findall(r"^```python with-a-cluster\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+    [script] = blocks(PAGE, "python with-a-cluster")
     kubeconfig = yaml.safe_load(control_plane.kubeconfig.read_text())
     kubeconfig["contexts"][0]["context"]["namespace"] = place.name
     (tmp_path / "kubeconfig").write_text(yaml.safe_dump(kubeconfig))

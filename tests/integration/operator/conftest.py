@@ -12,6 +12,7 @@ from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place
+from tests.integration.operator.installed import USER
 from tests.integration.operator.operators import RunningOperator
 
 Start = Callable[..., RunningOperator]
@@ -23,8 +24,7 @@ def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: P
 
     Without election, unless a test asks for it: the tests share one Lease.
     """
-    user = f"system:serviceaccount:{NAMESPACE}:{NAME}"
-    kubeconfig = control_plane.kubeconfig_of(user, "system:serviceaccounts")
+    kubeconfig = control_plane.kubeconfig_of(USER, "system:serviceaccounts")
     started: list[RunningOperator] = []
 
     def begin(*options: str, elect: bool = False, dies_after: int | None = None) -> RunningOperator:

@@ -8,13 +8,11 @@ from datetime import UTC, datetime
 
 import pytest
 
-from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
-from palaestra.operator.options import NAME
 from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
+from tests.integration.operator.installed import USER
 from tests.metrics import complaints, documented, served
 from tests.waiting import eventually
 
-USER = f"system:serviceaccount:{NAMESPACE}:{NAME}"
 PORT = 9090  # a trainer's own
 WRITTEN_S = 60.0  # asked for every 10 s, written every 30 s
 STATUS = TrainerStatus(

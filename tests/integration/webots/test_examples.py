@@ -2,10 +2,11 @@
 
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
+
+from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples"
@@ -36,9 +37,8 @@ def test_the_facade_example_drives_and_reads():
 def test_the_blocks_of_the_page_about_facades_are_one_script():
     """In a process of its own: it wants to start the ROS master too."""
     page = (ROOT / "docs/facades.md").read_text()
-    blocks = re.findall(r"^```python with-a-simulator\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
 
-    result = carried_out("-c", "\n".join(blocks))
+    result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
 
     assert "# robotino is paused; step inside `with webots:`" in page
     assert "\nrobotino is paused; step inside `with webots:`\n" in result.stdout

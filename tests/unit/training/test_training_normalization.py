@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from palaestra_trainer.measuring import measure
 from palaestra_trainer.seeds import EVALUATE
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from tests.pages import blocks
 
 DOCS = Path(__file__).parents[3] / "docs"
 GAMMA = 0.9
@@ -199,8 +199,8 @@ def test_a_policy_that_was_saved_sees_as_it_saw(make_normal, tmp_path):
 
 def shown_in(page, name):
     """Return the block of Python on a page of docs/ that defines `name`."""
-    blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(), re.DOTALL | re.MULTILINE)
-    return next(block for block in blocks if f"def {name}(" in block)
+    found = blocks((DOCS / page).read_text(), "python")
+    return next(block for block in found if f"def {name}(" in block)
 
 
 def test_a_policy_is_used_without_this_package_as_the_page_says(make_normal, tmp_path):

@@ -1,0 +1,15 @@
+"""The fenced blocks of a page of the documentation, which tests carry out as they stand."""
+
+import re
+
+FENCED = re.compile(r"^```([^\n]+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def fenced(page: str) -> list[tuple[str, str]]:
+    """Return every block of a page, as what stands behind its fence, e.g. `sh`, and its lines."""
+    return FENCED.findall(page)
+
+
+def blocks(page: str, kind: str) -> list[str]:
+    """Return the blocks behind whose fence `kind` stands and nothing else."""
+    return [text for found, text in fenced(page) if found == kind]
