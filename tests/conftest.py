@@ -1,10 +1,13 @@
-"""In which order tests run, on how many threads, and that no unit test is about time."""
+"""In which order tests run, on how many threads, that no unit test is about time, and what is skipped."""
 
 import gc
 import os
+from collections.abc import Generator
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from tests.control_plane.programs import REQUIRED, NoPrograms
 
 # Networks of this size learn faster on one thread than on several, which wait for each other; read by torch.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -23,6 +26,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     """Let garbage collections pass over what is imported and collected by now: it stays, and it is much."""
     gc.freeze()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup() -> Generator[None]:
+    """Skip what needs programs of a cluster where they are not built: a fixture need not think of it."""
+    return (yield from _skipped_without_programs())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Generator[None]:
+    """Skip it too where a test asks for them itself."""
+    return (yield from _skipped_without_programs())
+
+
+def _skipped_without_programs() -> Generator[None]:
+    try:
+        return (yield)
+    except NoPrograms as missing:
+        if os.environ.get(REQUIRED) == "1":
+            raise
+        pytest.skip(str(missing))
 
 
 def _minutes(item: pytest.Item) -> float:

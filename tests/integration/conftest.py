@@ -9,8 +9,7 @@ import pytest
 from palaestra.cluster import Api, Resource, connect
 from palaestra_trainer.simulators.master import ensure_master
 from tests.chart.installation import installed as installation
-from tests.control_plane.fixture import running_or_skipped
-from tests.control_plane.plane import ControlPlane
+from tests.control_plane.plane import ControlPlane, running
 from tests.integration.operator.cluster import Place, served
 from tests.waiting import eventually
 
@@ -34,7 +33,7 @@ def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlP
 
     It knows TrainingJobs from the start.
     """
-    with running_or_skipped(tmp_path_factory.mktemp("control-plane"), kinds=KINDS) as plane:
+    with running(tmp_path_factory.mktemp("control-plane"), kinds=KINDS) as plane:
         yield plane
 
 

@@ -1,7 +1,6 @@
 """An API server that knows the kinds which the chart and the examples use, and Helm to install with."""
 
 import json
-import os
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -9,9 +8,8 @@ import pytest
 from palaestra.cluster import Api, connect
 from tests.chart.definitions import KUEUE, PROMETHEUS, definitions
 from tests.chart.helm import NAMESPACE
-from tests.control_plane.fixture import running_or_skipped
-from tests.control_plane.plane import ControlPlane
-from tests.control_plane.programs import REQUIRED, NoPrograms, programs
+from tests.control_plane.plane import ControlPlane, running
+from tests.control_plane.programs import programs
 
 DEFINITION = "trainingjobs.palaestra.dev"  # left by tests that need no more of Palaestra
 NAMESPACES = (NAMESPACE, "robots", "drones")
@@ -26,7 +24,7 @@ Kubectl = Callable[..., str]
 @pytest.fixture(scope="module")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
     """One that nobody else uses: definitions are deleted here, and every TrainingJob with them."""
-    with running_or_skipped(tmp_path_factory.mktemp("chart")) as plane:
+    with running(tmp_path_factory.mktemp("chart")) as plane:
         yield plane
 
 
@@ -45,17 +43,12 @@ def kubectl(control_plane: ControlPlane) -> Kubectl:
 @pytest.fixture(scope="module")
 def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
     """The control plane with those of Prometheus' and Kueue's kinds that the chart and the examples use."""
-    try:
-        files = [
-            f"--filename={definitions(*module)}/{group}_{kind}.yaml"
-            for module, group, kinds in KINDS
-            for kind in kinds
-        ]
-        programs(("helm",))
-    except NoPrograms as error:
-        if os.environ.get(REQUIRED) == "1":
-            raise
-        pytest.skip(str(error))
+    files = [
+        f"--filename={definitions(*module)}/{group}_{kind}.yaml"
+        for module, group, kinds in KINDS
+        for kind in kinds
+    ]
+    programs(("helm",))
     kubectl("apply", "--server-side", *files)
     kubectl("wait", "--for=condition=Established", "--timeout=30s", *files)
     return control_plane

@@ -3,13 +3,10 @@
 import math
 from contextlib import suppress
 
-import pytest
-
-from tests.control_plane.programs import NoPrograms, programs
 from tests.integration.monitoring.life import address, diverge
 from tests.local_run import LocalRun
 from tests.monitoring import targets
-from tests.monitoring.prometheus import PROGRAMS, NotAnswered, scraping
+from tests.monitoring.prometheus import NotAnswered, scraping
 from tests.monitoring.questions import looked_at, questions
 from tests.soak.jobs import LITTLE_DQN, make_job
 
@@ -23,15 +20,6 @@ FAULTY = {
     "evaluation": {"everySteps": 100, "episodes": 1},
     "checkpoint": {"everySteps": 50, "keep": 2},
 }
-
-
-@pytest.fixture(autouse=True)
-def _prometheus_is_there():
-    """Where the network is not, the rest of the suite still is."""
-    try:
-        programs(PROGRAMS)
-    except NoPrograms as error:
-        pytest.skip(str(error))
 
 
 def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(tmp_path, place, start):

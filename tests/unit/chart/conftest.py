@@ -1,6 +1,5 @@
 """The chart's objects in each mode, rendered by Helm; skips where Helm is not built."""
 
-import os
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -9,7 +8,7 @@ import pytest
 
 from tests.chart.helm import objects
 from tests.chart.modes import MODES
-from tests.control_plane.programs import REQUIRED, NoPrograms, programs
+from tests.control_plane.programs import programs
 
 Object = dict[str, Any]
 
@@ -17,13 +16,7 @@ Object = dict[str, Any]
 @pytest.fixture(scope="session", autouse=True)
 def helm_is_built() -> None:
     """Nothing here works without it."""
-    if os.environ.get(REQUIRED) == "1":
-        programs(("helm",))
-        return
-    try:
-        programs(("helm",))
-    except NoPrograms as error:
-        pytest.skip(str(error))
+    programs(("helm",))
 
 
 @pytest.fixture(scope="session")
