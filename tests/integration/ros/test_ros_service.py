@@ -1,6 +1,10 @@
 """Services over a real master and real sockets: they answer, or the fault has a kind."""
 
+import contextlib
+import gc
 import json
+import os
+import socket
 import subprocess
 import sys
 
@@ -67,6 +71,28 @@ def test_calls_together_are_all_answered(service):
     first, second = call_together([(double, {"value": 1.0}), (time, {"ask": True})])
 
     assert (first.success, second.value) == (True, 1.25)
+
+
+def test_both_ends_are_set_up_for_small_messages(service):
+    """BBR, a common default, keeps a timer for each connection: with it four simulators are slower."""
+    double = service("double", "webots_ros/set_float")
+    double.begin(value=1.0)
+
+    with socket.socket(fileno=os.dup(double.fileno())) as client:
+        for end in (client, connected_to(client.getsockname())):
+            assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+            assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_CONGESTION, 16).rstrip(b"\0") == b"reno"
+    assert double.finish().success
+
+
+def connected_to(address):
+    """Return this process's socket whose peer has that address: the node runs in a thread."""
+    for it in gc.get_objects():
+        if isinstance(it, socket.socket):
+            with contextlib.suppress(OSError):
+                if it.getpeername() == address:
+                    return it
+    raise LookupError(address)
 
 
 def test_a_service_nobody_offers_means_a_dead_simulator(service):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 import threading
 import time
+import weakref
 from contextlib import ExitStack
 from functools import partial
 
@@ -211,3 +213,44 @@ def test_of_several_errors_the_first_work_s_is_raised(connections):
 
     with pytest.raises(LookupError, match="0"):
         take_turns([lambda: fail(0), lambda: fail(1)])
+
+
+def test_nothing_of_a_work_outlives_it():
+    """Greenlets are used again; an observation or a traceback that one kept would fill the memory."""
+
+    class Result:
+        pass
+
+    [seen] = [weakref.ref(result) for result in take_turns([Result])]
+
+    gc.collect()
+    assert seen() is None
+
+
+def test_turns_can_be_taken_again_after_any_end():
+    """Of a step that failed or was interrupted, the next one knows nothing."""
+
+    def interrupt():
+        let_others()
+        raise KeyboardInterrupt
+
+    def fail():
+        let_others()
+        raise LookupError
+
+    for broken, error in ((interrupt, KeyboardInterrupt), (fail, LookupError)):
+        with pytest.raises(error):
+            take_turns([let_others, broken, let_others])
+        assert take_turns([lambda: 1, let_others, lambda: 3]) == [1, None, 3]
+
+
+def test_each_thread_takes_turns_of_its_own():
+    """A greenlet belongs to the thread that made it; a script may step its environments in another."""
+    take_turns([let_others, let_others])
+    found = []
+
+    thread = threading.Thread(target=lambda: found.extend(take_turns([lambda: 1, lambda: 2])))
+    thread.start()
+    thread.join()
+
+    assert found == [1, 2]

@@ -10,6 +10,7 @@ Threads did the same at twice the processor time: see docs/decisions/0006-turns-
 from __future__ import annotations
 
 import select
+import threading
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
@@ -33,15 +34,60 @@ class Answer(Protocol):
 
 
 class _Turn(greenlet):
-    """One work of `take_turns`.
+    """One work of `take_turns` after another: for each new greenlet Python maps memory, and unmaps it later.
 
     Attributes:
+        work: what it does, or has done.
+        done: whether it has finished.
+        result: what `work` has returned.
+        failure: what it has raised instead.
         away_s: seconds that it has spent in others' turns; those in which all wait are nobody's turn.
         until: the descriptor of the answer that it waits for; None: it can go on.
     """
 
-    away_s = 0.0
-    until: int | None = None
+    def __init__(self) -> None:
+        super().__init__(self._do_works)
+        self.work: Callable[[], Any] | None = None
+        self.done = False
+        self.result: Any = None
+        self.failure: Exception | None = None
+        self.away_s = 0.0
+        self.until: int | None = None
+
+    def begin(self, work: Callable[[], Any]) -> _Turn:
+        """Return this turn, ready to do `work` for the caller."""
+        self.parent = getcurrent()
+        self.work = work
+        self.done = False
+        self.away_s = 0.0
+        self.until = None
+        return self
+
+    def end(self) -> tuple[Any, Exception | None]:
+        """Return what came of the work, and keep nothing of it."""
+        ended = self.result, self.failure
+        self.work = self.result = self.failure = None
+        return ended
+
+    def _do_works(self) -> None:
+        """Do one work, then, when it is switched to again, the next."""
+        while self.work is not None and self.parent is not None:
+            try:
+                self.result = self.work()
+            except Exception as error:  # noqa: BLE001 - raised by `take_turns`, when no work is left in the middle
+                self.failure = error
+            self.done = True
+            self.parent.switch()
+
+
+class _Idle(threading.local):
+    """Turns of this thread that have nothing to do."""
+
+    def __init__(self) -> None:
+        self.turns: list[_Turn] = []
+
+
+_idle = _Idle()
 
 
 def let_others(until: Answer | None = None) -> None:
@@ -73,31 +119,24 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
         Exception: of the first work, in their order, that failed.
         BaseException: from the work whose turn it is, at once; the others are ended where they stand.
     """
-    results: list[Any] = []
-    errors: dict[int, Exception] = {}
-
-    def run(place: int, work: Callable[[], Any]) -> None:
-        try:
-            results[place] = work()
-        except Exception as error:  # noqa: BLE001 - raised below, when no work is left in the middle
-            errors[place] = error
-
-    turns: list[_Turn] = []
-    for place, work in enumerate(works):
-        results.append(None)
-        turns.append(_Turn(lambda place=place, work=work: run(place, work)))
+    turns = [(_idle.turns.pop() if _idle.turns else _Turn()).begin(work) for work in works]
+    waiting = turns
     try:
-        while turns:
-            for turn in _ready(turns):
+        while waiting:
+            for turn in _ready(waiting):
                 turn.switch()
-            turns = [turn for turn in turns if not turn.dead]
+            waiting = [turn for turn in waiting if not turn.done]
     except BaseException:
         for turn in turns:
-            turn.throw()
+            if not turn.dead:
+                turn.throw()
         raise
-    if errors:
-        raise errors[min(errors)]
-    return results
+    ended = [turn.end() for turn in turns]
+    _idle.turns += turns
+    for _, failure in ended:
+        if failure is not None:
+            raise failure
+    return [result for result, _ in ended]
 
 
 def _ready(turns: list[_Turn]) -> list[_Turn]:

@@ -243,6 +243,6 @@ def _transition(before: Situation, after: Situation, outcome: Outcome) -> Transi
     return Transition(
         before_m=before.target_distance_m,
         after_m=after.target_distance_m,
-        nearest_m=float(after.distances_m.min()),
+        nearest_m=min(after.distances_m.tolist()),
         outcome=outcome,
     )

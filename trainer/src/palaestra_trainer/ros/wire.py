@@ -12,6 +12,7 @@ import struct
 import time
 from collections.abc import Mapping
 
+from palaestra_sim.protocol import sockets
 from palaestra_sim.protocol.tcpros import LENGTH, MAX_FRAME_BYTES, FramingError, decode_header, encode_header
 from palaestra_trainer import patience
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, WrongData
@@ -55,7 +56,8 @@ class Wire:
         except OSError as error:
             raise self._fault("cannot be reached", error) from error
         self._socket.settimeout(None)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for option in sockets.OPTIONS:
+            self._socket.setsockopt(*option)
         timeval = _TIMEVAL.pack(int(deadline_s), int(deadline_s % 1 * 1e6))
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, timeval)

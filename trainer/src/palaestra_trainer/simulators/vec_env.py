@@ -169,7 +169,7 @@ class SimulatorsVecEnv(VecEnv):
     def _stack(self, observations: list[Any]) -> VecEnvObs:
         if isinstance(self.observation_space, spaces.Dict):
             return {
-                key: np.stack([observation[key] for observation in observations])
+                key: np.array([observation[key] for observation in observations])
                 for key in self.observation_space.spaces
             }
-        return np.stack(observations)
+        return np.array(observations)

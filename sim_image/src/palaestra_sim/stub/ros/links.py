@@ -10,10 +10,11 @@ import socket
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
+from palaestra_sim.protocol import sockets
 from palaestra_sim.protocol.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.stub.ros.loop import Loop
 
-_CHUNK_BYTES = 65536
+_CHUNK_BYTES = 4096
 
 
 class Endpoint(Protocol):
@@ -61,7 +62,8 @@ class Link:
 
     def __init__(self, loop: Loop, connection: socket.socket, greet: Greet) -> None:
         connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for option in sockets.OPTIONS:
+            connection.setsockopt(*option)
         self._loop = loop
         self._socket = connection
         self._greet = greet

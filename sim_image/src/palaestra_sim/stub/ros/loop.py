@@ -10,14 +10,15 @@ import contextlib
 import heapq
 import itertools
 import os
-import selectors
+import select
 import signal
+import socket
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any
 
 Callback = Callable[[], None]
+_File = int | socket.socket
 
 # Being woken costs a virtual machine 30 us, more than the answer to a request. So where the last waits were
 # all short, the next one first looks a few times, and lets others run in between. One longer wait in every
@@ -25,6 +26,8 @@ Callback = Callable[[], None]
 _QUICK_S = 200e-6
 _STREAK = 10  # waits; a trainer's step has fewer
 _LOOKS = 30
+
+_EVENTS = 32  # at a time; others that are ready come with the next look
 
 # What is due as soon as this is what the peers wait for too, such as the end of a step: they send nothing
 # before, and looking for it would only take the processor from those who compute, and come late.
@@ -35,30 +38,31 @@ class Loop:
     """Runs callbacks when sockets are ready, moments have come, or other threads posted."""
 
     def __init__(self) -> None:
-        self._selector = selectors.DefaultSelector()
+        self._epoll = select.epoll()
+        self._watched: dict[int, Callback] = {}
         self._timers: list[tuple[float, int, Callback]] = []
         self._order = itertools.count()
         self._posted: deque[Callback] = deque()
         self._wake_read, self._wake_write = os.pipe()
         os.set_blocking(self._wake_read, False)
         os.set_blocking(self._wake_write, False)
-        self._selector.register(self._wake_read, selectors.EVENT_READ, self._run_posted)
+        self.watch(self._wake_read, self._run_posted)
         self._running = False
         self._quick_waits = 0
         self._wakes_on_signals = False
 
-    def watch(self, file: Any, ready: Callback, *, writing: bool = False) -> None:
+    def watch(self, file: _File, ready: Callback, *, writing: bool = False) -> None:
         """Call `ready` whenever `file` can be read, or with `writing` also when it can be written."""
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if writing else 0)
-        if file in self._selector.get_map():
-            self._selector.modify(file, events, ready)
-        else:
-            self._selector.register(file, events, ready)
+        number = _number(file)
+        change = self._epoll.modify if number in self._watched else self._epoll.register
+        change(number, select.EPOLLIN | (select.EPOLLOUT if writing else 0))
+        self._watched[number] = ready
 
-    def forget(self, file: Any) -> None:
+    def forget(self, file: _File) -> None:
         """Stop watching `file`, before it is closed."""
-        if file in self._selector.get_map():
-            self._selector.unregister(file)
+        number = _number(file)
+        if self._watched.pop(number, None) is not None:
+            self._epoll.unregister(number)
 
     def later(self, delay_s: float, callback: Callback) -> None:
         """Call `callback` once, `delay_s` seconds from now; 0 is after what is ready now."""
@@ -84,8 +88,10 @@ class Loop:
         """Run until `stop`."""
         self._running = True
         while self._running:
-            for key, _ in self._ready():
-                key.data()
+            for number, _ in self._ready():
+                # One that was ready may have been forgotten by one before it.
+                if (ready := self._watched.get(number)) is not None:
+                    ready()
             while self._timers and self._timers[0][0] <= time.monotonic():
                 heapq.heappop(self._timers)[2]()
 
@@ -93,26 +99,26 @@ class Loop:
         """Close what the loop itself opened; signals end no wait any more."""
         if self._wakes_on_signals:
             signal.set_wakeup_fd(-1)
-        self._selector.close()
+        self._epoll.close()
         os.close(self._wake_read)
         os.close(self._wake_write)
 
-    def _ready(self) -> list[tuple[selectors.SelectorKey, int]]:
+    def _ready(self) -> list[tuple[int, int]]:
         """Return what is ready, after a wait; where a short one is to be expected, look a few times first."""
         wait_s = self._wait_s()
         if wait_s == 0.0:
-            return self._selector.select(0)
+            return self._epoll.poll(0, _EVENTS)
         began = time.monotonic()
         ready = self._look() if self._quick_waits >= _STREAK and (wait_s is None or wait_s > _NEAR_S) else []
-        ready = ready or self._selector.select(wait_s)
+        ready = ready or self._epoll.poll(wait_s, _EVENTS)
         quick = time.monotonic() - began < _QUICK_S
         self._quick_waits = self._quick_waits + 1 if quick else 0
         return ready
 
-    def _look(self) -> list[tuple[selectors.SelectorKey, int]]:
+    def _look(self) -> list[tuple[int, int]]:
         """Return what is ready, after a few looks; nothing, if it takes longer."""
         for _ in range(_LOOKS):
-            if ready := self._selector.select(0):
+            if ready := self._epoll.poll(0, _EVENTS):
                 return ready
             os.sched_yield()
         return []
@@ -124,3 +130,7 @@ class Loop:
         os.read(self._wake_read, 4096)
         while self._posted:
             self._posted.popleft()()
+
+
+def _number(file: _File) -> int:
+    return file if isinstance(file, int) else file.fileno()
