@@ -92,6 +92,16 @@ def test_a_simulator_that_is_restarted_inside_of_a_context_runs(arena):
     assert (inside, arena.webots.observer.mode()) == (Mode.FAST, Mode.PAUSE)
 
 
+def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(arena):
+    """Who stops it knows that it is gone; the next context starts it."""
+    with arena.webots:
+        arena.webots.stop()
+    with arena.webots:
+        arena.robot.advance()
+
+    assert arena.webots.observer.mode() is Mode.PAUSE
+
+
 def test_a_mode_that_is_refused_is_told(arena):
     """3 was FAST until Webots R2020b; whoever believes that it runs steps for ever."""
     with pytest.raises(WrongData, match="robotino: refuses mode 3"):

@@ -106,6 +106,7 @@ class Webots:
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}
         self._entered = 0
+        self._stopped = False
 
     def at_start(self, name: str, connect: Callable[[], None]) -> None:
         """Have `connect` called after each start from now on, in place of what `name` had called before."""
@@ -128,6 +129,7 @@ class Webots:
         self._launcher.start()
         self.wait_available()
         self._launcher.confirm_ready()
+        self._stopped = False
         self.supervisor.set_mode(Mode.FAST if self._entered else Mode.PAUSE)
         for connect in self._at_start.values():
             connect()
@@ -156,6 +158,7 @@ class Webots:
         Raises:
             SimulatorHung: even killing it had no effect in time.
         """
+        self._stopped = True
         try:
             self._end()
         finally:
@@ -198,6 +201,7 @@ class Webots:
     def __enter__(self) -> Self:
         if not self.available():
             self.start()
+        self._stopped = False
         self.supervisor.set_mode(Mode.FAST)
         self._entered += 1
         return self
@@ -209,8 +213,8 @@ class Webots:
         traceback: TracebackType | None,
     ) -> None:
         self._entered -= 1
-        if self._entered:
-            return  # the block around this one goes on
+        if self._entered or self._stopped:
+            return  # the block around this one goes on, or there is nothing left to be paused
         try:
             self.supervisor.set_mode(Mode.PAUSE)
         except TrainerError:
