@@ -89,12 +89,13 @@ class Wire:
         if self._quick and not self._filled:
             # Nearly always the whole frame is here, and nothing else.
             try:
-                self._filled = self._socket.recv_into(self._buffer, 0, socket.MSG_DONTWAIT)
+                filled = self._socket.recv_into(self._buffer, 0, socket.MSG_DONTWAIT)
             except OSError:
                 return self._receive_in_parts(ahead)
-            end = self._frame_end(ahead)
-            if end and end == self._filled:
-                return self._take(ahead, end)
+            begin = ahead + LENGTH.size
+            if filled >= begin and LENGTH.unpack_from(self._buffer, ahead)[0] == filled - begin:
+                return self._view[0 if ahead else begin : filled]
+            self._filled = filled
         return self._receive_in_parts(ahead)
 
     def _receive_in_parts(self, ahead: int) -> memoryview:
