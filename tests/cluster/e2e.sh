@@ -82,4 +82,6 @@ say "running the end-to-end tests"
 export PALAESTRA_E2E=1 PALAESTRA_REQUIRE_CLUSTER=1 PALAESTRA_E2E_IMAGES=$CACHE/e2e-images
 env --default-signal=INT .venv/bin/pytest tests/e2e --durations=15 "$@" &
 tests=$!
-wait "$tests"
+ended=0
+wait "$tests" || ended=$? # a Ctrl-C that comes just before is acted on behind it, if this does not end the script
+exit "$ended"

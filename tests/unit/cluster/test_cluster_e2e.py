@@ -136,6 +136,19 @@ def test_a_signal_lets_the_tests_clean_up_and_then_removes_the_cluster(e2e, stop
     assert e2e.calls == ["up.sh", "tests", "cleaned", "down.sh"]
 
 
+def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
+    """On a busy machine the tests may have ended before it hears of Ctrl-C: it did not end by their result."""
+    with e2e.started(tests_end="") as process:
+        eventually(lambda: "tests" in e2e.calls)
+        process.send_signal(signal.SIGSTOP)
+        ctrl_c(process)
+        eventually(lambda: "cleaned" in e2e.calls)
+        process.send_signal(signal.SIGCONT)
+        assert process.wait(END_S) == INTERRUPTED
+
+    assert e2e.calls == ["up.sh", "tests", "cleaned", "down.sh"]
+
+
 def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
     """What was brought up meanwhile goes too."""
     (tmp_path / "tools/images.sh").write_text("#!/bin/sh\nexit 1\n")
