@@ -14,7 +14,7 @@ from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from tests.bench.arena import running
 from tests.bench.stepping import rate
 
-ROUNDS = 5
+ROUNDS = 15
 STEPS = 200
 SLEEP_MS = 3
 # Every wheel turns the other way at every step, so that none of its commands can be spared.
