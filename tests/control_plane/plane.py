@@ -23,6 +23,7 @@ from palaestra.local.ports import LOOPBACK, HeldPorts
 from tests.control_plane.certificates import Authority, Pair
 from tests.control_plane.programs import programs
 from tests.json_lines import whole_lines
+from tests.waiting import eventually
 
 ADDRESS = LOOPBACK
 SERVICES = "198.19.0.0/24"  # a range for benchmarks: no route leads there
@@ -102,6 +103,17 @@ class ControlPlane:
             check=False,
         )
 
+    def await_kinds(self, *kinds: str) -> None:
+        """Return when CustomResourceDefinitions, named as for kubectl, are served.
+
+        kubectl gives up at once on one that has no condition yet; so it is asked again.
+
+        Raises:
+            TooLate: one of them is not within 30 s.
+        """
+        wait = ("wait", "--for=condition=Established", "--timeout=10s", *kinds)
+        eventually(lambda: self.kubectl(*wait).returncode == 0)
+
     def kubeconfig_of(self, user: str, group: str = "") -> Path:
         """Write a kubeconfig for a user with a certificate and return its path."""
         return _kubeconfig(self.folder / f"{user.replace(':', '-')}.kubeconfig", self, user, group)
@@ -119,6 +131,7 @@ def running(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane
     Raises:
         NoPrograms: the programs are not built.
         DidNotStart: one of them did not come up in 60 s, or the definitions are refused.
+        TooLate: the definitions are not served within 30 s.
     """
     authority = Authority.create(folder)
     with ExitStack() as processes:
@@ -143,10 +156,10 @@ def running(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane
 
 def _define(plane: ControlPlane, kinds: Path) -> None:
     file = f"--filename={kinds}"
-    for command in (("apply", "--server-side"), ("wait", "--for=condition=Established", "--timeout=30s")):
-        done = plane.kubectl(*command, file)
-        if done.returncode:
-            raise DidNotStart(f"{kinds}: {done.stderr}")
+    done = plane.kubectl("apply", "--server-side", file)
+    if done.returncode:
+        raise DidNotStart(f"{kinds}: {done.stderr}")
+    plane.await_kinds(file)
 
 
 def _etcd(plane: ControlPlane, port: int, peer_port: int) -> list[str]:

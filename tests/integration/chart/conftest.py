@@ -50,7 +50,7 @@ def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
     ]
     programs(("helm",))
     kubectl("apply", "--server-side", *files)
-    kubectl("wait", "--for=condition=Established", "--timeout=30s", *files)
+    control_plane.await_kinds(*files)
     return control_plane
 
 

@@ -50,10 +50,7 @@ def crowd(tmp_path_factory):
     with running(tmp_path_factory.mktemp("crowd")) as plane:
         installed = plane.kubectl("apply", "-f", str(ROOT / "manifests" / "install.yaml"))
         assert installed.returncode == 0, installed.stderr
-        established = plane.kubectl(
-            "wait", "--for=condition=Established", "crd/trainingjobs.palaestra.dev", "--timeout=30s"
-        )
-        assert established.returncode == 0, established.stderr
+        plane.await_kinds("crd/trainingjobs.palaestra.dev")
         api = connect(str(plane.kubeconfig))
         wait_for(lambda: api.serves("palaestra.dev/v1alpha1"), 30, api.version)
         api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": NAMESPACE}})
