@@ -14,7 +14,6 @@ README = (ROOT / "README.md").read_text()
 
 def block(language):
     """Return the first block of a language."""
-    """Return the first block of a language."""
     return blocks(README, language)[0].removesuffix("\n")
 
 

@@ -172,6 +172,25 @@ def test_a_wait_of_all_is_nobody_s_turn(connections):
     assert min(found) >= waited_s() - waited > 0
 
 
+def test_the_slow_wait_beside_each_other_too(connections):
+    """A step of fifty milliseconds takes that long, whoever was asked before."""
+    began, waited = time.perf_counter(), waited_s()
+    found = []
+
+    def work(place):
+        asks, _ = connections[place]
+        let_others(until=asks)
+        asks.recv(100)
+        found.append(time.perf_counter() - began - away_s())
+
+    answer = threading.Timer(0.05, lambda: [answers.send(b"here") for _, answers in connections])
+    answer.start()
+    take_turns([lambda: work(0), lambda: work(1)])
+    answer.join()
+
+    assert min(found) >= waited_s() - waited > 0
+
+
 def test_when_patience_is_over_nobody_is_waited_for(connections):
     """Sixteen simulators may hang when a run is asked to end."""
     waited = waited_s()

@@ -14,7 +14,7 @@ from palaestra_sim.protocol import sockets
 from palaestra_sim.protocol.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.stub.ros.loop import Loop
 
-_CHUNK_BYTES = 4096
+_CHUNK_BYTES = 4096  # reserved anew for each read; what is longer comes with the next
 
 
 class Endpoint(Protocol):
