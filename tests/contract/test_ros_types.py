@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_sim.protocol.rostypes import message_type, service_type, type_names
+from palaestra_sim.protocol.tcpros import frame
 
 MD5 = json.loads(Path(__file__).with_name("ros_md5.json").read_text())
 MESSAGES, SERVICES = type_names()
@@ -33,8 +34,9 @@ def test_request_and_response_of_every_service_survive_the_wire(name):
     """A service whose types cannot be read would only fail when first called."""
     type_ = service_type(name)
 
-    type_.request.decode(type_.request.encode({}))
-    type_.response.decode(type_.response.encode({}))
+    for codec in (type_.request, type_.response):
+        codec.decode(memoryview(codec.encode({})))
+        assert codec.frame({}) == frame(codec.encode({}))
 
 
 def test_fields_are_named_as_in_the_definition():

@@ -15,8 +15,9 @@ import keyword
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import resources
+from itertools import islice, repeat
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
 
@@ -25,6 +26,8 @@ import genmsg.gentools
 import genmsg.msg_loader
 import genpy
 import genpy.generator
+
+from palaestra_sim.protocol.tcpros import frame
 
 _STRUCT_CODES = {
     "bool": "?",
@@ -46,7 +49,11 @@ class Codec(Protocol):
         """Return the bytes of a message; absent fields are zero, empty or False."""
         ...
 
-    def decode(self, payload: bytes) -> Any:
+    def frame(self, fields: dict[str, Any]) -> bytes:
+        """Return the same behind their length, as TCPROS wants them."""
+        ...
+
+    def decode(self, payload: bytes | memoryview) -> Any:
         """Return an object with one attribute a field.
 
         Raises:
@@ -160,15 +167,19 @@ class _Record:
         parts: for each field None if it is a number, else the record inside.
         codes: of all numbers, in order.
         make: makes the tuple with attributes.
+        flat: whether all fields are numbers.
     """
 
     names: tuple[str, ...]
     parts: tuple[_Record | None, ...]
     codes: str
     make: Callable[[Iterable[Any]], Any]
+    flat: bool
 
-    def flatten(self, fields: Mapping[str, Any]) -> list[Any]:
+    def flatten(self, fields: Mapping[str, Any]) -> Iterable[Any]:
         """Return the numbers of a message, 0 for absent ones."""
+        if self.flat:
+            return map(fields.get, self.names, repeat(0))
         numbers: list[Any] = []
         for name, part in zip(self.names, self.parts, strict=True):
             if part is None:
@@ -179,6 +190,8 @@ class _Record:
 
     def build(self, numbers: Iterator[Any]) -> Any:
         """Return the message that takes its numbers from an iterator."""
+        if self.flat:
+            return self.make(islice(numbers, len(self.names)))
         return self.make([part.build(numbers) if part else next(numbers) for part in self.parts])
 
 
@@ -198,7 +211,7 @@ def _record(spec: Any) -> _Record | None:
     # As in genpy: a field called `from` is an attribute called `from_`.
     names = tuple(name + "_" * keyword.iskeyword(name) for name in spec.names)
     made: Any = collections.namedtuple(spec.short_name, names)  # type: ignore[misc]  # noqa: PYI024 - a run-time name
-    return _Record(names, tuple(parts), codes, made._make)
+    return _Record(names, tuple(parts), codes, partial(tuple.__new__, made), not any(parts))
 
 
 @cache
@@ -212,17 +225,20 @@ class _StructCodec:
     def __init__(self, record: _Record) -> None:
         self._record = record
         self._struct = struct.Struct("<" + record.codes)
-        self._flat = not any(record.parts)
+        self._framed = struct.Struct("<I" + record.codes)
 
     def encode(self, fields: dict[str, Any]) -> bytes:
         return self._struct.pack(*self._record.flatten(fields))
 
-    def decode(self, payload: bytes) -> Any:
+    def frame(self, fields: dict[str, Any]) -> bytes:
+        return self._framed.pack(self._struct.size, *self._record.flatten(fields))
+
+    def decode(self, payload: bytes | memoryview) -> Any:
         try:
             numbers = self._struct.unpack(payload)
         except struct.error as error:
             raise ValueError(f"{len(payload)} bytes for {self._struct.size}") from error
-        return self._record.make(numbers) if self._flat else self._record.build(iter(numbers))
+        return self._record.make(numbers) if self._record.flat else self._record.build(iter(numbers))
 
 
 class _GenpyCodec:
@@ -239,9 +255,12 @@ class _GenpyCodec:
             raise ValueError(f"{self._class.__name__}: {error}") from error
         return buffer.getvalue()
 
-    def decode(self, payload: bytes) -> Any:
+    def frame(self, fields: dict[str, Any]) -> bytes:
+        return frame(self.encode(fields))
+
+    def decode(self, payload: bytes | memoryview) -> Any:
         try:
-            return self._class().deserialize(payload)
+            return self._class().deserialize(bytes(payload))
         except genpy.DeserializationError as error:
             raise ValueError(f"{self._class.__name__}: {error}") from error
 

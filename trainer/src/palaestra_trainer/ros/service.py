@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from palaestra_sim.protocol.rostypes import service_type
-from palaestra_sim.protocol.tcpros import LENGTH, frame
+from palaestra_sim.protocol.tcpros import LENGTH
 from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node
@@ -49,9 +49,9 @@ class RosService:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as a call.
         """
-        data = frame(self._type.request.encode(fields))
+        data = self._type.request.frame(fields)
         try:
-            self._connected().send(data)
+            (self._wire or self._connect()).send(data)
         except BaseException:  # a Ctrl-C too: the next answer would be this request's
             self.close()
             raise
@@ -90,31 +90,28 @@ class RosService:
 
     def _read_answer(self, wire: Wire) -> Any:
         answer = wire.receive(ahead=1)
-        payload = bytes(answer[1 + LENGTH.size :])
+        payload = answer[1 + LENGTH.size :]
         if answer[0] != _OK_BYTE:
-            raise WrongData(self.simulator, f"{self.name} failed: {payload.decode(errors='replace')}")
-        return self._decode(payload)
-
-    def _decode(self, payload: bytes) -> Any:
+            words = bytes(payload).decode(errors="replace")
+            raise WrongData(self.simulator, f"{self.name} failed: {words}")
         try:
             return self._type.response.decode(payload)
         except ValueError as error:
             raise WrongData(self.simulator, f"{self.name} answered with {error}") from error
 
-    def _connected(self) -> Wire:
-        if self._wire is None:
-            node = ensure_node()
-            address = Master(node).service_address(self.name)
-            if address is None:
-                raise SimulatorDead(self.simulator, f"no node serves {self.name}")
-            header = {
-                "callerid": node,
-                "md5sum": self._type.md5,
-                "persistent": "1",
-                "service": self.name,
-                "type": self._type.name,
-            }
-            self._wire = Wire(address, header, self.simulator, self._deadline_s)
+    def _connect(self) -> Wire:
+        node = ensure_node()
+        address = Master(node).service_address(self.name)
+        if address is None:
+            raise SimulatorDead(self.simulator, f"no node serves {self.name}")
+        header = {
+            "callerid": node,
+            "md5sum": self._type.md5,
+            "persistent": "1",
+            "service": self.name,
+            "type": self._type.name,
+        }
+        self._wire = Wire(address, header, self.simulator, self._deadline_s)
         return self._wire
 
 

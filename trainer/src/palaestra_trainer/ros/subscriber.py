@@ -40,7 +40,7 @@ class RosSubscriber:
         self.name = name
         self.simulator = name.split("/")[1]
         self._type = message_type(type_name)
-        self._decode = decode or (lambda payload: self._type.codec.decode(bytes(payload)))
+        self._decode = decode or self._type.codec.decode
         self._deadline_s = deadline_s
         self._wire: Wire | None = None
         self._registered = False

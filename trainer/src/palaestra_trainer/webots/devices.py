@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber, call_together
 from palaestra_trainer.turns import let_others
+from palaestra_trainer.webots.readings import BOOL, FLOAT64, RANGE, Reading
 from palaestra_trainer.webots.services import Services
-
-# What follows a message's std_msgs/Header, whose only part of varying length is `frame_id`.
-_RANGE = struct.Struct("<Bffff")  # sensor_msgs/Range: type, field of view, least, most, reading
-_BOOL = struct.Struct("<?")
-_FLOAT64 = struct.Struct("<d")
-_FRAME_LENGTH = struct.Struct("<I")
-_FRAME_AT = 12  # after sequence number and stamp
 
 # Webots replaces these in names of devices, and nothing else.
 _REPLACED = str.maketrans("-. ()", "_____")
@@ -36,6 +29,9 @@ class Sensor:
         device: the device's name in the world, e.g. ir1
         type_name: the type of its topic.
         decode: reads the value out of a message's bytes.
+
+    Attributes:
+        late: whether what arrives until the next step may belong to the one before.
     """
 
     def __init__(
@@ -46,7 +42,7 @@ class Sensor:
         self._enable = RosService(f"{path}/enable", "webots_ros/set_int")
         self._values = RosSubscriber(f"{path}/value", type_name, decode)
         self._value: Any = None
-        self._late = False
+        self.late = False
 
     @property
     def value(self) -> Any:
@@ -66,16 +62,7 @@ class Sensor:
                 f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step",
             )
         self._values.connect()
-        self._late = False
-
-    def mistrust(self) -> None:
-        """Take nothing that has arrived until the next step for a reading of that step."""
-        self._late = True
-
-    def forget_old(self) -> None:
-        """Throw away what came too late for the step it belonged to."""
-        if self._late:
-            self.read_arrived()
+        self.late = False
 
     def read(self) -> bool:
         """Take the next message; False when it did not come in time, the value stays then.
@@ -86,7 +73,7 @@ class Sensor:
         try:
             self._value = self._values.next()
         except SimulatorHung:
-            self._late = True
+            self.late = True
             return False
         return True
 
@@ -97,10 +84,10 @@ class Sensor:
             SimulatorDead, WrongData: as `RosSubscriber`.
         """
         value = self._values.newest(None)
-        self._late = value is None
+        self.late = value is None
         if value is not None:
             self._value = value
-        return not self._late
+        return not self.late
 
     def disable(self) -> None:
         """Stop the sensor and unsubscribe.
@@ -121,27 +108,21 @@ class DistanceSensor(Sensor):
     """A distance sensor; `value` is what its lookup table gives, volts for a Robotino."""
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "sensor_msgs/Range", self._range)
-
-    def _range(self, payload: memoryview) -> float:
-        return _finite(_fields(_RANGE, payload)[-1], self.device)
+        super().__init__(robot, device, "sensor_msgs/Range", Reading(device, RANGE))
 
 
 class TouchSensor(Sensor):
     """A bumper; `value` is True while something touches it."""
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/BoolStamped", _bool)
+        super().__init__(robot, device, "webots_ros/BoolStamped", Reading(device, BOOL))
 
 
 class PositionSensor(Sensor):
     """The position of a joint; `value` in radians or metres."""
 
     def __init__(self, robot: str, device: str) -> None:
-        super().__init__(robot, device, "webots_ros/Float64Stamped", self._position)
-
-    def _position(self, payload: memoryview) -> float:
-        return _finite(_fields(_FLOAT64, payload)[0], self.device)
+        super().__init__(robot, device, "webots_ros/Float64Stamped", Reading(device, FLOAT64))
 
 
 class Motor:
@@ -217,22 +198,3 @@ def set_velocities(wanted: Iterable[tuple[Motor, float]]) -> None:
     )
     for motor, velocity in changes:
         motor.velocity = velocity
-
-
-def _fields(layout: struct.Struct, payload: memoryview) -> tuple[Any, ...]:
-    """Return what follows a message's header; its length has to be exact, or text becomes a reading."""
-    (frame_bytes,) = _FRAME_LENGTH.unpack_from(payload, _FRAME_AT)
-    begin = _FRAME_AT + _FRAME_LENGTH.size + frame_bytes
-    if len(payload) != begin + layout.size:
-        raise ValueError(f"a message of {len(payload)} bytes, not {begin + layout.size}")
-    return layout.unpack_from(payload, begin)
-
-
-def _bool(payload: memoryview) -> bool:
-    return bool(_fields(_BOOL, payload)[0])
-
-
-def _finite(value: float, device: str) -> float:
-    if not math.isfinite(value):
-        raise ValueError(f"{value} from {device}")
-    return value

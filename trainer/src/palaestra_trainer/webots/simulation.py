@@ -118,7 +118,8 @@ class Simulation:
 
     def _advance_and_read(self) -> Sensor | None:
         for sensor in self._sensors:
-            sensor.forget_old()
+            if sensor.late:
+                sensor.read_arrived()
         try:
             self._advance()
             # Asked before the sensors are read, so that answers and messages come in others' turns;
@@ -132,7 +133,7 @@ class Simulation:
                 self._tracked[name] = self._observer.finish_pose(name)
         except BaseException:  # a Ctrl-C too: what arrives now belongs to this step
             for sensor in self._sensors:
-                sensor.mistrust()
+                sensor.late = True
             raise
         return silent
 

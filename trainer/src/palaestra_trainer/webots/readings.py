@@ -1,0 +1,61 @@
+"""The number that a sensor's message is read for, without the rest of the message.
+
+Every topic of a sensor begins with a std_msgs/Header, whose only part of varying length is `frame_id`; one
+device sends the same there each time.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+# What follows the header, in the codes of `struct`; the reading comes last.
+RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
+BOOL = "?"
+FLOAT64 = "d"
+
+_FRAME_ID_LENGTH = struct.Struct("<I")
+_FRAME_ID_AT = 12  # after sequence number and stamp
+
+
+class Reading:
+    """Reads the last number of one device's messages.
+
+    Args:
+        device: whom errors name.
+        codes: of the numbers behind the header.
+    """
+
+    def __init__(self, device: str, codes: str) -> None:
+        self._device = device
+        self._codes = codes
+        self._length = -1  # of a whole message; none has come yet
+        self._frame_id_bytes = 0
+        self._layout = struct.Struct("")
+
+    def __call__(self, message: memoryview) -> Any:
+        """Return the reading.
+
+        Raises:
+            ValueError: it is not finite, or the message has a wrong length: text would become a reading.
+            struct.error: the message ends within its header.
+        """
+        if len(message) != self._length:
+            self._fit(message)
+        numbers = self._layout.unpack(message)
+        if numbers[0] != self._frame_id_bytes:
+            raise ValueError(f"a frame_id of {numbers[0]} bytes, not {self._frame_id_bytes}")
+        if not math.isfinite(numbers[-1]):
+            raise ValueError(f"{numbers[-1]} from {self._device}")
+        return numbers[-1]
+
+    def _fit(self, message: memoryview) -> None:
+        """Take the layout of a message of a new length."""
+        (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
+        length = _FRAME_ID_AT + _FRAME_ID_LENGTH.size + frame_id_bytes + struct.calcsize("<" + self._codes)
+        if len(message) != length:
+            raise ValueError(f"a message of {len(message)} bytes, not {length}")
+        self._length = length
+        self._frame_id_bytes = frame_id_bytes
+        self._layout = struct.Struct(f"<{_FRAME_ID_AT}xI{frame_id_bytes}x{self._codes}")
