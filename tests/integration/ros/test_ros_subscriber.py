@@ -26,7 +26,7 @@ def test_connected_means_that_the_publisher_sends_to_us(peer, ranges):
     """A message sent before would be lost."""
     seen = []
 
-    peer.do(lambda: seen.append(peer.publisher.subscribers))
+    peer.do(lambda: seen.append(len(peer.publisher.topic.links)))
 
     assert ranges.connected
     assert seen == [1]

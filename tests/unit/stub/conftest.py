@@ -30,11 +30,6 @@ class FakePublisher:
         self.template = template
         self.latched = latched
 
-    @property
-    def subscribers(self):
-        """How many inboxes there are."""
-        return len(self.topic.inboxes)
-
     def send(self, fields):
         """Keep the template with these fields."""
         self.topic.deliver({**self.template, **fields})

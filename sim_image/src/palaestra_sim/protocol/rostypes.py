@@ -45,11 +45,11 @@ _STRUCT_CODES = {
 class Codec(Protocol):
     """Turns the values of one message into bytes and back."""
 
-    def encode(self, fields: dict[str, Any]) -> bytes:
+    def encode(self, fields: Mapping[str, Any]) -> bytes:
         """Return the bytes of a message; absent fields are zero, empty or False."""
         ...
 
-    def frame(self, fields: dict[str, Any]) -> bytes:
+    def frame(self, fields: Mapping[str, Any]) -> bytes:
         """Return the same behind their length, as TCPROS wants them."""
         ...
 
@@ -227,10 +227,10 @@ class _StructCodec:
         self._struct = struct.Struct("<" + record.codes)
         self._framed = struct.Struct("<I" + record.codes)
 
-    def encode(self, fields: dict[str, Any]) -> bytes:
+    def encode(self, fields: Mapping[str, Any]) -> bytes:
         return self._struct.pack(*self._record.flatten(fields))
 
-    def frame(self, fields: dict[str, Any]) -> bytes:
+    def frame(self, fields: Mapping[str, Any]) -> bytes:
         return self._framed.pack(self._struct.size, *self._record.flatten(fields))
 
     def decode(self, payload: bytes | memoryview) -> Any:
@@ -247,7 +247,7 @@ class _GenpyCodec:
     def __init__(self, spec: Any) -> None:
         self._class = _genpy_class(spec)
 
-    def encode(self, fields: dict[str, Any]) -> bytes:
+    def encode(self, fields: Mapping[str, Any]) -> bytes:
         buffer = io.BytesIO()
         try:
             _fill(self._class(), fields).serialize(buffer)
@@ -255,7 +255,7 @@ class _GenpyCodec:
             raise ValueError(f"{self._class.__name__}: {error}") from error
         return buffer.getvalue()
 
-    def frame(self, fields: dict[str, Any]) -> bytes:
+    def frame(self, fields: Mapping[str, Any]) -> bytes:
         return frame(self.encode(fields))
 
     def decode(self, payload: bytes | memoryview) -> Any:
@@ -265,7 +265,7 @@ class _GenpyCodec:
             raise ValueError(f"{self._class.__name__}: {error}") from error
 
 
-def _fill(message: Any, fields: dict[str, Any]) -> Any:
+def _fill(message: Any, fields: Mapping[str, Any]) -> Any:
     for name, value in fields.items():
         if isinstance(value, dict):
             _fill(getattr(message, name), value)

@@ -7,7 +7,7 @@ Source: http://wiki.ros.org/ROS/TCPROS and http://wiki.ros.org/ROS/Connection%20
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 LENGTH = struct.Struct("<I")
 
@@ -52,17 +52,25 @@ def decode_header(payload: bytes) -> dict[str, str]:
 class FrameReader:
     """Cuts a stream into frames, however the network delivered it."""
 
+    __slots__ = ("_buffer",)
+
     def __init__(self) -> None:
         self._buffer = bytearray()
 
-    def feed(self, data: bytes) -> Iterator[bytes]:
-        """Yield the payload of every frame that `data` completes.
+    def feed(self, data: bytes) -> Iterable[bytes]:
+        """Return the payload of every frame that `data` completes, to be iterated over once.
 
         Raises:
-            FramingError: a frame claims more than MAX_FRAME_BYTES.
+            FramingError: while iterating, a frame claims more than MAX_FRAME_BYTES.
         """
+        begins_here = not self._buffer and len(data) >= LENGTH.size
+        if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size:
+            return (data[LENGTH.size :],)  # one whole frame, as nearly always
+        self._buffer += data
+        return self._cut()
+
+    def _cut(self) -> Iterator[bytes]:
         buffer = self._buffer
-        buffer += data
         while len(buffer) >= LENGTH.size:
             (length,) = LENGTH.unpack_from(buffer)
             if length > MAX_FRAME_BYTES:

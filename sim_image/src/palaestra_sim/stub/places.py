@@ -55,6 +55,11 @@ class Place:
         """The frame, in the world's."""
         return self.pose if self.parent is None else self.parent.world_pose.after(self.pose)
 
+    @property
+    def world_position(self) -> Vector:
+        """Where its origin is in the world, in metres."""
+        return self.translation if self.parent is None else self.world_pose.position
+
     def chain(self) -> Iterator[Place]:
         """Yield this place and those around it, up to the top of the world."""
         place: Place | None = self

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import pairwise
 
 from palaestra_sim.stub.obstacles import Neighbourhood, Obstacle, Ray
@@ -61,6 +62,12 @@ class LookupTable:
         if self._noisy:
             return value * (1.0 + (base[1] + slope[1] * distance_m) * gauss(0.0, 1.0))
         return value
+
+
+@cache
+def lookup_table(*rows: Row) -> LookupTable:
+    """Return the table of these rows, one for all sensors that have the same."""
+    return LookupTable(rows)
 
 
 class Fan:

@@ -23,7 +23,7 @@ from palaestra_sim.stub.geometry import Pose, turn
 from palaestra_sim.stub.motors import Motor, MotorSpec
 from palaestra_sim.stub.physics import WHEELS, Body
 from palaestra_sim.stub.places import Place, RobotPlace
-from palaestra_sim.stub.rays import LookupTable, Row
+from palaestra_sim.stub.rays import Row, lookup_table
 from palaestra_sim.stub.reading import Reading
 from palaestra_sim.stub.shapes import Shape, bounding_shapes
 from palaestra_sim.world import Node
@@ -204,7 +204,7 @@ class _RobotReader:
         self._devices.sensors[name] = DistanceSensor(
             name=name,
             ray=self._ray(node, pose),
-            table=LookupTable(self._rows(node)),
+            table=lookup_table(*self._rows(node)),
             type=DISTANCE_SENSOR_TYPES[type_name],
             aperture_rad=reading.number(node, "aperture", 1.5708),
             model=node.text("model") or "",

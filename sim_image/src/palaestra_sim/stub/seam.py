@@ -23,11 +23,6 @@ class Service(NamedTuple):
 class Publisher(Protocol):
     """Sends to the subscribers that are connected at that moment."""
 
-    @property
-    def subscribers(self) -> int:
-        """How many are connected."""
-        ...
-
     def send(self, fields: Fields) -> None:
         """Send a message of these fields."""
         ...

@@ -125,4 +125,7 @@ def space(parts: Sequence[str]) -> spaces.Box:
 def observe(seen: Situation, parts: Sequence[str], within: spaces.Box) -> NDArray[np.float32]:
     """Return the numbers of these parts, cut off at the bounds of `within`."""
     numbers = [number for name in parts for number in PARTS[name].measure(seen)]
-    return np.clip(np.array(numbers, np.float32), within.low, within.high)
+    # What np.clip does, at half its price.
+    wanted = np.array(numbers, np.float32)
+    cut_off: NDArray[np.float32] = np.minimum(np.maximum(wanted, within.low), within.high)
+    return cut_off

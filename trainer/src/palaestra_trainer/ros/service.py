@@ -25,6 +25,8 @@ class RosService:
         deadline_s: the longest wait for an answer.
     """
 
+    __slots__ = ("_deadline_s", "_type", "_wire", "name", "simulator")
+
     def __init__(self, name: str, type_name: str, deadline_s: float = DEADLINE_S) -> None:
         self.name = name
         self.simulator = name.split("/")[1]

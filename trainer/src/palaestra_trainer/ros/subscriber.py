@@ -30,11 +30,13 @@ class RosSubscriber:
         deadline_s: the longest wait for a message.
     """
 
+    __slots__ = ("_deadline_s", "_decode", "_registered", "_type", "_wire", "name", "simulator")
+
     def __init__(
         self,
         name: str,
         type_name: str,
-        decode: Callable[[memoryview], Any] | None = None,
+        decode: Callable[[bytes | memoryview], Any] | None = None,
         deadline_s: float = DEADLINE_S,
     ) -> None:
         self.name = name

@@ -34,8 +34,14 @@ class Sensor:
         late: whether what arrives until the next step may belong to the one before.
     """
 
+    __slots__ = ("_enable", "_value", "_values", "device", "late")
+
     def __init__(
-        self, robot: str, device: str, type_name: str, decode: Callable[[memoryview], Any] | None = None
+        self,
+        robot: str,
+        device: str,
+        type_name: str,
+        decode: Callable[[bytes | memoryview], Any] | None = None,
     ) -> None:
         self.device = device
         path = f"/{robot}/{topic_name(device)}"
@@ -107,6 +113,8 @@ class Sensor:
 class DistanceSensor(Sensor):
     """A distance sensor; `value` is what its lookup table gives, volts for a Robotino."""
 
+    __slots__ = ()
+
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "sensor_msgs/Range", Reading(device, RANGE))
 
@@ -114,12 +122,16 @@ class DistanceSensor(Sensor):
 class TouchSensor(Sensor):
     """A bumper; `value` is True while something touches it."""
 
+    __slots__ = ()
+
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/BoolStamped", Reading(device, BOOL))
 
 
 class PositionSensor(Sensor):
     """The position of a joint; `value` in radians or metres."""
+
+    __slots__ = ()
 
     def __init__(self, robot: str, device: str) -> None:
         super().__init__(robot, device, "webots_ros/Float64Stamped", Reading(device, FLOAT64))
@@ -136,6 +148,8 @@ class Motor:
         velocity: rad/s, as the simulator has confirmed it; None while it is not known what it made of it.
         velocity_service: sets it.
     """
+
+    __slots__ = ("_position", "_services", "velocity", "velocity_service")
 
     def __init__(self, robot: str, device: str) -> None:
         services = Services(robot)

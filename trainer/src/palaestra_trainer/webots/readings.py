@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+from functools import cache
 from typing import Any
 
 # What follows the header, in the codes of `struct`; the reading comes last.
@@ -27,6 +28,8 @@ class Reading:
         codes: of the numbers behind the header.
     """
 
+    __slots__ = ("_codes", "_device", "_frame_id_bytes", "_layout", "_length")
+
     def __init__(self, device: str, codes: str) -> None:
         self._device = device
         self._codes = codes
@@ -34,7 +37,7 @@ class Reading:
         self._frame_id_bytes = 0
         self._layout = struct.Struct("")
 
-    def __call__(self, message: memoryview) -> Any:
+    def __call__(self, message: bytes | memoryview) -> Any:
         """Return the reading.
 
         Raises:
@@ -50,7 +53,7 @@ class Reading:
             raise ValueError(f"{numbers[-1]} from {self._device}")
         return numbers[-1]
 
-    def _fit(self, message: memoryview) -> None:
+    def _fit(self, message: bytes | memoryview) -> None:
         """Take the layout of a message of a new length."""
         (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
         length = _FRAME_ID_AT + _FRAME_ID_LENGTH.size + frame_id_bytes + struct.calcsize("<" + self._codes)
@@ -58,4 +61,9 @@ class Reading:
             raise ValueError(f"a message of {len(message)} bytes, not {length}")
         self._length = length
         self._frame_id_bytes = frame_id_bytes
-        self._layout = struct.Struct(f"<{_FRAME_ID_AT}xI{frame_id_bytes}x{self._codes}")
+        self._layout = _layout(frame_id_bytes, self._codes)
+
+
+@cache
+def _layout(frame_id_bytes: int, codes: str) -> struct.Struct:
+    return struct.Struct(f"<{_FRAME_ID_AT}xI{frame_id_bytes}x{codes}")

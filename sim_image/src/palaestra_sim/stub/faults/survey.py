@@ -99,8 +99,6 @@ def check(faults: Iterable[Fault], found: Survey) -> None:
 class _Silent:
     """A publisher with nobody to send to."""
 
-    subscribers = 0
-
     def send(self, fields: Fields) -> None:
         """Send it to nobody."""
 

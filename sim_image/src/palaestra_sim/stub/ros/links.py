@@ -14,7 +14,7 @@ from palaestra_sim.protocol import sockets
 from palaestra_sim.protocol.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.stub.ros.loop import Loop
 
-_CHUNK_BYTES = 4096  # reserved anew for each read; what is longer comes with the next
+_CHUNK_BYTES = 448  # reserved anew for each read, of what Python keeps at hand; the rest comes with the next
 
 
 class Endpoint(Protocol):
@@ -59,6 +59,8 @@ Greet = Callable[["Link", Mapping[str, str]], Endpoint]
 
 class Link:
     """A connection from accept to close; `greet` turns its header into an endpoint."""
+
+    __slots__ = ("_endpoint", "_frames", "_greet", "_loop", "_newest", "_socket", "_unsent", "closed")
 
     def __init__(self, loop: Loop, connection: socket.socket, greet: Greet) -> None:
         connection.setblocking(False)

@@ -103,8 +103,8 @@ class RosNode:
 
     def answer(self, call: object, fields: Mapping[str, Any]) -> None:
         """Answer a call whose handler returned LATER, then the requests that waited behind it."""
-        if isinstance(call, _Call):
-            call.end.answer(call.type, dict(fields))
+        if isinstance(call, ServiceEnd):
+            call.answer(fields)
         self._loop.later(0, self.take_waiting)
 
     def later(self, delay_s: float, callback: Callable[[], None]) -> None:
@@ -223,18 +223,10 @@ def _check_md5(header: Mapping[str, str], type_name: str, md5: str) -> None:
         raise Refused(f"client wants md5sum {theirs}, but {type_name} has {md5}")
 
 
-class _Call:
-    """A call that waits for its answer."""
-
-    __slots__ = ("end", "type")
-
-    def __init__(self, end: ServiceEnd, service: ServiceType) -> None:
-        self.end = end
-        self.type = service
-
-
 class ServiceEnd:
     """The server's end of one client's connection to one service."""
+
+    __slots__ = ("_handler", "_link", "_node", "_persistent", "_service")
 
     def __init__(
         self, node: RosNode, link: Connection, service: ServiceType, handler: Handler, *, persistent: bool
@@ -251,18 +243,18 @@ class ServiceEnd:
 
     def handle(self, payload: bytes) -> None:
         """Have a request handled, and answer it, or let the handler do so later."""
-        self._node.current_call = _Call(self, self._service)
+        self._node.current_call = self
         try:
             fields = self._handler(self._service.request.decode(payload))
         except (ServiceFailed, ValueError) as error:
             self._send(b"\0" + frame(str(error).encode()))
             return
         if fields is not LATER:
-            self.answer(self._service, fields)
+            self.answer(fields)
 
-    def answer(self, service: ServiceType, fields: dict[str, Any]) -> None:
+    def answer(self, fields: Mapping[str, Any]) -> None:
         """Answer the request that was handled last."""
-        self._send(b"\1" + frame(service.response.encode(fields)))
+        self._send(b"\1" + self._service.response.frame(fields))
 
     def lost(self) -> None:
         """Let the node forget the connection."""

@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from palaestra_sim.protocol.rostypes import MessageType
-from palaestra_sim.protocol.tcpros import LENGTH, frame
+from palaestra_sim.protocol.tcpros import LENGTH
 from palaestra_sim.stub.ros.links import Connection, Endpoint
 
 _STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds
-_TRAILING_VALUES = {
+# What a message ends with.
+_READINGS = {
     "sensor_msgs/Range": struct.Struct("<f"),
     "webots_ros/BoolStamped": struct.Struct("<?"),
     "webots_ros/Float64Stamped": struct.Struct("<d"),
@@ -26,6 +27,8 @@ class Topic:
         links: of the subscribers that are connected.
         publishers: how many share the topic.
     """
+
+    __slots__ = ("_last", "latched", "links", "name", "publishers", "type")
 
     def __init__(self, name: str, type_: MessageType, *, latched: bool) -> None:
         self.name = name
@@ -53,6 +56,8 @@ class Topic:
 class _SubscriberEnd:
     """The publisher's end of one subscriber's connection, which only ever closes."""
 
+    __slots__ = ("_dropped", "_link", "_topic")
+
     def __init__(self, topic: Topic, link: Connection, dropped: Callable[[Connection], None]) -> None:
         self._topic = topic
         self._link = link
@@ -69,36 +74,37 @@ class _SubscriberEnd:
 class Publisher:
     """Sends messages to the subscribers that are connected at that moment, queue size 1."""
 
+    __slots__ = ("_frame", "_reading", "_sequence", "_template", "topic")
+
     def __init__(self, topic: Topic, template: dict[str, Any]) -> None:
         self.topic = topic
         self._template = template
         self._sequence = 0
-        self._frame: bytearray | None = None
-
-    @property
-    def subscribers(self) -> int:
-        """How many subscribers are connected."""
-        return len(self.topic.links)
+        # Of `send_value`, made when it is first called.
+        self._frame = bytearray()
+        self._reading = struct.Struct("")
 
     def send(self, fields: Mapping[str, Any]) -> None:
         """Send a message of `fields`, over the template's."""
-        payload = self.topic.type.codec.encode({**self._template, **fields})
-        self.topic.send(frame(payload))
+        self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))
 
     def send_value(self, value: float, stamp_ns: int | None = None) -> None:
         """Send a stamped message whose last field is `value`, the rest as in the template.
+
+        Without a subscriber it is none, and is not counted.
 
         Args:
             value: the reading.
             stamp_ns: nanoseconds of the header's time; the wall clock by default.
         """
-        data = self._frame
-        if data is None:
-            empty = self.topic.type.codec.encode(self._template)
-            data = self._frame = bytearray(frame(empty))
+        if not self.topic.links:
+            return
+        if not self._frame:
+            self._frame += self.topic.type.codec.frame(self._template)
+            self._reading = _READINGS[self.topic.type.name]
+        data, reading = self._frame, self._reading
         self._sequence += 1
         seconds, nanoseconds = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 1_000_000_000)
         _STAMP.pack_into(data, LENGTH.size, self._sequence, seconds, nanoseconds)
-        trailing = _TRAILING_VALUES[self.topic.type.name]
-        trailing.pack_into(data, len(data) - trailing.size, value)
+        reading.pack_into(data, len(data) - reading.size, value)
         self.topic.send(bytes(data))

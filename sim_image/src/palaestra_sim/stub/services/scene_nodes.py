@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from palaestra_sim.stub.geometry import Pose, to_quaternion, transposed
 from palaestra_sim.stub.nodes import SceneNode
+from palaestra_sim.stub.places import Place
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Handler, Service
 
@@ -105,7 +106,7 @@ class NodeServices:
         return {"value": False}
 
     def _get_position(self, request: Any) -> Fields:
-        return {"position": _point(_pose(self._node(request)).position)}
+        return {"position": _point(_place(self._node(request)).world_position)}
 
     def _get_orientation(self, request: Any) -> Fields:
         return {"orientation": _quaternion(_pose(self._node(request)))}
@@ -129,7 +130,7 @@ class NodeServices:
 
     def _get_center_of_mass(self, request: Any) -> Fields:
         """Answer the middle of the node: nothing has a mass here."""
-        return {"centerOfMass": _point(_pose(self._node(request)).position)}
+        return {"centerOfMass": _point(_place(self._node(request)).world_position)}
 
     def _get_static_balance(self, request: Any) -> Fields:
         self._node(request)
@@ -192,10 +193,15 @@ class NodeServices:
 
 
 def _pose(node: SceneNode) -> Pose:
-    """Return where a node is in the world; in Webots a node without a place crashes the controller."""
+    """Return where a node is in the world, and how it is turned."""
+    return _place(node).world_pose
+
+
+def _place(node: SceneNode) -> Place:
+    """Return the place of a node; in Webots a node without one crashes the controller."""
     if node.place is None:
         raise ServiceFailed(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
-    return node.place.world_pose
+    return node.place
 
 
 def _point(vector: tuple[float, float, float]) -> Fields:

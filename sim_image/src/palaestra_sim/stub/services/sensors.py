@@ -63,7 +63,7 @@ class Feed:
         if sensor is None:
             return
         for period_ms, publisher in self.publishers.items():
-            if elapsed_ms % period_ms == 0 and publisher is not None and publisher.subscribers:
+            if elapsed_ms % period_ms == 0 and publisher is not None:
                 publisher.send_value(sensor.value)
 
 
