@@ -8,3 +8,7 @@ OPTIONS = (
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
     (socket.IPPROTO_TCP, socket.TCP_CONGESTION, b"reno"),
 )
+
+# To be read at first: what a step needs is shorter, and Python has blocks of up to 512 bytes at hand, which
+# all connections use in turn. What is longer comes with the next read.
+FIRST_BYTES = 448

@@ -64,7 +64,7 @@ class FrameReader:
             FramingError: while iterating, a frame claims more than MAX_FRAME_BYTES.
         """
         begins_here = not self._buffer and len(data) >= LENGTH.size
-        if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size:
+        if begins_here and LENGTH.unpack_from(data)[0] == len(data) - LENGTH.size <= MAX_FRAME_BYTES:
             return (data[LENGTH.size :],)  # one whole frame, as nearly always
         self._buffer += data
         return self._cut()

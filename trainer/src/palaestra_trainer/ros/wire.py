@@ -20,7 +20,6 @@ from palaestra_trainer.waits import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192
-_AT_ONCE_BYTES = 448  # what Python keeps at hand; the messages and answers of a step are shorter
 
 # Being woken costs a virtual machine 30 us, more than a stub needs for its answer. So where the last wait was
 # short, the next one first looks a few times, and lets others run in between.
@@ -93,7 +92,7 @@ class Wire:
             # Nearly always the whole frame is here, and nothing else. Its bytes lie where those of the last
             # one did, whosever they were: a buffer of one's own has left the processor's caches by now.
             try:
-                data = self._socket.recv(_AT_ONCE_BYTES, socket.MSG_DONTWAIT)
+                data = self._socket.recv(sockets.FIRST_BYTES, socket.MSG_DONTWAIT)
             except OSError:
                 return self._receive_in_parts(ahead)
             begin = ahead + LENGTH.size

@@ -28,14 +28,13 @@ class Reading:
         codes: of the numbers behind the header.
     """
 
-    __slots__ = ("_codes", "_device", "_frame_id_bytes", "_layout", "_length")
+    __slots__ = ("_codes", "_device", "_frame_id_bytes", "_layout")
 
     def __init__(self, device: str, codes: str) -> None:
         self._device = device
         self._codes = codes
-        self._length = -1  # of a whole message; none has come yet
         self._frame_id_bytes = 0
-        self._layout = struct.Struct("")
+        self._layout = _layout(0, codes)
 
     def __call__(self, message: bytes | memoryview) -> Any:
         """Return the reading.
@@ -44,7 +43,7 @@ class Reading:
             ValueError: it is not finite, or the message has a wrong length: text would become a reading.
             struct.error: the message ends within its header.
         """
-        if len(message) != self._length:
+        if len(message) != self._layout.size:
             self._fit(message)
         numbers = self._layout.unpack(message)
         if numbers[0] != self._frame_id_bytes:
@@ -56,14 +55,14 @@ class Reading:
     def _fit(self, message: bytes | memoryview) -> None:
         """Take the layout of a message of a new length."""
         (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
-        length = _FRAME_ID_AT + _FRAME_ID_LENGTH.size + frame_id_bytes + struct.calcsize("<" + self._codes)
+        length = self._layout.size - self._frame_id_bytes + frame_id_bytes
         if len(message) != length:
             raise ValueError(f"a message of {len(message)} bytes, not {length}")
-        self._length = length
         self._frame_id_bytes = frame_id_bytes
         self._layout = _layout(frame_id_bytes, self._codes)
 
 
 @cache
 def _layout(frame_id_bytes: int, codes: str) -> struct.Struct:
+    """Return the layout of a message, which gives the length of its frame_id, then its numbers."""
     return struct.Struct(f"<{_FRAME_ID_AT}xI{frame_id_bytes}x{codes}")

@@ -14,8 +14,6 @@ from palaestra_sim.protocol import sockets
 from palaestra_sim.protocol.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.stub.ros.loop import Loop
 
-_CHUNK_BYTES = 448  # reserved anew for each read, of what Python keeps at hand; the rest comes with the next
-
 
 class Endpoint(Protocol):
     """What a connection turns into once its header has been read."""
@@ -129,7 +127,7 @@ class Link:
         if self.closed:
             return
         try:
-            data = self._socket.recv(_CHUNK_BYTES)
+            data = self._socket.recv(sockets.FIRST_BYTES)
         except BlockingIOError:
             return
         except OSError:
