@@ -4,6 +4,7 @@ import contextlib
 import gc
 import json
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -14,6 +15,8 @@ from palaestra_trainer import patience
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
 from palaestra_trainer.waits import waited_s
+
+DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
 
 PROGRAM_WITH_A_NODE = """\
 import json, os, sys
@@ -48,6 +51,32 @@ def service(peer):
     yield make
     for each in made:
         each.close()
+
+
+@pytest.mark.parametrize("length", [0, 430, 439, 440, 449, 5_000, 100_000])
+def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service, length):
+    """What is looked for at first is short; the rest of a longer one comes in parts."""
+    texts = []
+    peer.do(lambda: peer.node.serve("text", "webots_ros/get_string", lambda _: {"value": texts.pop()}))
+    ask = service("text", "webots_ros/get_string")
+
+    for wanted in ("short", "x" * length, "short"):
+        texts.append(wanted)
+        ask.begin(ask=True)
+        assert select.select([ask], [], [], DEADLINE_S)[0], "no answer"
+        assert ask.finish().value == wanted
+
+
+@pytest.mark.parametrize("length", [0, 439, 440, 441, 5_000, 100_000])
+def test_a_request_of_any_length_arrives_whole(peer, service, length):
+    """A world is told in one request."""
+    heard = []
+    peer.do(lambda: peer.node.serve("hear", "webots_ros/set_string", lambda it: heard.append(it.value) or {}))
+
+    for text in ("x" * length, "short"):
+        service("hear", "webots_ros/set_string")(value=text)
+
+    assert heard == ["x" * length, "short"]
 
 
 def test_a_call_returns_the_response(service):
