@@ -36,6 +36,11 @@ MODES: dict[str, Values] = {
             "podAnnotations": {"example.com/team": "robots"},
             "podLabels": {"team": "robots"},
         },
+        "jobs": {
+            "allowedPodLabels": ["example.com/"],
+            "allowedPodAnnotations": ["example.com/", "note"],
+            "nodeSelector": {"kubernetes.io/os": "linux"},
+        },
         "serviceAccount": {"create": False, "name": "existing"},
     },
 }

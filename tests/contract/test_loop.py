@@ -29,3 +29,18 @@ def test_the_operator_makes_no_object():
 
     assert taken
     assert [name for module, name in taken if inspect.isfunction(getattr(import_module(module), name))] == []
+
+
+def test_a_look_observes_once():
+    """Reading every object of a job again for each question about it made a look three times as dear."""
+    calls = [
+        (source.name, ast.unparse(node.func))
+        for source in SOURCES
+        for node in ast.walk(ast.parse(source.read_text()))
+        if isinstance(node, ast.Call)
+    ]
+
+    assert [call for call in calls if call[1] in {"observe", "self._looking.look"}] == [
+        ("controller.py", "self._looking.look"),
+        ("looking.py", "observe"),
+    ]

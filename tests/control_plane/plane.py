@@ -120,13 +120,16 @@ class ControlPlane:
 
 
 @contextmanager
-def running(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane]:
+def running(
+    folder: Path, *, kinds: Path | None = None, requests_per_s: int | None = None
+) -> Iterator[ControlPlane]:
     """Run a control plane with its files in `folder` until the block ends.
 
     Args:
         folder: exists and is empty.
         kinds: a file of definitions that are there before the controllers, one of which looks for new kinds
             every 30 s only: it collects the garbage.
+        requests_per_s: that each controller may send; None: Kubernetes' own default.
 
     Raises:
         NoPrograms: the programs are not built.
@@ -150,7 +153,7 @@ def running(folder: Path, *, kinds: Path | None = None) -> Iterator[ControlPlane
         _wait_ready(plane, api_server)
         if kinds is not None:
             _define(plane, kinds)
-        processes.enter_context(started(folder, _controllers(plane)))
+        processes.enter_context(started(folder, _controllers(plane, requests_per_s)))
         yield plane
 
 
@@ -202,8 +205,10 @@ def _api_server(plane: ControlPlane, etcd_port: int) -> list[str]:
     ]
 
 
-def _controllers(plane: ControlPlane) -> list[str]:
+def _controllers(plane: ControlPlane, requests_per_s: int | None) -> list[str]:
     user = "system:kube-controller-manager"
+    rate = requests_per_s
+    limits = [] if rate is None else [f"--kube-api-qps={rate}", f"--kube-api-burst={rate}"]
     return [
         str(plane.binaries / "kube-controller-manager"),
         f"--kubeconfig={plane.kubeconfig_of(user)}",
@@ -214,6 +219,7 @@ def _controllers(plane: ControlPlane) -> list[str]:
         "--leader-elect=false",
         f"--bind-address={ADDRESS}",
         "--secure-port=0",
+        *limits,
     ]
 
 

@@ -120,9 +120,10 @@ def evictions(cluster: Cluster) -> Iterator[Evictions]:
 
 @pytest.fixture(scope="session")
 def always_interrupted(cluster: Cluster) -> Iterator[Namespace]:
-    """A namespace with the job `always`, whose trainer does nothing but exit with 75."""
+    """A namespace with the job `always`, whose trainer exits with 75 at the same step each time."""
     made = Namespace(cluster, unique("always"))
-    made.apply(make_job("always", script="exit 75", backoffLimit=0))
+    word = '{"step": 7, "reason": "Interrupted: always"}'
+    made.apply(make_job("always", script=f"echo '{word}' >/dev/termination-log; exit 75", backoffLimit=0))
     yield made
     made.delete()
 

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from tests.e2e.cluster import Object, Refused, path
-from tests.e2e.escalations import HELD, REFUSED, REQUESTS, UNKNOWN, authors
+from tests.e2e.escalations import HELD, METADATA, REFUSED, REQUESTS, UNKNOWN, authors
 from tests.e2e.jobs import make_claim
 from tests.e2e.namespace import EXAMPLES
 from tests.e2e.tour import somebody_s
@@ -179,10 +179,10 @@ def test_a_field_of_pods_is_none_of_a_trainingjob(train, planned, plain, attempt
     assert unnamed(made) == unnamed(plain), attempt.gain
 
 
-@each(HELD)
+@each((*HELD, *METADATA))
 def test_what_nobody_has_opened_to_jobs_is_not_used(train, shared, attempt):
-    """Though it lies in the author's own namespace."""
-    name = f"held-{HELD.index(attempt)}"
+    """Though it lies in the author's own namespace, or is only a word that other controllers obey."""
+    name = f"held-{(*HELD, *METADATA).index(attempt)}"
     train(authors(name, (attempt.path, attempt.value)))
 
     shared.wait(lambda: shared.condition(name, "Accepted").get("reason") == attempt.told)

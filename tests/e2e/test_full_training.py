@@ -2,28 +2,33 @@
 
 import json
 from datetime import datetime
+from pathlib import PurePath
 
 import pytest
 import yaml
 
-from palaestra_sim.world import robots
+from palaestra_sim.world import RunIdentity, robots, ros_name
 from tests.e2e.long_run import KILLS, NAME, REPLICAS
 from tests.e2e.namespace import LONG_S, named
 
 pytestmark = pytest.mark.timeout(1200)
 
 
+def ros_names(content):
+    """Yield the names of a replica's robots, which its sidecars write into the source worlds."""
+    training = yaml.safe_load(content["training.yaml"])
+    job = {field: training[field] for field in ("job", "namespace", "uid", "replica")}
+    for simulator in training["simulators"]:
+        identity = RunIdentity(**job, group=simulator["group"], index=simulator["index"])
+        source = content[PurePath(simulator["world"]).name]
+        yield from (f"/{ros_name(identity, robot.robot)}" for robot in robots(source.encode()))
+
+
 def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
     """The paper's one limitation: a world with fixed names allows one simulator only."""
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
-    generated = [
-        f"/{robot.ros_name}"
-        for content in space.select("configmaps", NAME)
-        for file, world in content["data"].items()
-        if file.endswith(".wbt")
-        for robot in robots(world.encode())
-    ]
+    generated = [name for each in space.select("configmaps", NAME) for name in ros_names(each["data"])]
     assert len(generated) == len(set(generated)) == REPLICAS * 2
 
     def all_known():
@@ -117,7 +122,7 @@ def test_kubectl_shows_a_job_in_one_line(long_run):
 
 @pytest.mark.after_the_long_run
 def test_what_was_run_stands_in_the_config_maps(long_run):
-    """Anyone can read the resolved job and the generated worlds of a replica, after its end too."""
+    """Anyone can read the resolved job and the source worlds of a replica, after its end too."""
     long_run.end()
     contents = long_run.namespace.select("configmaps", NAME)
 

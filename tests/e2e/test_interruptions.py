@@ -31,8 +31,16 @@ def evict(namespace, name, pod):  # noqa: ARG001
     namespace.cluster.evict(namespace.name, pod)
 
 
+def mark(namespace, name, pod):
+    """Leave the mark of an operator that was killed before it evicted the pod."""
+    uid = namespace.get("pods", pod)["metadata"]["uid"]
+    annotations = {"palaestra.dev/replaced": f"1 {uid} Stalled: it stands still"}
+    namespace.cluster.patch("jobs", namespace.name, f"{name}-0", {"metadata": {"annotations": annotations}})
+
+
 @pytest.mark.parametrize(
-    ("interrupt", "counted"), [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption")]
+    ("interrupt", "counted"),
+    [(suspend, "suspension"), (delete, "disruption"), (evict, "disruption"), (mark, "operator")],
 )
 def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
     """Written on the way out, so nothing is lost; never more than one interval if it is not."""

@@ -10,14 +10,15 @@ from tests.e2e.namespace import LONG_S
 pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
 
 FOR_JOBS = {"palaestra.dev/for-jobs": "true"}
-CRASHES = {"env": [{"name": "PYTHONHOME", "value": "/nowhere"}], "startDeadlineSeconds": 20}
-NO_IMAGE = {"image": "nowhere:0", "startDeadlineSeconds": 20}
+CRASHES = {"env": [{"name": "PYTHONHOME", "value": "/nowhere"}]}
+NO_IMAGE = {"image": "nowhere:0"}
 NOWHERE = {"nodeSelector": {"palaestra.dev/nowhere": "true"}}
 NEVER_UP = {
     "driver": "command",
     "image": IMAGE,
     "command": ["sleep", "3600"],
     "startDeadlineSeconds": 15,
+    "restart": {"limit": 1},
     "resources": LITTLE,
 }
 
@@ -28,33 +29,36 @@ def world_map(**labels):
 
 
 @pytest.mark.after_the_kills
-def test_a_simulator_that_never_comes_up_fails_the_replica_and_is_named(namespace, job):
+def test_a_simulator_that_never_comes_up_is_named_and_spends_the_trainers_budget(namespace, job):
     """Kubernetes sees a sidecar that runs; only trainer and operator know that nobody answers."""
     namespace.apply(job("never-up", simulator=NEVER_UP, trainer={"resources": SMALL}, backoffLimit=0))
 
+    assert "collect-0" in namespace.wait_for_reason("never-up", "SimulatorStartDeadline", LONG_S)["message"]
     assert namespace.wait_for_end("never-up", LONG_S) == "Failed"
-    assert namespace.replica("never-up")["reason"] == "SimulatorStartDeadline"
-    assert "collect-0" in namespace.replica("never-up")["message"]
+    assert namespace.replica("never-up")["reason"] == "SimulatorBudgetSpent"
 
 
-def test_a_sidecar_that_crash_loops_fails_the_replica_and_is_named(namespace, job):
-    """Kubernetes never fails a pod for it, and its main container waits for nobody."""
+def test_a_sidecar_that_crash_loops_is_named_and_ends_nothing(namespace, job):
+    """The kubelet starts it again and again; nothing is counted for it."""
     namespace.apply(job("crashes", script=WAIT, simulator=CRASHES))
 
-    assert namespace.wait_for_end("crashes", LONG_S) == "Failed"
-    assert namespace.replica("crashes")["reason"] == "SidecarCrashLoop"
-    assert "sim-collect-0" in namespace.replica("crashes")["message"]
+    told = namespace.wait_for_reason("crashes", "SidecarCrashLoop", LONG_S)
+    assert "sim-collect-0" in told["message"]
+    assert told["phase"] in {"Pending", "Running"}
+    assert told["restarts"]["trainer"] == 0
 
 
-def test_an_image_that_cannot_be_pulled_is_named_with_its_container(namespace, job):
-    """Told as soon as the kubelet knows it, and the end of the replica after the start deadline."""
+def test_an_image_that_cannot_be_pulled_is_named_and_waited_for(namespace, job):
+    """Told as soon as the kubelet knows it; nothing is ended before the bound of its author."""
     namespace.apply(job("no-image", script=WAIT, simulator=NO_IMAGE))
+    namespace.apply(job("no-image-soon", script=WAIT, simulator=NO_IMAGE, startTimeoutSeconds=60))
 
     told = namespace.wait_for_reason("no-image", "ImagePull", LONG_S)
     assert "sim-collect-0" in told["message"]
     assert "nowhere:0" in told["message"]
-    assert namespace.wait_for_end("no-image", LONG_S) == "Failed"
-    assert namespace.replica("no-image")["reason"] == "ImagePull"
+    assert namespace.wait_for_end("no-image-soon", LONG_S) == "Failed"
+    assert namespace.replica("no-image-soon")["reason"] == "ImagePull"
+    assert namespace.replica("no-image")["phase"] == "Pending"
 
 
 def test_a_job_starts_when_its_world_appears(namespace, job):

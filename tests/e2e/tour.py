@@ -17,7 +17,9 @@ def tour(place: Namespace, operators: str) -> None:
     """Have the operator whose pods are in the namespace `operators` do in `place` all that it ever does."""
     refer(place)
     give_up(place)
+    stop_suspended(place)
     suspend(place, flag=False)
+    replace_pod(place)
     suspend(place, flag=True)
     replace_operator(place, operators)
     suspend(place, flag=False)  # the second operator meets the events of the first
@@ -48,10 +50,27 @@ def give_up(place: Namespace) -> None:
     place.wait(lambda: place.get("trainingjobs", "brief") is None, LONG_S)
 
 
+def stop_suspended(place: Namespace) -> None:
+    """Let the time of a job be over while one of its Jobs is suspended: that one is deleted."""
+    place.apply(make_job("over", script=WAIT, replicas=2, activeDeadlineSeconds=15))
+    place.wait(lambda: len(place.pods("over")) == 2, LONG_S)
+    place.cluster.patch("jobs", place.name, "over-0", {"spec": {"suspend": True}})
+    place.wait(lambda: place.get("jobs", "over-0") is None, LONG_S)
+
+
 def suspend(place: Namespace, *, flag: bool) -> None:
     """Suspend or resume a job, and wait until its Job is."""
     place.patch("paused", suspend=flag)
     place.wait(lambda: (place.get("jobs", "paused-0") or {})["spec"]["suspend"] is flag, LONG_S)
+
+
+def replace_pod(place: Namespace) -> None:
+    """Have the pod of a job replaced, as after a mark that an operator left when it was killed."""
+    pod = place.wait(lambda: next(iter(place.pods("paused")), None), LONG_S)
+    mark = f"1 {pod['metadata']['uid']} Stalled: it stands still"
+    annotations = {"metadata": {"annotations": {"palaestra.dev/replaced": mark}}}
+    place.cluster.patch("jobs", place.name, "paused-0", annotations)
+    place.wait(lambda: place.get("pods", named(pod)) is None, LONG_S)
 
 
 def replace_operator(place: Namespace, operators: str) -> None:

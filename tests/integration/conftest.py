@@ -6,16 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from palaestra.cluster import Api, Resource, connect
+from palaestra.cluster import Api
 from palaestra_trainer.simulators.master import ensure_master
-from tests.chart.installation import installed as installation
+from tests.control_plane.installing import install
 from tests.control_plane.plane import ControlPlane, running
-from tests.integration.operator.cluster import Place, served
-from tests.waiting import eventually
+from tests.integration.operator.cluster import Place
 
 KINDS = Path(__file__).parents[2] / "manifests" / "crd.yaml"
-UNNAMESPACED = {"Namespace", "ClusterRole", "ClusterRoleBinding"}
-PLURALS = {"NetworkPolicy": "networkpolicies"}
 
 
 @pytest.fixture(scope="session")
@@ -40,23 +37,18 @@ def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlP
 @pytest.fixture(scope="session")
 def installed(control_plane: ControlPlane) -> Iterator[Api]:
     """An administrator's client, once everything of install.yaml but the Deployment is there."""
-    api = connect(str(control_plane.kubeconfig))
-    for obj in installation():
-        if obj["kind"] not in {"Deployment", "CustomResourceDefinition"}:
-            kind = obj["kind"]
-            resource = Resource(
-                api_version=obj["apiVersion"],
-                kind=kind,
-                plural=PLURALS.get(kind, f"{kind.lower()}s"),
-                namespaced=kind not in UNNAMESPACED,
-            )
-            api.create(resource, obj)
-    eventually(lambda: served(api))
+    api = install(control_plane)
     yield api
     api.close()
 
 
 @pytest.fixture
-def place(installed: Api) -> Place:
+def prefix() -> str:
+    """How the name of the namespace begins."""
+    return "place"
+
+
+@pytest.fixture
+def place(installed: Api, prefix: str) -> Place:
     """A namespace of the test's own."""
-    return Place(installed)
+    return Place(installed, prefix)

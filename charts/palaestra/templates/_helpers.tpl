@@ -67,10 +67,14 @@ readOnlyRootFilesystem: true
   verbs: [update]
 - apiGroups: [batch]
   resources: [jobs]
-  verbs: [get, list, watch, create, patch]
+  verbs: [get, list, watch, create, patch, delete] # delete: suspended ones of ended replicas
 - apiGroups: [""]
   resources: [pods]
   verbs: [list, watch]
+# A pod that no kubelet heals gets a new one; an eviction heeds disruption budgets, a deletion would not.
+- apiGroups: [""]
+  resources: [pods/eviction]
+  verbs: [create]
 - apiGroups: [""]
   resources: [configmaps, persistentvolumeclaims]
   verbs: [get, list, watch, create]

@@ -9,7 +9,11 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from pydantic import ValidationError
+
+from palaestra.api import Status
 from palaestra.api.status import TERMINAL, Phase
+from palaestra.client.waiting import News
 from palaestra.cluster import Api, ApiError, NotFound
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
@@ -35,7 +39,8 @@ def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
         api: the cluster.
         job: the TrainingJob; the API server adds five characters to its name, so that two trials never meet.
         within_s: seconds in which it has to succeed.
-        tell: is called with a line for each phase that the job comes to.
+        tell: is called with a line for each phase that the job comes to, and for each reason why a
+            replica waits.
 
     Raises:
         TrialFailed: it failed, or had not ended in time.
@@ -77,16 +82,16 @@ def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:
 
 def _wait(api: Api, namespace: str, name: str, within_s: float, tell: Tell) -> None:
     ends = time.monotonic() + within_s
-    phase, status = "", Object()
+    phase, status, news = "", Object(), News(f"{namespace}/{name}")
     while phase not in TERMINAL:
         if time.monotonic() > ends:
             raise TrialFailed(f"{namespace}/{name}: {phase} after {within_s:g} s; {_why(status)}")
         if phase:
             time.sleep(PERIOD_S)
         status = _status(api, namespace, name, tell) or status
-        before, phase = phase, status.get("phase", Phase.PENDING.value)
-        if phase != before:
-            tell(f"{namespace}/{name}: {phase}")
+        phase = status.get("phase", Phase.PENDING.value)
+        for line in news.of(phase, _readable(status)):
+            tell(line)
     if phase != Phase.SUCCEEDED.value:
         raise TrialFailed(f"{namespace}/{name}: {phase}; {_why(status)}")
 
@@ -100,6 +105,14 @@ def _status(api: Api, namespace: str, name: str, tell: Tell) -> Object | None:
             raise
         tell(f"{namespace}/{name}: {error}; asked again")
         return None
+
+
+def _readable(status: Object) -> Status:
+    """Return the status as this release reads it; empty where another release has written another."""
+    try:
+        return Status.model_validate(status)
+    except ValidationError:
+        return Status()
 
 
 def _why(status: Object) -> str:

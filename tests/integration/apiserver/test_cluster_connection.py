@@ -3,23 +3,24 @@
 import base64
 import json
 import stat
-from datetime import datetime, timedelta
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
-from kubernetes.config import incluster_config
 
 from palaestra.cluster import (
+    Api,
     ApiError,
     Forbidden,
+    Limits,
     NotConfigured,
     Unreachable,
+    account,
     connect,
     connection,
     own_namespace,
 )
 from palaestra.cluster.resources import PODS
+from palaestra.cluster.transport import Transport
 from tests.control_plane.certificates import Authority
 from tests.integration.apiserver.conftest import write_kubeconfig
 from tests.integration.apiserver.server import reply
@@ -104,32 +105,45 @@ def test_a_server_that_another_authority_vouches_for_is_not_talked_to(control_pl
 
 @pytest.fixture
 def in_a_pod(control_plane, tmp_path, monkeypatch):
-    """The environment and the files of a pod; returns its token's file and a clock to be set forward."""
-    token, late = tmp_path / "token", [timedelta()]
-    monkeypatch.setattr(incluster_config, "SERVICE_TOKEN_FILENAME", str(token))
+    """The environment and the files of a pod; returns the folder of its account."""
     authority = control_plane.authority.pair.certificate
-    monkeypatch.setattr(incluster_config, "SERVICE_CERT_FILENAME", str(authority))
+    (tmp_path / "ca.crt").write_bytes(authority.read_bytes())
     monkeypatch.setenv("KUBERNETES_SERVICE_HOST", "127.0.0.1")
     monkeypatch.setenv("KUBERNETES_SERVICE_PORT", str(control_plane.port))
-    clock = SimpleNamespace(now=lambda: datetime.now() + late[0])  # noqa: DTZ005 - as the client does
-    monkeypatch.setattr(incluster_config, "datetime", SimpleNamespace(datetime=clock, timedelta=timedelta))
-    return SimpleNamespace(token=token, late=late)
+    monkeypatch.setattr(account, "FILES", tmp_path)
+    return tmp_path
+
+
+def token_of(control_plane, *options):
+    """Return a token of the default account."""
+    there = ("serviceaccount/default", "--namespace=default", "--timeout=30s")
+    assert control_plane.kubectl("wait", "--for=create", *there).returncode == 0
+    return control_plane.kubectl("create", "token", "default", *options).stdout.strip()
 
 
 def test_a_pod_is_its_service_account_and_reads_its_token_anew(control_plane, in_a_pod):
     """The kubelet replaces tokens before they expire; the operator runs on."""
-    account = ("serviceaccount/default", "--namespace=default", "--timeout=30s")
-    assert control_plane.kubectl("wait", "--for=create", *account).returncode == 0
-    in_a_pod.token.write_text("expired")
-    api = connect()
+    now_s = [0.0]
+    (in_a_pod / "token").write_text("expired")
+    api = Api(Transport(account.account(clock=lambda: now_s[0]), Limits()))
     with pytest.raises(ApiError, match="Unauthorized"):
         api.version()
 
-    in_a_pod.token.write_text(control_plane.kubectl("create", "token", "default").stdout.strip())
-    in_a_pod.late[0] = timedelta(seconds=61)
+    (in_a_pod / "token").write_text(token_of(control_plane))
+    now_s[0] = 60.0
 
     with pytest.raises(Forbidden, match='"system:serviceaccount:default:default" cannot list'):
         api.list(PODS, "default")
+    api.close()
+
+
+def test_in_a_pod_nothing_has_to_be_named(control_plane, in_a_pod):
+    """As in every pod of a cluster."""
+    (in_a_pod / "token").write_text(token_of(control_plane))
+
+    api = connect()
+
+    assert api.version().startswith("v1.")
     api.close()
 
 

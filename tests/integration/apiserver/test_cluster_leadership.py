@@ -175,3 +175,21 @@ def test_a_candidate_that_never_started_can_be_stopped(real, namespace):
     leadership.stop()
 
     assert not leadership.leads()
+
+
+def test_a_lease_that_was_lost_and_regained_is_another_tenure(real, namespace):
+    """What was decided in the first must not be written in the second."""
+    leads, follows = threading.Semaphore(0), threading.Event()
+    leadership = Leadership(real, namespace, "operator", "me", duration_s=DURATION_S, renew_s=0.3)
+    leadership.start(leads.release, follows.set)
+    assert leads.acquire(timeout=10)
+    first = leadership.term()
+
+    real.merge(LEASES, namespace, "operator", {"spec": {"holderIdentity": "another"}})
+    assert follows.wait(10)
+    lost = leadership.term()
+    assert leads.acquire(timeout=4 * DURATION_S)
+    again = leadership.term()
+    leadership.stop()
+
+    assert (first, lost, again, leadership.term()) == (1, None, 2, None)

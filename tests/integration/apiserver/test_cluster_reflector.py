@@ -40,7 +40,7 @@ class Followed:
     """A reflector of pods, and what it reported."""
 
     def __init__(self, rude, resource=PODS):
-        self.script, self.names = rude.script, []
+        self.script, self.names, self.labels = rude.script, [], []
         self.more = threading.Condition()
         self.reflector = Reflector(rude.api, resource, namespace="n", keep=self.keep, changed=self.changed)
 
@@ -54,6 +54,7 @@ class Followed:
         """Note the name."""
         with self.more:
             self.names.append(obj["metadata"]["name"])
+            self.labels.append(obj["metadata"]["labels"].get("palaestra.dev/job"))
             self.more.notify_all()
 
     def wait_reported(self, *names):
@@ -103,6 +104,22 @@ def test_what_is_listed_and_what_is_added_is_known(follow):
 
     assert followed.reflector.synced
     assert followed.known() == {"a", "b", "c"}
+
+
+def test_an_object_whose_label_changes_is_reported_for_the_old_label_too(follow):
+    """The job that it is taken from has lost it, and would not look until something else wakes it.
+
+    As it is now is reported last: who counts what is reported would keep the old state.
+    """
+    first, later = added("c", "11"), {**added("c", "12"), "type": "MODIFIED"}
+    first["object"]["metadata"]["labels"] = {"palaestra.dev/job": "one"}
+    later["object"] = pod("c", "12")
+    later["object"]["metadata"]["labels"] = {"palaestra.dev/job": "other"}
+
+    followed = follow(stream(first, later, added("d", "13"), ends="silent"))
+    followed.wait_reported("d")
+
+    assert [label for label in followed.labels if label] == ["one", "one", "other"]
 
 
 def test_a_watch_that_is_silent_for_too_long_is_given_up_and_continued(follow):

@@ -81,6 +81,26 @@ def test_a_busy_server_that_asks_for_more_time_than_there_is_gets_it_from_the_qu
     assert time.monotonic() - started < 0.5
 
 
+def test_a_busy_server_that_asks_for_no_time_at_all_is_not_hammered(rude):
+    """`Retry-After: 0` is legal; a client that takes it at its word sends thousands of requests a second."""
+    rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
+
+    with pytest.raises(TooManyRequests):
+        rude.api.create(PODS, POD)
+
+    assert 2 <= len(rude.script.asked) <= 8
+
+
+def test_an_eviction_that_a_disruption_budget_refuses_is_not_waited_for(rude):
+    """A budget may refuse for days; thirty such pods would hold a worker for minutes at each look."""
+    rude.script.calls = [refusal(429, "TooManyRequests", Retry_After="0")]
+
+    with pytest.raises(TooManyRequests):
+        rude.api.evict("n", "p", uid="u")
+
+    assert len(rude.script.asked) == 1
+
+
 def test_nobody_who_listens_is_unreachable(tmp_path):
     """The message names the address."""
     kubeconfig = write_kubeconfig(tmp_path / "nobody", "http://127.0.0.1:9", {})

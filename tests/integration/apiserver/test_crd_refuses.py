@@ -173,6 +173,26 @@ def test_a_driver_that_is_a_command_needs_one(create):
     assert_says(said, "spec.simulators[0].command.*belongs to driver command, which needs one; set both")
 
 
+def groups_with_worlds(*lengths):
+    """Return groups of simulators with inline worlds of so many characters."""
+    return [
+        {"name": f"g{place}", "role": "Collect", "world": {"inline": "x" * length}}
+        for place, length in enumerate(lengths)
+    ]
+
+
+def test_inline_worlds_are_bounded_together(create):
+    """One by one they are within their bounds; a few such jobs would fill a cache."""
+    fits, too_much = (180_000,) * 5, (180_000,) * 4 + (180_001,)
+    evaluation = {"spec__trainer__evaluation": {"everySteps": 0}}
+    accepted, _ = create(make_job(spec__simulators=groups_with_worlds(*fits), **evaluation))
+    code, said = create(make_job(spec__simulators=groups_with_worlds(*too_much), **evaluation))
+
+    assert accepted == 0
+    assert code == 1
+    assert_says(said, "spec.simulators.*more than 900,000 characters; put the worlds into the images")
+
+
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_every_example_is_accepted(apply, example):
     """What people copy works."""

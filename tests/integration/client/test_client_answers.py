@@ -3,6 +3,7 @@
 import json
 
 import pytest
+import yaml
 
 from palaestra import Client
 from palaestra.cli import main
@@ -13,6 +14,14 @@ from tests.integration.apiserver.server import refusal, reply, serving, stream
 
 JOB = "apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: trial}\nspec: {}\n"
 NAMED = {"name": "trial-x7k2p", "namespace": "robots", "uid": "0d1f"}
+WAITS = {
+    "index": 0,
+    "phase": "Pending",
+    "reason": "ImagePull",
+    "message": "container trainer: image a:1 cannot be pulled",
+    "since": "2026-01-31T12:00:05Z",
+}
+WHY = "ImagePull since 2026-01-31T12:00:05Z: container trainer: image a:1 cannot be pulled"
 NO_RIGHT = 'trainingjobs.palaestra.dev is forbidden: User "me" cannot list resource "trainingjobs" in ...'
 NO_ROOM = "trainingjobs.palaestra.dev is forbidden: exceeded quota: few, requested: 1, used: 1, limited: 1"
 
@@ -61,6 +70,57 @@ def test_a_trial_whose_job_is_gone_already_goes_by_what_was_seen(tried, server, 
     made, *_, deleted = server[0].of(watches=False)
     assert made.path.startswith("/apis/palaestra.dev/v1alpha1/namespaces/robots/")
     assert (deleted.method, deleted.body["preconditions"]) == ("DELETE", {"uid": "0d1f"})
+
+
+@pytest.fixture
+def waited(server):
+    """Wait for a job that waits for its image and succeeds then; `report` is the caller's."""
+    script, kubeconfig = server
+    job = yaml.safe_load(JOB) | {"metadata": NAMED | {"generation": 1, "resourceVersion": "1"}}
+    waits = {"phase": "Pending", "observedGeneration": 1, "replicas": [WAITS]}
+    ended = {"phase": "Succeeded", "observedGeneration": 1}
+    last = job | {"metadata": job["metadata"] | {"resourceVersion": "2"}, "status": ended}
+    script.calls = [reply(obj={"metadata": {"resourceVersion": "1"}, "items": [job | {"status": waits}]})]
+    script.watches = [stream({"type": "MODIFIED", "object": last})]
+
+    def wait(**report):
+        with Client(kubeconfig=kubeconfig) as client:
+            return client.wait("trial-x7k2p", deadline_s=20.0, **report)
+
+    return wait
+
+
+def test_a_wait_reports_phases_and_why_replicas_wait(waited):
+    """Somebody looks at the notebook meanwhile."""
+    lines = []
+
+    assert waited(report=lines.append).status.phase == "Succeeded"
+    assert lines == ["trial-x7k2p: Pending", f"trial-x7k2p: replica 0: {WHY}", "trial-x7k2p: Succeeded"]
+
+
+def test_a_wait_prints_nothing_of_its_own(waited, capsys):
+    """A library writes only where its caller asks for it."""
+    waited()
+
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, capsys):
+    """`helm test` with a typo in an image was silent until its deadline."""
+    monkeypatch.setattr("palaestra.trial.PERIOD_S", 0.0)
+    script, kubeconfig = server
+    (tmp_path / "job.yaml").write_text(JOB)
+    waits = reply(obj={"status": {"phase": "Pending", "replicas": [WAITS]}})
+    succeeded = reply(obj={"status": {"phase": "Succeeded"}})
+    script.calls = [reply(201, {"metadata": NAMED}), waits, waits, succeeded, reply()]
+
+    assert main(["try", str(tmp_path / "job.yaml"), f"--kubeconfig={kubeconfig}"]) == 0
+
+    assert capsys.readouterr().out.splitlines() == [
+        "robots/trial-x7k2p: Pending",
+        f"robots/trial-x7k2p: replica 0: {WHY}",
+        "robots/trial-x7k2p: Succeeded",
+    ]
 
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])

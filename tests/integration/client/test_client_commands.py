@@ -42,6 +42,18 @@ def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
     assert "ALGORITHM" in typed("get", "-o", "wide")[1][0]
 
 
+def test_describe_and_watch_take_a_job_whose_name_the_api_server_made(typed, place, tell):
+    """`kubectl create` of a file with generateName leaves the field in the object."""
+    made = place.create(TRAINING_JOBS, {**yaml.safe_load(TRIAL), "metadata": {"generateName": "try-"}})
+    name = made["metadata"]["name"]
+    tell(name, "Succeeded")
+
+    described, watched = typed("describe", name), typed("watch", name)
+
+    assert (described[0], watched[0]) == (0, 0), (described, watched)
+    assert name in described[1][0]
+
+
 def test_get_of_all_namespaces_names_them(typed, place):
     """As kubectl does."""
     place.train("a")

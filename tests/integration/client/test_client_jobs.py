@@ -1,5 +1,6 @@
 """The client against a real API server; the operator's word is the test's."""
 
+import json
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -10,6 +11,7 @@ from palaestra.client import EndedOtherwise, NoPod, NoSuchJob, TookTooLong
 from palaestra.cluster import Invalid
 from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from palaestra.errors import SpecErrors
+from palaestra_sim.world import builtin
 from tests.integration.operator.cluster import training_job
 from tests.waiting import eventually
 
@@ -41,6 +43,40 @@ def test_a_file_and_a_model_are_applied_alike(client, tmp_path):
 
     assert from_model.metadata.uid == from_file.metadata.uid
     assert from_model.metadata.generation == 1
+
+
+def test_a_job_whose_name_the_api_server_made_is_listed_and_followed(client, place, tell):
+    """`kubectl create` of a file with generateName: one such job hid all others of its namespace."""
+    place.train("a")
+    made = place.create(TRAINING_JOBS, {**training_job(), "metadata": {"generateName": "try-"}})
+    name = made["metadata"]["name"]
+
+    tell(name, "Succeeded")
+
+    assert {each.metadata.name for each in client.list()} == {"a", name}
+    assert [each.phase for each in client.statuses(name, deadline_s=SOON_S)] == ["Succeeded"]
+
+
+def test_inline_worlds_of_more_than_256_kib_are_applied_by_the_server_only(
+    client, control_plane, place, tmp_path
+):
+    """A plain `kubectl apply` copies the file into an annotation, which is too long then."""
+    world = builtin("arena").decode() + "# a comment\n" * 12_000
+    groups = [
+        {"name": name, "role": role, "world": {"inline": world}}
+        for name, role in (("collect", "Collect"), ("evaluate", "Evaluate"))
+    ]
+    job = training_job("large", simulators=groups)
+    file = tmp_path / "job.json"
+    file.write_text(json.dumps(job))
+    apply = ("-n", place.name, "apply", "-f", str(file))
+
+    refused = control_plane.kubectl(*apply)
+    stored = client.apply(job)
+
+    assert "metadata.annotations: Too long" in refused.stderr
+    assert client.apply(job).metadata.generation == stored.metadata.generation == 1
+    assert control_plane.kubectl(*apply, "--server-side", "--force-conflicts").returncode == 0
 
 
 def test_a_wrong_job_is_refused_before_anything_is_sent(client):

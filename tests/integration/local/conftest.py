@@ -56,6 +56,8 @@ class Stage:
     opened: ExitStack
     uid: str = field(default_factory=lambda: str(uuid.uuid4()))
     start_deadline_s: float = PATIENCE_S
+    long_s: float = PATIENCE_S
+    shown: list[str] = field(default_factory=list)
     logs: dict[str, Log] = field(default_factory=dict)
 
     @property
@@ -89,7 +91,13 @@ class Stage:
         backoff = BackOff(first_s=0.02, most_s=0.2, calm_s=PATIENCE_S)
         return RunningPod(
             pod,
-            Kubelet(logs=self.logs, backoff=backoff, start_deadline_s=self.start_deadline_s),
+            Kubelet(
+                logs=self.logs,
+                backoff=backoff,
+                start_deadline_s=self.start_deadline_s,
+                show=self.shown.append,
+                long_s=self.long_s,
+            ),
         )
 
     def interrupt(

@@ -1,6 +1,7 @@
 """A pod on this machine behaves as a kubelet's pod does: order, probes, restarts, shutdown."""
 
 import asyncio
+import re
 
 import pytest
 
@@ -71,6 +72,28 @@ def test_a_sidecar_that_hangs_before_it_is_ready_is_given_up_at_the_deadline(sta
         stage.run(silent, main="event run", grace_s=0.2)
 
     assert stage.events == []
+
+
+def test_a_container_that_does_not_come_up_for_long_is_named_with_since_when(stage):
+    """A terminal on which nothing moves says neither what is awaited nor where to look."""
+    stage.long_s, stage.start_deadline_s = 0.05, 0.3
+    silent = stage.container("silent", "sleep 60", startup=ready(stage))
+
+    with pytest.raises(StartFailed):
+        stage.run(silent, main="event run", grace_s=0.2)
+
+    [line] = stage.shown
+    assert re.fullmatch(r"waits for silent since \d\d:\d\d:\d\d; see .*/logs/silent\.log", line)
+
+
+@pytest.mark.parametrize(("first", "lines"), [("", 1), ("echo up; ", 0)])
+def test_a_trainer_is_waited_for_until_its_first_line(stage, first, lines):
+    """From then on it reports itself what it waits for."""
+    stage.long_s = 0.3
+
+    stage.run(main=f"{first}sleep 0.6")
+
+    assert len(stage.shown) == lines
 
 
 def test_a_failed_startup_probe_restarts_the_sidecar(stage):

@@ -126,13 +126,13 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
 
 
 def test_the_run_directory_holds_what_was_run(desk):
-    """The generated worlds, the configuration, the job, and a log for each container."""
+    """The source worlds, the configuration, the job, and a log for each container."""
     desk.write(ASK)
 
     desk.run()
 
     names = {str(each.relative_to(desk.run_directory)) for each in desk.run_directory.rglob("*.*")}
-    assert {"worlds/collect-0.wbt", "worlds/evaluate-0.wbt", "training.yaml", "job.yaml"} <= names
+    assert {"worlds/collect.wbt", "worlds/evaluate.wbt", "training.yaml", "job.yaml"} <= names
     assert {"logs/ros-master.log", "logs/sim-collect-0.log", "logs/trainer.log"} <= names
 
 

@@ -86,7 +86,7 @@ def test_what_a_sick_run_causes_is_told_and_taken_back(tmp_path, folder, rules):
         _fires_and_clears(prometheus, "PalaestraFaultBudgetNearlySpent")
 
         stopped = [
-            run.pid_of(program, "collect-0.wbt") for program in ("palaestra-sidecar", "palaestra-stub")
+            run.pid_of(program, "sim-collect-0/") for program in ("palaestra-sidecar", "palaestra-stub")
         ]
         for pid in stopped:  # with its sidecar, so that nobody starts it anew before it is told
             send(pid, signal.SIGSTOP)

@@ -35,6 +35,7 @@ def test_every_query_of_every_panel_and_all_that_an_alert_looks_at_is_answered(t
             prometheus.until(lambda: prometheus.query("palaestra_operator_leader == 1"), ANSWERED_S)
             diverge(place)
             place.train("waiting")
+            place.hold_up(place.pods("waiting")[0], "ImagePullBackOff", "no such image")
             prometheus.until(lambda: not _drop_answered(asked, prometheus), ANSWERED_S)
 
     assert not asked, "\n".join(f"{it.dashboard}: {it.panel} {it.expr}" for it in asked)

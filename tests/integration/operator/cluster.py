@@ -65,6 +65,32 @@ def world_map() -> Object:
     }
 
 
+def local_queues() -> Object:
+    """Return the kind by which a cluster has heard of Kueue; the test plays it."""
+    kinds = {
+        "kind": "LocalQueue",
+        "listKind": "LocalQueueList",
+        "plural": "localqueues",
+        "singular": "localqueue",
+    }
+    schema = {"openAPIV3Schema": {"type": "object", "x-kubernetes-preserve-unknown-fields": True}}
+    definition = {
+        "apiVersion": "apiextensions.k8s.io/v1",
+        "kind": "CustomResourceDefinition",
+        "metadata": {"name": "localqueues.kueue.x-k8s.io"},
+        "spec": {
+            "group": "kueue.x-k8s.io",
+            "names": kinds,
+            "scope": "Namespaced",
+            "versions": [{"name": "v1beta1", "served": True, "storage": True, "schema": schema}],
+        },
+    }
+    # A name of a group that belongs to Kubernetes' own projects needs their approval.
+    approval = {"api-approved.kubernetes.io": "unapproved, plays Kueue in a test"}
+    definition["metadata"]["annotations"] = approval
+    return definition
+
+
 def stranger(name: str) -> Object:
     """Return a Job that has nothing to do with Palaestra."""
     container = {"name": "main", "image": "theirs", "command": ["true"]}
@@ -80,9 +106,9 @@ def stranger(name: str) -> Object:
 class Place:
     """A namespace, with what people and kubelets do there; `api` is an administrator's."""
 
-    def __init__(self, api: Api) -> None:
+    def __init__(self, api: Api, prefix: str = "place") -> None:
         self.api = api
-        self.name = f"place-{next(numbers)}-{datetime.now(UTC):%M%S}"
+        self.name = f"{prefix}-{next(numbers)}-{datetime.now(UTC):%M%S}"
         api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": self.name}})
 
     def create(self, resource: Resource, obj: Object) -> Object:
@@ -158,6 +184,12 @@ class Place:
         now = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
         running = {"state": {"running": {"startedAt": now}}, "ready": True, "started": True}
         self._report(pod, "Running", running, podIP=address, podIPs=[{"ip": address}], startTime=now)
+
+    def hold_up(self, pod: Object, reason: str, message: str) -> None:
+        """Let a kubelet wait before it starts the trainer of a pod."""
+        waiting = {"state": {"waiting": {"reason": reason, "message": message}}, "ready": False}
+        trainer = {"name": "trainer", "image": "i", "imageID": "", "restartCount": 0, **waiting}
+        self._patch(pod, {"phase": "Pending", "containerStatuses": [trainer]})
 
     def end(self, pod: Object, code: int = 0, word: Termination | None = None) -> None:
         """Let a pod's trainer end with an exit code and a last word."""

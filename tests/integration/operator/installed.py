@@ -1,5 +1,7 @@
 """An operator as a process, with the rights of an installed one, and what it asked of the API server."""
 
+import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +19,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from palaestra.local.ports import LOOPBACK, HeldPorts
 from tests.control_plane.plane import ControlPlane
 
+ROOT = Path(__file__).parents[3]
 USER = "system:serviceaccount:palaestra-system:palaestra-operator"
 PROGRAM = Path(sys.executable).with_name("palaestra")
 READS = ("get", "list", "watch")
@@ -93,15 +96,18 @@ def asked(plane: ControlPlane) -> list[Asked]:
 
 
 @contextmanager
-def operator(plane: ControlPlane, log: Path) -> Iterator[Installed]:
-    """Run an operator until the block ends; its log goes to a file."""
+def operator(plane: ControlPlane, log: Path, *, in_a_pod: bool = False) -> Iterator[Installed]:
+    """Run an operator until the block ends; its log goes to a file.
+
+    It has a kubeconfig, or in a pod the files of its account and the environment that its image sets.
+    """
     with HeldPorts() as ports:
         port = ports.any()
-        kubeconfig = str(plane.kubeconfig_of(USER))
-        options = ("--kubeconfig", kubeconfig, "--metrics-address", f"{LOOPBACK}:{port}")
+        program = _in_a_pod(plane) if in_a_pod else (str(PROGRAM), "operator", *_kubeconfig(plane))
         with log.open("ab") as written:
             process = subprocess.Popen(
-                ["setpriv", "--pdeathsig", "KILL", "--", str(PROGRAM), "operator", *options],
+                ["setpriv", "--pdeathsig", "KILL", "--", *program, f"--metrics-address={LOOPBACK}:{port}"],
+                env=os.environ | _environment(plane) if in_a_pod else None,
                 stdin=subprocess.DEVNULL,
                 stdout=written,
                 stderr=subprocess.STDOUT,
@@ -113,6 +119,30 @@ def operator(plane: ControlPlane, log: Path) -> Iterator[Installed]:
         finally:
             process.kill()
             process.wait()
+
+
+def _kubeconfig(plane: ControlPlane) -> tuple[str, str]:
+    return "--kubeconfig", str(plane.kubeconfig_of(USER))
+
+
+def _in_a_pod(plane: ControlPlane) -> tuple[str, ...]:
+    """Return the command line of an operator with the files that a kubelet gives to its pod."""
+    account = plane.folder / "account"
+    account.mkdir(exist_ok=True)
+    *_, namespace, name = USER.split(":")
+    token = plane.kubectl("create", "token", name, f"--namespace={namespace}")
+    assert token.returncode == 0, token.stderr
+    (account / "token").write_text(token.stdout.strip())
+    (account / "ca.crt").write_bytes(plane.authority.pair.certificate.read_bytes())
+    return sys.executable, str(Path(__file__).with_name("in_a_pod.py")), str(account), "operator"
+
+
+def _environment(plane: ControlPlane) -> dict[str, str]:
+    """Return what the image sets, and what a kubelet does; no kubeconfig of the person is found."""
+    lines = re.findall(r"^ENV (.+)$", (ROOT / "operator" / "Dockerfile").read_text(), re.MULTILINE)
+    of_image = dict(word.split("=", 1) for line in lines for word in line.split())
+    there = {"KUBERNETES_SERVICE_HOST": LOOPBACK, "KUBERNETES_SERVICE_PORT": str(plane.port)}
+    return {**of_image, **there, "HOME": str(plane.folder), "KUBECONFIG": ""}
 
 
 def wait_for(claim: Callable[[], bool], deadline_s: float, told: Callable[[], object]) -> None:

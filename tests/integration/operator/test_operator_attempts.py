@@ -2,7 +2,9 @@
 
 import pytest
 
-from palaestra.cluster.resources import PODS
+from palaestra.cluster import Resource
+from palaestra.cluster.resources import JOBS, PODS
+from palaestra.observe.jobs import REPLACED
 from palaestra_sim.protocol.status import FaultRecord, Termination
 from tests.waiting import eventually
 
@@ -17,6 +19,7 @@ SPENT = Termination(
     log=("simulator restarted", "budget spent"),
     faults=(FAULT,),
 )
+BUDGETS = Resource(api_version="policy/v1", kind="PodDisruptionBudget", plural="poddisruptionbudgets")
 SAVED = Termination(step=20, reason="Interrupted: SIGTERM received", log=("checkpoint written",))
 
 
@@ -114,3 +117,51 @@ def test_a_volume_that_cannot_be_mounted_is_told(place, start):
     eventually(lambda: replica(place).get("reason") == "VolumeNotMounted")
 
     assert 'volume "run": no such file' in replica(place)["message"]
+
+
+def marked(place, pod):
+    """Leave the mark of an operator that was killed between it and the eviction."""
+    mark = f"1 {pod['metadata']['uid']} TrainerNotStarted: the node forgot it"
+    place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {REPLACED: mark}}})
+
+
+def test_a_pod_that_no_kubelet_heals_is_evicted_and_counted_once(place, start):
+    """By a new operator too, which finds the mark at a pod that lives; the Job counts no failure."""
+    operator = start()
+    place.train(backoffLimit=0)
+    [first] = place.pods()
+    operator.stop()
+    marked(place, first)
+    start()
+
+    eventually(lambda: "deletionTimestamp" in place.get(PODS, first["metadata"]["name"])["metadata"])
+    place.take(first, "EvictionByEvictionAPI", "Eviction API: evicting", phase="Failed")
+    eventually(lambda: replica(place).get("attempt") == 2)
+    [second] = place.pods()
+
+    assert second["metadata"]["uid"] != first["metadata"]["uid"]
+    restarts = replica(place)["restarts"]
+    assert (restarts["operator"], restarts["disruption"], restarts["trainer"]) == (1, 0, 0)
+    assert place.get(JOBS, "job-0").get("status", {}).get("failed", 0) == 0
+
+
+def test_a_disruption_budget_is_heeded_and_told(place, start):
+    """Somebody wants the pod to stay; it is tried again until they do not."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.bind(pod)
+    place.run(pod)
+    place.until("Running")
+    labels = {"matchLabels": {"palaestra.dev/job": "job"}}
+    budget = {
+        "metadata": {"name": "stay", "namespace": place.name},
+        "spec": {"minAvailable": 1, "selector": labels},
+    }
+    place.api.create(BUDGETS, {"apiVersion": "policy/v1", "kind": "PodDisruptionBudget", **budget})
+    marked(place, pod)
+
+    told = eventually(lambda: "disruption budget" in replica(place).get("message", "") and replica(place))
+
+    assert told["reason"] == "TrainerNotStarted"
+    assert place.get(PODS, pod["metadata"]["name"])["metadata"].get("deletionTimestamp") is None

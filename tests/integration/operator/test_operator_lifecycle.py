@@ -1,10 +1,13 @@
 """A TrainingJob from apply to its end, at a real API server, with a kubelet that is played."""
 
+import pytest
+
 from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, TRAINING_JOBS
 from palaestra_sim.protocol.status import Termination
 from tests.integration.operator.cluster import stranger, world_map, world_of
 from tests.waiting import eventually
 
+FOR_JOBS = {"palaestra.dev/for-jobs": "true"}
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)
 
 
@@ -27,6 +30,18 @@ def test_a_job_gets_its_objects_runs_and_succeeds(place, start):
     assert status["successRate"] == 0.9
     assert status["step"] == 20
     assert eventually(lambda: {"Accepted", "Succeeded"} <= place.events())  # told once the status is written
+
+
+@pytest.mark.parametrize("prefix", ["1team"])
+def test_a_job_in_a_namespace_that_begins_with_a_digit_runs(place, start):
+    """RFC 1123 allows it; every job in it failed."""
+    start()
+    place.train()
+    [pod] = place.pods()
+
+    place.run(pod)
+
+    place.until("Running")
 
 
 def test_a_replica_that_succeeded_is_not_trained_again_when_its_job_is_deleted(place, start):
@@ -78,6 +93,31 @@ def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
 
     place.pods()
     assert place.children() == before
+
+
+def claim(name):
+    """Return a claim that is open to jobs."""
+    spec = {"accessModes": ["ReadWriteOnce"], "resources": {"requests": {"storage": "1Gi"}}}
+    metadata = {"name": name, "labels": FOR_JOBS}
+    return {"apiVersion": "v1", "kind": "PersistentVolumeClaim", "metadata": metadata, "spec": spec}
+
+
+def test_a_claim_that_is_for_jobs_no_more_keeps_its_job_suspended(place, start):
+    """Pods that run go on; one that would start again is a new one."""
+    start()
+    place.create(CLAIMS, claim("runs"))
+    place.train(storage={"existingClaim": "runs"})
+    place.pods()
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": True}})
+    place.until("Suspended")
+    place.api.merge(CLAIMS, place.name, "runs", {"metadata": {"labels": None}})
+
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": False}})
+    eventually(lambda: place.status()["replicas"][0]["reason"] == "ClaimNotForJobs")
+    assert place.get(JOBS, "job-0")["spec"]["suspend"] is True
+    place.api.merge(CLAIMS, place.name, "runs", {"metadata": {"labels": FOR_JOBS}})
+
+    assert place.pods(deadline_s=60)
 
 
 def test_a_job_of_another_controller_is_left_alone(place, start):

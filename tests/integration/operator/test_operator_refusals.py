@@ -9,6 +9,7 @@ from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINI
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from tests.chart.installation import SECRETS_ROLE
+from tests.integration.operator.cluster import local_queues
 from tests.integration.operator.installed import USER
 from tests.waiting import eventually
 
@@ -122,28 +123,7 @@ def open_secrets(installed, place):
 @pytest.fixture
 def kueue(installed):
     """A cluster that has heard of Kueue; the test plays it."""
-    kinds = {
-        "kind": "LocalQueue",
-        "listKind": "LocalQueueList",
-        "plural": "localqueues",
-        "singular": "localqueue",
-    }
-    schema = {"openAPIV3Schema": {"type": "object", "x-kubernetes-preserve-unknown-fields": True}}
-    definition = {
-        "apiVersion": "apiextensions.k8s.io/v1",
-        "kind": "CustomResourceDefinition",
-        "metadata": {"name": "localqueues.kueue.x-k8s.io"},
-        "spec": {
-            "group": "kueue.x-k8s.io",
-            "names": kinds,
-            "scope": "Namespaced",
-            "versions": [{"name": "v1beta1", "served": True, "storage": True, "schema": schema}],
-        },
-    }
-    # A name of a group that belongs to Kubernetes' own projects needs their approval.
-    approval = {"api-approved.kubernetes.io": "unapproved, plays Kueue in a test"}
-    definition["metadata"]["annotations"] = approval
-    installed.create(DEFINITIONS, definition)
+    installed.create(DEFINITIONS, local_queues())
     eventually(lambda: installed.serves("kueue.x-k8s.io"))
     yield
     installed.delete(DEFINITIONS, None, "localqueues.kueue.x-k8s.io")

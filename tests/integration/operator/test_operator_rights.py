@@ -1,6 +1,7 @@
 """The roles of an installation hold exactly what the operator uses, by the API server's own record."""
 
-from palaestra.cluster.resources import CONFIG_MAPS, JOBS, TRAINING_JOBS
+from palaestra.cluster.resources import CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
+from palaestra.observe.jobs import REPLACED
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
 from tests.chart.installation import installed
@@ -30,8 +31,9 @@ def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
     place.train("claimed", storage={"existingClaim": "shared"})
     place.train("mapped", **world_of("world"))
     place.train("brief", ttlSecondsAfterFinished=1, trainer={"algorithm": {"name": "SAC"}})
+    stop_suspended(place)
     place.train()
-    place.pods()
+    replace_pod(place)
     for _ in range(2):  # the second operator meets the events of the first
         suspend(place, flag=True)
         suspend(place, flag=False)
@@ -44,6 +46,24 @@ def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
 
     allowed = granted(installed(), NAMESPACE, NAME)
     assert {right for right in used(control_plane) if right.resource != "secrets"} == allowed - UNSEEN
+
+
+def stop_suspended(place):
+    """Let the time of a job be over while one of its Jobs is suspended: that one is deleted."""
+    place.train("over", replicas=2, activeDeadlineSeconds=2)
+    pods = place.pods("over", count=2)
+    place.api.merge(JOBS, place.name, "over-0", {"spec": {"suspend": True}})
+    place.run(next(pod for pod in pods if pod["metadata"]["labels"]["palaestra.dev/replica"] == "1"))
+    eventually(lambda: place.get(JOBS, "over-0") is None)
+
+
+def replace_pod(place):
+    """Have the pod replaced, as after a mark that an operator left when it was killed."""
+    [pod] = place.pods()
+    mark = f"1 {pod['metadata']['uid']} Stalled: it stands still"
+    place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {REPLACED: mark}}})
+    eventually(lambda: "deletionTimestamp" in place.get(PODS, pod["metadata"]["name"])["metadata"])
+    place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting", phase="Failed")
 
 
 def suspend(place, *, flag):

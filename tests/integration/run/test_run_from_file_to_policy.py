@@ -52,7 +52,7 @@ class Unplugged:
 
     Attributes:
         nodes: the robots that the ROS master knew.
-        named: the robots of its generated worlds.
+        named: the robots of the worlds that its sidecars made.
         pids: every process below the runner.
         left: those that stayed.
     """
@@ -74,7 +74,7 @@ def unplugged(tmp_path_factory):
         run.start("-v")
         run.wait_for_step(100)
         nodes = registered(run)
-        worlds = sorted((run.directory / "worlds").glob("*.wbt"))
+        worlds = sorted((run.directory / "scratch").glob("*/work/*.wbt"))
         pids = [pid for pid, _ in run.processes()]
         run.process.kill()
         run.end()
@@ -103,7 +103,7 @@ def test_every_example_runs(run, name):
 
 
 def test_each_simulator_has_a_legal_name_of_its_own(unplugged):
-    """What `rosnode list` shows, and what stands in the generated worlds of the run directory."""
+    """What `rosnode list` shows, and what stands in the worlds that the simulators run."""
     assert len(unplugged.nodes) == 3
     assert unplugged.nodes == unplugged.named
 

@@ -202,6 +202,8 @@ def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
         "suspend",
         "activeDeadlineSeconds",
         "stallDeadlineSeconds",
+        "startTimeoutSeconds",
+        "noProgressLimit",
         "ttlSecondsAfterFinished",
     ]
 

@@ -5,6 +5,9 @@ from pydantic import ValidationError
 
 from palaestra.api import Driver, Metadata, Role, SimulatorGroup, Spec, TrainingJob, validate
 from palaestra.api.simulators import Recycle
+from palaestra.errors import SpecErrors
+
+NOON = "2026-01-31T12:00:00Z"
 
 
 @pytest.fixture
@@ -137,9 +140,99 @@ def test_a_status_is_read_with_its_times_and_replicas(job_data) -> None:
     assert job.status.replicas[0].simulators[0].last_fault is None
 
 
+@pytest.mark.parametrize("namespace", ["1team", "42", "team-1"])
+def test_a_namespace_may_begin_with_a_digit(namespace, job_data) -> None:
+    """RFC 1123 allows it, so clusters have such."""
+    data = job_data()
+    data["metadata"]["namespace"] = namespace
+
+    assert validate(data).metadata.namespace == namespace
+
+
+def test_a_name_that_an_api_server_made_is_a_name(job_data) -> None:
+    """`kubectl create` of a file with generateName; the server leaves the field there."""
+    data = job_data()
+    data["metadata"] = {"name": "try-x2b4q", "generateName": "try-"}
+
+    assert validate(data).metadata.name == "try-x2b4q"
+
+
+def test_a_job_whose_name_is_still_to_be_made_is_refused_with_the_remedy(job_data) -> None:
+    """`palaestra run` and `Client.apply` need the name that they start, and start again."""
+    data = job_data({"replicas": 0})
+    data["metadata"] = {"generateName": "try-"}
+
+    with pytest.raises(SpecErrors) as refused:
+        validate(data)
+
+    assert refused.value.problems == (
+        "metadata: has generateName and no name; add a name",
+        "spec.replicas: 0 is less than 1; use 1 or more",
+    )
+
+
 def test_what_an_api_server_adds_to_the_metadata_is_passed_over(job_data) -> None:
     """A job read back from a cluster is still a job file."""
     data = job_data()
     data["metadata"] |= {"uid": "5a0c", "generation": 3, "managedFields": [], "finalizers": []}
 
     assert validate(data).metadata.uid == "5a0c"
+
+
+NEWER_STATUS = {
+    "phase": "Running",
+    "ofTomorrow": {"deep": [1]},
+    "release": {"trainer": "t:1", "stub": "s:1", "webots": "w:1", "gazebo": "g:1"},
+    "conditions": [
+        {
+            "type": type_,
+            "status": status,
+            "reason": "R",
+            "message": "m",
+            "lastTransitionTime": NOON,
+            "by": "x",
+        }
+        for type_, status in (("Running", "True"), ("Halted", "True"), ("Failed", "Maybe"))
+    ],
+    "replicas": [
+        {
+            "index": 0,
+            "phase": "Running",
+            "restarts": {"trainer": 1, "operator": 2},
+            "goodput": {"stepping": 4, "dreaming": 2},
+            "simulators": [
+                {"name": "collect-0", "role": "Collect", "state": "ready", "mood": "good"},
+                {"name": "collect-1", "role": "Collect", "state": "dreaming"},
+                {"name": "referee-0", "role": "Referee", "state": "ready"},
+            ],
+            "lastAttempt": {"attempt": 1, "reason": "R", "message": "m", "node": "n"},
+        }
+    ],
+}
+
+
+def test_what_a_newer_release_reports_besides_is_ignored(job_data) -> None:
+    """A command line, or an operator during a rollback, reads what it knows."""
+    status = validate(job_data() | {"status": NEWER_STATUS}).status
+
+    assert status.phase == "Running"
+    assert [each.type for each in status.conditions] == ["Running"]
+    (replica,) = status.replicas
+    assert (replica.restarts.trainer, replica.last_attempt.attempt, replica.goodput.stepping) == (1, 1, 4)
+    assert [each.name for each in replica.simulators] == ["collect-0"]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"phase": "Halted"}, {"replicas": [{"index": 0, "phase": "Halted"}]}, {"replicas": [{"index": "0"}]}],
+)
+def test_a_phase_or_type_that_is_unknown_is_still_refused(wrong, job_data) -> None:
+    """It could mean that a replica has ended, and one that has ended is never started again."""
+    with pytest.raises(SpecErrors, match=r"^status"):
+        validate(job_data() | {"status": wrong})
+
+
+def test_an_unknown_field_of_the_spec_is_refused_as_ever(job_data) -> None:
+    """A person writes it, so it is a mistake."""
+    with pytest.raises(SpecErrors, match=r"spec.ofTomorrow: is not a field"):
+        validate(job_data({"ofTomorrow": 1}))

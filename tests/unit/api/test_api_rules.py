@@ -30,6 +30,19 @@ BROKEN = {
         },
         "spec.simulators: more than 32 simulators in one pod; lower the counts or use replicas",
     ),
+    "more inline worlds than a ConfigMap holds": (
+        {
+            "simulators": [
+                {"name": f"g{place}", "role": "Collect", "world": {"inline": "x" * 190_000}}
+                for place in range(5)
+            ],
+            "trainer.evaluation": {"everySteps": 0},
+        },
+        (
+            "spec.simulators: their inline worlds have more than 900,000 characters; "
+            "put the worlds into the images and name them with world.file"
+        ),
+    ),
     "nothing evaluates": (
         {"simulators": [{"name": "collect", "role": "Collect"}]},
         (

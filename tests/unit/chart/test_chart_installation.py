@@ -63,6 +63,7 @@ def test_the_definition_is_that_of_the_models(made):
 def test_the_operator_makes_no_pod_itself(made):
     """Pods are made by Jobs, so that Kubernetes counts, replaces and cleans them up."""
     assert verbs(made["ClusterRole", NAME], "pods") == {"list", "watch"}
+    assert verbs(made["ClusterRole", NAME], "pods/eviction") == {"create"}
 
 
 def test_nothing_needs_what_a_plain_cluster_lacks(made):

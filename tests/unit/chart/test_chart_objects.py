@@ -129,6 +129,20 @@ def test_the_operator_understands_its_options(one, mode):
     assert chosen.leader_elect is True
 
 
+def test_what_pods_may_carry_and_where_they_run_reaches_the_operator(one):
+    """In the words of its command line; by default nothing is allowed and nothing asked for."""
+    closed, default = options(one("closed", "Deployment")), options(one("default", "Deployment"))
+
+    assert closed.allowed_pod_labels == ["example.com/"]
+    assert closed.allowed_pod_annotations == ["example.com/", "note"]
+    assert dict(closed.node_selector) == {"kubernetes.io/os": "linux"}
+    assert (default.allowed_pod_labels, default.allowed_pod_annotations, default.node_selector) == (
+        [],
+        [],
+        [],
+    )
+
+
 def test_the_operator_s_defaults_are_those_of_its_release(one):
     """Naming them again would hide what `palaestra operator --help` says."""
     chosen, release = options(one("default", "Deployment")), Images.of_release(version("palaestra"))

@@ -172,6 +172,9 @@ def test_an_operator_that_cannot_be_is_not_started(fails):
     assert fails("operator", "--metrics-address=8080") == [told]
 
 
+A_KEY = "give a key such as example.com/team, or a domain such as example.com/"
+
+
 @pytest.mark.parametrize(
     ("command", "wrong"),
     [
@@ -180,13 +183,18 @@ def test_an_operator_that_cannot_be_is_not_started(fails):
         ("world FILE --job=a --group=collect --index=-1", "--index: -1 is refused; give 0 or more"),
         ("operator --workers=0", "--workers: 0 is refused; give 1 or more"),
         ("operator --resync=nan", "--resync: nan is refused; give a finite number"),
+        ("operator --allow-pod-label=*", f"--allow-pod-label: '*' is refused; {A_KEY}"),
+        (
+            "operator --node-selector=gpu",
+            "--node-selector: 'gpu' is refused; give a label such as kubernetes.io/arch=amd64",
+        ),
         ("try FILE --within=0", "--within: 0 is refused; give more than 0"),
         ("delete a --timeout=soon", "--timeout: 'soon' is no number"),
         ("logs a --tail=-3", "--tail: -3 is refused; give 0 or more"),
         ("fetch a --replica=1.5", "--replica: '1.5' is no whole number"),
     ],
 )
-def test_a_number_that_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsys):
+def test_what_cannot_be_meant_is_refused_where_it_is_typed(command, wrong, capsys):
     """Before a file is read or a cluster asked: FILE does not exist."""
     with pytest.raises(SystemExit) as ended:
         main(command.split())

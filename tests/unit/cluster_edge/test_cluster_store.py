@@ -88,3 +88,13 @@ def test_nothing_remains_of_what_was_dropped():
 
     assert len(store) == 0
     assert store.select(None, {}) == []
+
+
+def test_an_object_whose_job_label_changes_is_returned_as_it_was_before():
+    """Both jobs are looked at: the one that lost it, and the one that got it."""
+    store = Store()
+    store.put(make_object(job="x"))
+
+    assert store.relabelled(make_object(job="x", role="y")) is None
+    assert store.relabelled(make_object("b", job="y")) is None
+    assert store.relabelled(make_object(job="y")) == make_object(job="x")

@@ -1,4 +1,4 @@
-"""A scene: one TrainingJob, what an API server holds of it, and a clock that only tests move.
+"""A scene: one TrainingJob, what an API server holds of it, and clocks that only tests move.
 
 `scene.step()` is one pass of the loop. What is decided is carried out on the scene's own objects, as an
 API server would; what Kubernetes does by itself (pods, ends of Jobs) a test says with the scene's verbs.
@@ -14,7 +14,19 @@ import pytest
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import ReplicaStatus, Status
-from palaestra.decide import Create, Decision, Delete, accept, as_data, decide, prepare
+from palaestra.decide import (
+    Create,
+    Decision,
+    Delete,
+    Discard,
+    Record,
+    Replace,
+    Times,
+    accept,
+    as_data,
+    decide,
+    prepare,
+)
 from palaestra.observe import Objects, Polled, observe, references
 from palaestra.plan import ClusterLayout, Images
 from palaestra_sim.protocol.status import SimulatorStatus, Termination, TrainerStatus
@@ -45,7 +57,11 @@ class Scene:
             "metadata": {"name": "job", "namespace": "default", "uid": UID, "generation": 1},
             "spec": {"simulators": list(GROUPS), **spec},
         }
-        self.now = START
+        self.now = START  # the operator's wall clock, which somebody may set
+        self.clock_s = 1000.0  # its monotonic clock
+        self.record = Record()
+        self.behind_s = 0.0  # the node's clock, against that of the API server
+        self.server_s = 0.0  # the API server's clock, against START
         self.layout = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
         self.objects: dict[str, list[dict[str, Any]]] = {
             name: [] for name in (*LISTS.values(), "pods", "events")
@@ -54,7 +70,9 @@ class Scene:
         self.there: dict[tuple[str, str], dict[str, Any]] = {}
         self.denied: dict[int | None, str] = {}
         self.kueue = False
+        self.switchers: dict[str, str] = {}
         self.deleted = False
+        self.budget = False  # a disruption budget that allows no eviction
         self.pods_made = 0
 
     @property
@@ -74,15 +92,11 @@ class Scene:
         """Return the decision as things are; nothing is changed."""
         job = accept(deepcopy(self.raw))
         sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
-        objects = Objects(
-            **deepcopy(self.objects),
-            polled=self.polled,
-            sources=sources,
-            denied=self.denied,
-            kueue=self.kueue,
-        )
-        observed = observe(job, objects)
-        return decide(job, observed, prepare(job, observed, self.layout), self.now)
+        known = {"polled": self.polled, "denied": self.denied, "switchers": self.switchers}
+        objects = Objects(**deepcopy(self.objects), **known)
+        observed = replace(observe(job, objects), sources=sources, kueue=self.kueue)
+        times = Times(now=self.now, clock_s=self.clock_s, record=self.record)
+        return decide(job, observed, prepare(job, observed, self.layout), times)
 
     def step(self, seconds: float = 0) -> Decision:
         """Let time pass, decide once and carry it out."""
@@ -91,6 +105,7 @@ class Scene:
         for action in decision.actions:
             self._do(action)
         self.raw["status"] = as_data(decision.status)
+        self.record = decision.record
         return decision
 
     def settle(self, seconds: float = 0) -> Decision:
@@ -107,10 +122,28 @@ class Scene:
     def pass_(self, seconds: float) -> None:
         """Let time pass."""
         self.now += timedelta(seconds=seconds)
+        self.clock_s += seconds
+        self.server_s += seconds
+
+    def set_clock(self, seconds: float) -> None:
+        """Set the operator's wall clock forward, or back; no other clock knows."""
+        self.now += timedelta(seconds=seconds)
+
+    def restart(self) -> None:
+        """Let another process go on: it remembers nothing, and its monotonic clock is another."""
+        self.record, self.clock_s, self.polled = Record(), 5.0, {}
 
     def stamp(self, seconds: float = 0) -> str:
         """Return a moment, by default now, as an API server writes it."""
-        return (self.now + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
+        return (START + timedelta(seconds=self.server_s + seconds)).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+    def node_stamp(self) -> str:
+        """Return now, as a kubelet or a pod writes it."""
+        return self.stamp(-self.behind_s)
+
+    def delete(self, pod: dict[str, Any], grace_s: int = 60) -> None:
+        """Delete a pod, as somebody does: it is to be gone after its grace."""
+        pod["metadata"] |= {"deletionTimestamp": self.stamp(grace_s), "deletionGracePeriodSeconds": grace_s}
 
     def new_pod(self, index: int = 0, uid: str | None = None) -> dict[str, Any]:
         """Make the next pod of a replica, which a node has taken."""
@@ -126,7 +159,7 @@ class Scene:
                 "ownerReferences": [{"kind": "Job", "uid": self.job(index)["metadata"]["uid"]}],
             },
             "spec": {**template["spec"], "nodeName": "node-1"},
-            "status": {"phase": "Pending", "startTime": self.stamp()},
+            "status": {"phase": "Pending", "startTime": self.node_stamp()},
         }
         self.objects["pods"].append(pod)
         return pod
@@ -148,10 +181,10 @@ class Scene:
             "exitCode": state.get("code", 1),
             "reason": state.get("reason", "Error"),
             "message": state.get("message", ""),
-            "finishedAt": self.stamp(),
+            "finishedAt": self.node_stamp(),
         }
         if state.get("running"):
-            entry |= {"started": True, "state": {"running": {"startedAt": self.stamp()}}}
+            entry |= {"started": True, "state": {"running": {"startedAt": self.node_stamp()}}}
         elif "waiting" in state:
             reason, _, words = state["waiting"].partition(": ")
             entry["state"] = {"waiting": {"reason": reason, "message": words}}
@@ -188,7 +221,7 @@ class Scene:
     def poll(self, pod: dict[str, Any], **status: Any) -> None:
         """Let the trainer of a pod answer, now."""
         told = {"step": 0, "target": 100, "episodes": 0, "phase": "training", "attempt": 1} | status
-        self.polled[pod["metadata"]["uid"]] = Polled(status=TrainerStatus(**told), at=self.now)
+        self.polled[pod["metadata"]["uid"]] = Polled(status=TrainerStatus(**told), at_s=self.clock_s)
 
     def _do(self, action: Any) -> None:
         if isinstance(action, Create):
@@ -198,10 +231,25 @@ class Scene:
             self.objects[LISTS[created["kind"]]].append(created)
         elif isinstance(action, Delete):
             self.deleted = True
+        elif isinstance(action, Discard):
+            self.objects["jobs"].remove(next(it for it in self.objects["jobs"] if _name(it) == action.job))
         else:
             _merge(
                 next(it for it in self.objects["jobs"] if it["metadata"]["name"] == action.job), action.patch
             )
+        if isinstance(action, Replace) and not self.budget:
+            self._evict(action.uid)
+
+    def _evict(self, uid: str) -> None:
+        pod = next(each for each in self.objects["pods"] if each["metadata"]["uid"] == uid)
+        self.delete(pod)
+        pod["status"]["conditions"] = [
+            {"type": "DisruptionTarget", "status": "True", "reason": "EvictionByEvictionAPI"}
+        ]
+
+
+def _name(obj: dict[str, Any]) -> str:
+    return str(obj["metadata"]["name"])
 
 
 def _merge(target: dict[str, Any], patch: dict[str, Any]) -> None:

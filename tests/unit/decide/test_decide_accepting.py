@@ -93,7 +93,7 @@ def test_a_job_that_an_older_release_accepted_goes_on_as_it_is():
     assert [each.reason for each in decision.events] == ["InvalidSpec"]
 
 
-@pytest.mark.parametrize("status", [{"phase": "Dancing"}, {"fields": "of tomorrow"}, "text"])
+@pytest.mark.parametrize("status", [{"phase": "Dancing"}, {"activeSeconds": "4"}, "text"])
 def test_a_status_that_cannot_be_read_is_left_alone(status):
     """Which replicas have ended is not known, so nothing is done with the job."""
     obj = raw(status=status)

@@ -319,3 +319,17 @@ def test_a_replica_whose_last_pod_is_gone_ended_for_the_reason_of_its_job(traini
     scene.settle()
 
     assert (last(scene)[0], last(scene)[2]) == (1, "Diverged")
+
+
+def test_the_end_of_an_attempt_is_kept_where_its_pod_goes_after_the_job_has_failed(training):
+    """Which cache hears first, that of Jobs or that of pods, is chance; what is kept is not."""
+    scene, _ = training(activeDeadlineSeconds=60)
+    scene.step(60)
+    scene.settle()
+    assert scene.status.phase is Phase.FAILED
+    scene.objects["pods"].clear()
+
+    scene.settle(5)
+
+    assert last(scene) == (1, None, "DeadlineExceeded")
+    assert scene.replica().last_attempt.message == scene.replica().message

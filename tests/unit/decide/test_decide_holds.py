@@ -1,9 +1,13 @@
 """What keeps a job from starting, each with its reason; most of it somebody can mend, and then it starts."""
 
+from dataclasses import replace
+
 import pytest
 
 from palaestra.api.status import Phase
-from palaestra.decide import Create
+from palaestra.decide import Create, accept, wants_whole
+from palaestra.observe import Lacking, Objects, observe, references
+from tests.e2e.escalations import METADATA
 
 OPEN = {"palaestra.dev/for-jobs": "true"}
 GROUPS = [{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}]
@@ -179,6 +183,65 @@ def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
     assert scene.status.conditions[0].status == "True"
 
 
+@pytest.mark.parametrize("attempt", METADATA, ids=[each.name for each in METADATA])
+def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scene, attempt):
+    """Its author may be somebody who may create no pod."""
+    scene = make_scene(scheduling={attempt.path.rpartition(".")[2]: attempt.value})
+
+    decision = scene.settle()
+
+    [key] = attempt.value
+    value = "jobs.allowed" + attempt.path.rpartition(".")[2].replace("pod", "Pod")
+    message = (
+        f"{attempt.path}: key {key} is not allowed in this cluster; allow it with the chart's value {value}, "
+        "or make a new TrainingJob without it"
+    )
+    assert held(scene) == (attempt.told, message), attempt.gain
+    assert decision.actions == ()
+    assert scene.status.phase is Phase.PENDING
+
+
+@pytest.mark.parametrize(
+    ("allowed", "key", "holds"),
+    [
+        pytest.param((), "example.com/team", True, id="nothing"),
+        pytest.param(("example.com/team",), "example.com/team", False, id="the key"),
+        pytest.param(("example.com/teams",), "example.com/team", True, id="a longer key"),
+        pytest.param(("example.com/",), "example.com/team", False, id="the domain"),
+        pytest.param(("example.com/",), "www.example.com/team", True, id="a domain above"),
+        pytest.param(("com/",), "example.com/team", True, id="the end of the domain"),
+        pytest.param(("note",), "note", False, id="a key without domain"),
+        pytest.param(("note/",), "note", True, id="a key that is called as a domain"),
+    ],
+)
+def test_a_key_is_allowed_by_itself_or_by_its_whole_domain(make_scene, allowed, key, holds):
+    """A part of a domain may be somebody else's."""
+    scene = make_scene(scheduling={"podAnnotations": {key: "x"}})
+    scene.layout = replace(scene.layout, allowed_pod_annotations=allowed, allowed_pod_labels=())
+
+    scene.settle()
+
+    assert (scene.status.conditions[0].reason == "PodMetadataNotAllowed") is holds
+
+
+def test_a_job_starts_when_its_labels_are_allowed_and_keeps_them_when_they_no_longer_are(make_scene):
+    """The operator is started anew with the value; what was accepted is not judged again."""
+    scene = make_scene(scheduling={"podLabels": {"example.com/team": "robots"}})
+    scene.settle()
+    assert held(scene)[0] == "PodMetadataNotAllowed"
+
+    default, scene.layout = scene.layout, replace(scene.layout, allowed_pod_labels=("example.com/",))
+    decision = scene.settle()
+    labels = decision.actions[-1].object["spec"]["template"]["metadata"]["labels"]
+    scene.layout = default
+    scene.objects["jobs"].clear()
+    again = scene.settle()
+
+    assert labels["example.com/team"] == "robots"
+    assert scene.status.conditions[0].status == "True"
+    assert again.actions[-1].object["spec"]["template"]["metadata"]["labels"] == labels
+
+
 @pytest.mark.parametrize("deleting", [False, True])
 def test_a_job_of_somebody_else_is_left_alone(make_scene, deleting):
     """It has our name: perhaps of a TrainingJob that was there before, and is being collected."""
@@ -198,3 +261,33 @@ def test_a_job_of_somebody_else_is_left_alone(make_scene, deleting):
     assert ("is being deleted" in message) is deleting
     assert all(each.object["kind"] != "Job" for each in decision.actions)
     assert after.actions[-1].object["kind"] == "Job"
+
+
+def observed(scene):
+    """Return the job of a scene, what is observed of it, and the layout."""
+    job = accept(scene.raw)
+    sources = {each: scene.there.get((each.kind.value, each.name)) for each in references(job)}
+    return job, replace(observe(job, Objects(**scene.objects)), sources=sources), scene.layout
+
+
+def test_a_job_is_read_whole_when_it_is_planned_and_not_before(make_scene, accepted):
+    """A cache holds digests; each reading moves a megabyte."""
+    to_plan, planned, waits = make_scene(), accepted(), make_scene(simulators=WORLD)
+
+    assert wants_whole(*observed(to_plan), Lacking.TEXTS)
+    assert not wants_whole(*observed(to_plan), None)
+    assert not wants_whole(*observed(planned), Lacking.FIELDS)
+    assert not wants_whole(*observed(waits), Lacking.TEXTS)
+
+
+def test_a_job_that_lacks_references_is_read_whole_even_while_it_waits(make_scene):
+    """What it waits for may be among what it lacks."""
+    assert wants_whole(*observed(make_scene(simulators=WORLD)), Lacking.FIELDS)
+
+
+def test_a_job_that_has_failed_is_not_read_again(make_scene):
+    """Of a refused job nothing was ever made, and nothing ever will be."""
+    scene = make_scene(simulators=[{**GROUPS[0], "world": {"inline": "no world"}}, GROUPS[1]])
+    scene.settle()
+
+    assert not wants_whole(*observed(scene), Lacking.FIELDS)

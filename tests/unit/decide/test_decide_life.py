@@ -4,7 +4,8 @@ from datetime import UTC, datetime
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
-from palaestra.decide import Create, SetSuspend, Stop
+from palaestra.decide import Create, SetSuspend, Stop, accept, prepare
+from palaestra.observe import Objects, observe
 
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 
@@ -57,6 +58,30 @@ def test_a_config_map_that_somebody_deleted_is_made_again(training):
     assert kinds(scene.step()) == ["ConfigMap"]
 
 
+def test_a_config_map_of_an_earlier_version_is_made_again_as_it_was(training):
+    """It held each simulator's own world; its name, which the Job mounts, has a hash of them."""
+    scene, _ = training()
+    scene.objects["config_maps"].clear()
+    volume = scene.job()["spec"]["template"]["spec"]["volumes"][0]
+    volume["configMap"]["name"] = "job-0-6311dc3b59"  # what a5276f3 called it
+
+    [made] = [each.object for each in scene.step().actions]
+
+    assert made["metadata"]["name"] == "job-0-6311dc3b59"
+    assert made["data"].keys() == {"training.yaml", "collect-0.wbt", "evaluate-0.wbt"}
+
+
+def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
+    """What is planned anew for nothing takes the time of other jobs."""
+    scene = accepted(replicas=3)
+    scene.objects["config_maps"].pop(1)
+    job = accept(scene.raw)
+
+    prepared = prepare(job, observe(job, Objects(**scene.objects)), scene.layout)
+
+    assert prepared.plan.replicas.keys() == {1}
+
+
 def test_a_job_that_trains_says_so(training):
     """In its phase, its columns and its conditions."""
     scene, _ = training()
@@ -82,7 +107,7 @@ def test_a_job_succeeds_when_all_its_replicas_have(accepted, last_word):
 
     assert (scene.status.phase, scene.status.running) == (Phase.SUCCEEDED, "2/2")
     assert (scene.status.step, scene.status.success_rate) == (100, 0.8)
-    assert scene.status.completion_time == START
+    assert scene.status.completion_time == scene.now
     assert Reason.SUCCEEDED in [each.reason for each in decision.events]
 
 
@@ -92,7 +117,7 @@ def test_the_last_word_is_waited_for(training, last_word):
     scene.end_job("Complete")
     decision = scene.step(1)
     assert scene.status.phase is Phase.RUNNING
-    assert decision.wake_after_s == 29
+    assert decision.wake_after_s == 30
 
     scene.end(pod, 0, last_word(step=7))
     scene.step(1)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason
 from palaestra.api.status import Phase
-from palaestra.decide import Create, accept, as_data, decide, prepare
+from palaestra.decide import Create, Times, accept, as_data, decide, prepare
 from palaestra.observe import Objects, Polled, observe, trimmed
 from palaestra.plan import ClusterLayout, Images
 from palaestra_sim.protocol.status import (
@@ -22,6 +22,7 @@ from palaestra_sim.protocol.status import (
 from tests.unit.decide.conftest import GROUPS
 
 LAYOUT = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
+CLOCK_S = 1000.0
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 TERMINAL = {Phase.SUCCEEDED, Phase.FAILED}
 
@@ -184,7 +185,7 @@ events = st.fixed_dictionaries(
 def clusters(draw, planned):
     """Return what a cluster may show of a job."""
     jobs = []
-    for each in planned.replicas:
+    for each in planned.replicas.values():
         if draw(st.booleans()):
             job = trimmed(deepcopy(each.job))
             job["metadata"] |= {"uid": "job-uid"} | draw(st.sampled_from(MARKS))
@@ -200,17 +201,17 @@ def clusters(draw, planned):
                 )
             )
             jobs.append(job)
-    one_pod = st.sampled_from(planned.replicas).flatmap(lambda it: pods(it.job))
+    one_pod = st.sampled_from(tuple(planned.replicas.values())).flatmap(lambda it: pods(it.job))
     found = draw(st.lists(one_pod, max_size=3, unique_by=lambda it: it["metadata"]["uid"]))
     uids = [each["metadata"]["uid"] for each in found if draw(st.booleans())]
     return Objects(
         jobs=jobs,
         pods=found,
-        claims=[trimmed(each.claim) for each in planned.replicas if draw(st.booleans())],
-        config_maps=[trimmed(each.config_map) for each in planned.replicas if draw(st.booleans())],
+        claims=[trimmed(each.claim) for each in planned.replicas.values() if draw(st.booleans())],
+        config_maps=[trimmed(each.config_map) for each in planned.replicas.values() if draw(st.booleans())],
         policies=[trimmed(planned.network_policy)] if draw(st.booleans()) else [],
         events=draw(st.lists(events, max_size=2)),
-        polled={uid: Polled(status=draw(answers), at=START) for uid in uids},
+        polled={uid: Polled(status=draw(answers), at_s=CLOCK_S) for uid in uids},
     )
 
 
@@ -229,11 +230,12 @@ def raw(status=None):
     return head | {"spec": SPEC} | ({"status": status} if status is not None else {})
 
 
-def one(obj, objects, now):
+def one(obj, objects, times=None):
     """Return one decision."""
     job = accept(obj)
     observed = observe(job, objects)
-    return decide(job, observed, prepare(job, observed, LAYOUT), now)
+    times = times or Times(now=START, clock_s=CLOCK_S)
+    return decide(job, observed, prepare(job, observed, LAYOUT), times)
 
 
 PLANNED = prepare(accept(raw()), observe(accept(raw()), Objects()), LAYOUT).plan
@@ -242,11 +244,14 @@ histories = st.lists(st.tuples(clusters(PLANNED), st.integers(0, 700)), min_size
 
 def decisions(history):
     """Yield each decision of a history, with the status before it and what was seen."""
-    status, now = as_data(one(raw(), Objects(), START).status), START
+    first = one(raw(), Objects())
+    status, times = as_data(first.status), Times(now=START, clock_s=CLOCK_S, record=first.record)
     for objects, seconds in history:
-        now += timedelta(seconds=seconds)
-        decision = one(raw(status), objects, now)
-        yield accept(raw(status)).status, objects, now, decision
+        now, clock_s = times.now + timedelta(seconds=seconds), times.clock_s + seconds
+        times = Times(now=now, clock_s=clock_s, record=times.record)
+        decision = one(raw(status), objects, times)
+        times = Times(now=now, clock_s=clock_s, record=decision.record)
+        yield accept(raw(status)).status, objects, times, decision
         status = as_data(decision.status)
 
 
@@ -254,8 +259,8 @@ def decisions(history):
 @given(histories)
 def test_deciding_again_says_nothing_new(history):
     """Level-triggered: the status that came out, and the same objects, lead to the same status."""
-    for _, objects, now, decision in decisions(history):
-        again = one(raw(as_data(decision.status)), objects, now)
+    for _, objects, times, decision in decisions(history):
+        again = one(raw(as_data(decision.status)), objects, times)
 
         assert as_data(again.status) == as_data(decision.status)
         done = {(each.reason, each.message, each.replica) for each in decision.events}
@@ -330,4 +335,4 @@ def test_garbage_is_as_good_as_nothing(things, others):
     """One bad object must not delay another, whatever it is."""
     objects = Objects(jobs=things, pods=others, claims=things, events=others, config_maps=things)
 
-    assert one(raw(), objects, START).status.phase is Phase.PENDING
+    assert one(raw(), objects).status.phase is Phase.PENDING

@@ -96,7 +96,7 @@ def test_a_container_that_the_node_cannot_make_is_named(accepted):
 def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
     """Nothing is force-deleted: the pod may still write to the volume."""
     scene, pod = training()
-    pod["metadata"]["deletionTimestamp"] = scene.stamp(60)
+    scene.delete(pod)
     assert scene.step().wake_after_s == 90
     assert scene.replica().reason == "Training"
 
@@ -284,7 +284,8 @@ def test_a_pod_that_was_the_last_is_not_called_tried_again(training, last_word, 
 def test_a_replica_on_a_lost_node_does_not_run(training):
     """The node's last word was that it does; nobody knows."""
     scene, pod = training()
-    pod["metadata"]["deletionTimestamp"] = scene.stamp()
+    scene.delete(pod, 0)
+    scene.settle()
 
     scene.settle(31)
 
@@ -294,3 +295,18 @@ def test_a_replica_on_a_lost_node_does_not_run(training):
         "0/1",
     )
     assert scene.status.conditions[1].reason == "NodeLost"
+
+
+def test_a_pod_that_is_not_there_and_was_not_asked_about_says_so(make_scene):
+    """Silence would read as if nothing were wrong."""
+    scene = make_scene()
+    scene.settle()
+    scene.objects["unasked"] = frozenset({scene.job()["metadata"]["uid"]})
+
+    scene.settle()
+
+    assert scene.replica().reason == "Starting"
+    assert scene.replica().message == (
+        "its pod is about to be created; why that takes long was not asked, as too many others wait; "
+        "`kubectl describe` tells"
+    )

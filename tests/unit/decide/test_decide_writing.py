@@ -1,13 +1,11 @@
 """A status is written at once where people wait for it, and every half minute where it only moves on."""
 
 from copy import deepcopy
-from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from palaestra.decide import worth_writing
+from palaestra.decide import write_in_s
 
-NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 OLD = {
     "phase": "Running",
     "step": 10,
@@ -33,7 +31,16 @@ def changed(change):
 
 def test_what_is_equal_is_not_written():
     """No request while nothing changes."""
-    assert not worth_writing(OLD, deepcopy(OLD), None, NOW)
+    assert write_in_s(OLD, deepcopy(OLD), None) is None
+
+
+def test_active_time_is_written_with_what_else_changes():
+    """Alone it would be a write every half minute of a job that waits; with progress it costs none."""
+    active = {"activeSeconds": 30, "activeSince": "2026-01-31T12:00:30Z"}
+
+    assert write_in_s(OLD, OLD | active, None) is None
+    assert write_in_s(OLD, OLD | active, 3600) is None
+    assert write_in_s(OLD, OLD | active | {"step": 11}, 3600) == 0
 
 
 @pytest.mark.parametrize(
@@ -53,9 +60,9 @@ def test_progress_waits_for_half_a_minute(change):
     """Two hundred jobs with a write every ten seconds would be twenty a second."""
     new = changed(change)
 
-    assert not worth_writing(OLD, new, NOW - timedelta(seconds=29), NOW)
-    assert worth_writing(OLD, new, NOW - timedelta(seconds=30), NOW)
-    assert worth_writing(OLD, new, None, NOW)
+    assert write_in_s(OLD, new, 29) == 1
+    assert write_in_s(OLD, new, 30) == 0
+    assert write_in_s(OLD, new, None) == 0
 
 
 @pytest.mark.parametrize(
@@ -74,7 +81,7 @@ def test_progress_waits_for_half_a_minute(change):
 )
 def test_what_people_wait_for_is_written_at_once(change):
     """Phases, reasons, attempts, and the first numbers of a training."""
-    assert worth_writing(OLD, changed(change), NOW, NOW)
+    assert write_in_s(OLD, changed(change), 0) == 0
 
 
 @pytest.mark.parametrize(
@@ -82,4 +89,4 @@ def test_what_people_wait_for_is_written_at_once(change):
 )
 def test_whatever_the_api_server_holds_is_compared(old):
     """The first status, or one that somebody has written over."""
-    assert worth_writing(old, OLD, NOW, NOW)
+    assert write_in_s(old, OLD, 0) == 0

@@ -10,6 +10,7 @@ from palaestra.api.crd import crd
 from palaestra.cli.doctor import shown
 from palaestra.doctor import Verdict
 from palaestra.doctor.finding import right, wrong
+from palaestra.doctor.installation import judged_images
 from palaestra.doctor.platform import FIRST, difference, judged_pod, judged_version, release, trial_pod
 from palaestra.doctor.rights import OPERATOR
 
@@ -54,6 +55,37 @@ def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
 
     assert found.verdict is Verdict.WRONG
     assert "webhook" in found.remedy
+
+
+DIGEST = f"@sha256:{'0' * 64}"
+
+
+def operator(own="operator" + DIGEST, trainer="trainer" + DIGEST, stub="stub" + DIGEST):
+    """Return the operator's container as the chart makes it."""
+    return {"image": own, "command": ["palaestra", f"--trainer-image={trainer}", f"--stub-image={stub}"]}
+
+
+def test_images_that_are_named_by_digest_are_right():
+    """Nobody can change what they are."""
+    assert judged_images(operator()).verdict is Verdict.RIGHT
+
+
+@pytest.mark.parametrize("part", ["own", "trainer", "stub"])
+def test_an_image_that_is_named_by_tag_is_a_warning(part):
+    """A run that goes on after an interruption may meet another image under the same tag."""
+    found = judged_images(operator(**{part: "registry.example.com/image:1"}))
+
+    assert found.verdict is Verdict.WARNING
+    assert found.fact.startswith("registry.example.com/image:1: ")
+    assert "digest" in found.remedy
+
+
+def test_images_of_an_operator_that_is_given_none_are_the_releases():
+    """They are named by tag."""
+    found = judged_images({"image": "operator" + DIGEST})
+
+    assert found.fact.startswith("palaestra-trainer:")
+    assert ", palaestra-stub:" in found.fact
 
 
 def test_a_definition_with_more_in_it_is_the_same():

@@ -7,11 +7,13 @@ import uuid
 import pytest
 import yaml
 
+from palaestra.api import validate
 from palaestra.local import rundir
 from palaestra.local.errors import Refused, StorageFailed
 from palaestra.local.files import write
 from palaestra.local.outcome import Outcome, summary
 
+JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}}
 SPEC = {"seed": 1, "replicas": 1, "simulators": [{"name": "a", "startDeadlineSeconds": 60}]}
 
 
@@ -72,6 +74,42 @@ def test_a_changed_job_is_refused_with_every_changed_field(directory):
 def test_what_does_not_change_what_is_learned_may_change(directory, change):
     """Deadlines and the number of replicas, as in a cluster."""
     rundir.refuse_another_job(directory, record(**change))
+
+
+def test_a_default_that_is_new_since_a_run_began_makes_it_no_other_job(tmp_path):
+    """An upgrade between two attempts: what nobody asked for then is what nobody asks for now."""
+    job = validate({**JOB, "spec": {"trainer": {"algorithm": {"name": "PPO", "normalize": {}}}}})
+    old = rundir.record_of(job)
+    del old["spec"]["backoffLimit"], old["spec"]["network"], old["spec"]["simulators"][1]["recycle"]
+    del old["spec"]["trainer"]["algorithm"]["normalize"]["rewards"]
+    rundir.prepare(tmp_path, old)
+
+    rundir.refuse_another_job(tmp_path, rundir.record_of(job))
+
+
+def test_a_field_that_is_new_since_a_run_began_is_a_change_once_it_is_set(tmp_path):
+    """Then something else is asked for than before."""
+    old = rundir.record_of(validate({**JOB, "spec": {}}))
+    del old["spec"]["seed"]
+    rundir.prepare(tmp_path, old)
+
+    with pytest.raises(Refused, match=r"spec.seed: was 1, is 7\n"):
+        rundir.refuse_another_job(tmp_path, rundir.record_of(validate({**JOB, "spec": {"seed": 7}})))
+
+
+def test_the_record_of_a_newer_release_is_compared_as_it_stands(tmp_path):
+    """What it asked for and is unknown here is named, not left out."""
+    now = rundir.record_of(validate({**JOB, "spec": {}}))
+    rundir.prepare(tmp_path, {**now, "spec": {**now["spec"], "ofTomorrow": 3}})
+
+    with pytest.raises(Refused, match=r"^spec.ofTomorrow: was 3, is absent\n"):
+        rundir.refuse_another_job(tmp_path, now)
+
+
+def test_all_that_may_change_in_a_cluster_may_change_here():
+    """The same marks decide in both; the list cannot be forgotten."""
+    assert {"spec.activeDeadlineSeconds", "spec.simulators.startDeadlineSeconds"} < rundir.MUTABLE
+    assert "spec.seed" not in rundir.MUTABLE
 
 
 def test_a_field_that_is_new_or_gone_is_a_change():

@@ -14,7 +14,13 @@ from tools.metrics import page
 PAGE = Path(__file__).parents[3] / page.PAGE
 FAMILIES = [family for program in page.PROGRAMS for family in program.families]
 HOMES = {
-    "operator": ("palaestra_operator_", "palaestra_jobs", "palaestra_job_", "palaestra_replica_"),
+    "operator": (
+        "palaestra_operator_",
+        "palaestra_jobs",
+        "palaestra_job_",
+        "palaestra_replica_",
+        "palaestra_replicas_",
+    ),
     "trainer": ("palaestra_trainer_", "palaestra_simulator_"),
     "sidecar": ("palaestra_sidecar_", "palaestra_simulator_"),
 }
@@ -22,6 +28,8 @@ HOMES = {
 ENDS = ("_seconds", "_bytes", "_ratio", "_steps", "_info", "_per_second", "_total")
 UNITLESS = {
     "palaestra_jobs",
+    "palaestra_operator_crd_outdated",
+    "palaestra_replicas_waiting",
     "palaestra_operator_leader",
     "palaestra_operator_queue_depth",
     "palaestra_simulator_state",

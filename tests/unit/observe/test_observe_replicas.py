@@ -60,7 +60,7 @@ def test_of_two_pods_of_one_second_the_one_that_goes_on_is_newer(look, raw_pod):
 
 def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
     """And to nobody once that has ended: its last word says more."""
-    answer = Polled(status=TrainerStatus(step=1, target=2, episodes=0, phase="training"), at=NOW)
+    answer = Polled(status=TrainerStatus(step=1, target=2, episodes=0, phase="training"), at_s=5.0)
     other = look(pods=[raw_pod], polled={"another": answer}).replicas[0]
     alive = look(pods=[raw_pod], polled={"pod-1": answer}).replicas[0]
     raw_pod["status"]["phase"] = "Succeeded"
@@ -125,11 +125,21 @@ def test_an_event_in_series_is_as_late_as_its_last(look, raw_job):
 
 def test_what_is_there_is_known_by_kind_and_name(make_job):
     """A ConfigMap and a claim may have the same name."""
-    named = {"metadata": {"name": "x"}}
+    job = make_job()
+    named = {"metadata": {"name": "x", "ownerReferences": [{"uid": job.metadata.uid}]}}
 
-    seen = observe(make_job(), Objects(claims=[named], policies=[named]))
+    seen = observe(job, Objects(claims=[named], policies=[named]))
 
     assert seen.present == {("PersistentVolumeClaim", "x"), ("NetworkPolicy", "x")}
+
+
+def test_a_config_map_or_policy_of_somebody_else_is_not_there(make_job):
+    """Our label on it does not make it ours; a claim outlives its job, so it has no owner."""
+    named = {"metadata": {"name": "x"}}
+
+    seen = observe(make_job(), Objects(claims=[named], policies=[named], config_maps=[named]))
+
+    assert seen.present == {("PersistentVolumeClaim", "x")}
 
 
 def test_of_other_kinds_only_who_wrote_them_is_forgotten():
@@ -143,9 +153,15 @@ def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
     """Trimming takes away what nobody reads, and that is most of it."""
     raw_job |= {"status": {"failed": 1}}
     raw_job["metadata"] |= {
-        "annotations": {"palaestra.dev/stopped": "Stalled: it", "other": "x"},
+        "annotations": {
+            "palaestra.dev/stopped": "Stalled: it",
+            "palaestra.dev/suspend-set": "true",
+            "other": "x",
+        },
         "managedFields": [{"manager": "palaestra-operator"}],
+        "resourceVersion": "20",
     }
+    raw_pod["metadata"]["resourceVersion"] = "30"
     raw_pod["status"] = {
         "phase": "Running",
         "containerStatuses": [

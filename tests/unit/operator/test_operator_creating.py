@@ -5,6 +5,7 @@ import pytest
 from palaestra.cluster import AlreadyExists, NotFound
 from palaestra.decide import Create
 from palaestra.operator.acting import Acting
+from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denials
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.writing import Writer
@@ -14,7 +15,8 @@ RAW = {"metadata": {"namespace": "robots", "name": "job", "resourceVersion": "1"
 WANTED = {
     "apiVersion": "v1",
     "kind": "ConfigMap",
-    "metadata": {"name": "job-0-abc", "namespace": "robots"},
+    "metadata": {"name": "job-0-abc", "namespace": "robots", "ownerReferences": [{"uid": "ours"}]},
+    "immutable": True,
     "data": {"training.yaml": "seed: 1"},
 }
 
@@ -28,6 +30,8 @@ def a_job(*owners):
 class Server:
     """An API server that has an object of that name already."""
 
+    pods = ()
+
     def __init__(self, there):
         self.there = there
 
@@ -40,8 +44,8 @@ class Server:
         return self.there
 
     def list(self, *_, **__):
-        """Return no pods."""
-        return []
+        """Return the pods."""
+        return list(self.pods)
 
     def create(self, *_):
         """Refuse."""
@@ -49,23 +53,23 @@ class Server:
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("change", "wrong"),
     [
-        ({"training.yaml": "seed: 1"}, {}),
-        (
-            {"training.yaml": "seed: 2"},
-            {0: "ConfigMap job-0-abc is there already, with other content; delete it"},
-        ),
+        ({}, None),
+        ({"data": {"training.yaml": "seed: 2"}}, "with other content"),
+        ({"metadata": {"name": "job-0-abc"}}, "and is not this job's"),
+        ({"immutable": False}, "and is not immutable, so that anybody may change it"),
     ],
-    ids=["ours, of a moment ago", "of somebody else"],
+    ids=["ours, of a moment ago", "other content", "of somebody else", "not immutable"],
 )
-def test_a_config_map_that_is_there_already_is_used_only_with_our_content(data, told):
-    """Pods would train whatever it says."""
-    api, denials = Server({"metadata": {"name": "job-0-abc"}, "data": data}), Denials()
-    acting = Acting(api, Writer(api, lambda: True), None, None, denials)
+def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(change, wrong):
+    """Pods would train whatever it says, now or later."""
+    api, denials = Server({**WANTED, **change}), Denials()
+    acting = Acting(api, Writer(api, lambda: True), None, denials)
 
     refused = acting.carry_out(RAW, (Create(object=WANTED, replica=0),))
 
+    told = {} if wrong is None else {0: f"ConfigMap job-0-abc is there already, {wrong}; delete it"}
     assert (denials.of(KEY), bool(refused)) == (told, bool(told))
 
 
@@ -77,8 +81,44 @@ def test_a_config_map_that_is_there_already_is_used_only_with_our_content(data, 
 def test_a_job_that_is_there_already_is_taken_for_made_only_if_it_is_ours(there, made):
     """Else an event would say that it was created; whose the name is, the next look tells."""
     api = Server(there)
-    acting = Acting(api, Writer(api, lambda: True), None, Strangers(api), Denials())
+    acting = Acting(api, Writer(api, lambda: True), Strangers(api), Denials())
 
     refused = acting.carry_out(RAW, (Create(object=a_job("ours"), replica=0),))
 
     assert (not refused) is made
+
+
+def a_pod(uid="old", claim="shared", phase="Running"):
+    """Return a pod of replica 0 of the TrainingJob with a uid."""
+    labels = {"palaestra.dev/job": "job", "palaestra.dev/job-uid": uid, "palaestra.dev/replica": "0"}
+    volumes = [{"name": "run", "persistentVolumeClaim": {"claimName": claim}}]
+    metadata = {"name": "job-0-x", "labels": labels}
+    return {"metadata": metadata, "spec": {"volumes": volumes}, "status": {"phase": phase}}
+
+
+@pytest.mark.parametrize(
+    ("pod", "waits"),
+    [
+        (a_pod(), True),
+        (a_pod(claim="job-0-old"), False),
+        (a_pod(uid="new", claim="other"), True),
+        (a_pod(phase="Failed"), False),
+    ],
+    ids=["an earlier one's, on a claim of both", "an earlier one's", "its own", "one that has ended"],
+)
+def test_a_job_is_not_created_beside_a_pod_that_may_write_to_its_volume(pod, waits):
+    """The last look before a creation is at the cluster, not at a cache that may lag."""
+    job = a_job("ours")
+    job["metadata"]["labels"] = a_pod(uid="new")["metadata"]["labels"]
+    job["spec"] = {"template": {"spec": a_pod()["spec"]}}
+    api = Server(job)
+    api.pods = [pod]
+    acting = Acting(api, Writer(api, lambda: True), Strangers(api), Denials())
+
+    try:
+        acting.carry_out(RAW, (Create(object=job, replica=0),))
+        waited = False
+    except Outdated:
+        waited = True
+
+    assert waited is waits

@@ -7,11 +7,18 @@ from palaestra.operator.denials import Denials
 
 KEY = ("robots", "job")
 QUOTA = Forbidden(403, "Forbidden", "exceeded quota")
+BUDGET = "Cannot evict pod as it would violate the pod's disruption budget."
 WEBHOOK = "Internal error occurred: failed calling webhook x"
 
 
 @pytest.mark.parametrize(
-    "error", [QUOTA, Invalid(400, "BadRequest", "denied"), ServerError(500, "InternalError", WEBHOOK)]
+    "error",
+    [
+        QUOTA,
+        Invalid(400, "BadRequest", "denied"),
+        ServerError(500, "InternalError", WEBHOOK),
+        TooManyRequests(429, "TooManyRequests", BUDGET),
+    ],
 )
 def test_what_a_person_has_to_mend_is_told_until_it_was_made(error):
     """By replica, in the words of whoever refused."""

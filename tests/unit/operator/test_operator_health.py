@@ -27,7 +27,9 @@ def ask(told):
     """A function that returns status and text of a path."""
     metrics = Metrics()
     metrics.request("list", "pods", 200, 0.01)
-    metrics.watch(depth=lambda: 3, leads=lambda: True, phases=lambda: PHASES)
+    metrics.watch(
+        depth=lambda: 3, leads=lambda: True, phases=lambda: PHASES, waits=list, outdated=lambda: False
+    )
     trouble = lambda: told[0] if told else None  # noqa: E731 - both questions get the same answer
     server = HealthServer(("127.0.0.1", 0), healthy=trouble, ready=trouble, metrics=metrics.text)
 

@@ -107,7 +107,29 @@ def test_a_job_that_was_refused_has_no_replicas_to_count(metrics):
 def test_jobs_are_told_by_the_operator_that_leads(metrics, leads, jobs):
     """So that a sum over all operators counts each once."""
     phases = [("robots", "Running"), ("robots", "Running")]
-    metrics.watch(depth=lambda: 0, leads=lambda: leads, phases=lambda: phases)
+    metrics.watch(
+        depth=lambda: 0, leads=lambda: leads, phases=lambda: phases, waits=list, outdated=lambda: None
+    )
 
     assert value(metrics, "palaestra_jobs", job_namespace="robots", phase="Running") == jobs
     assert value(metrics, "palaestra_operator_leader") == leads
+
+
+@pytest.mark.parametrize(("outdated", "shown"), [(True, 1), (False, 0), (None, None)])
+def test_an_outdated_definition_is_a_gauge_that_has_no_value_before_it_was_read(metrics, outdated, shown):
+    """An alert must not clear only because an operator has just started."""
+    metrics.watch(depth=lambda: 0, leads=lambda: True, phases=list, waits=list, outdated=lambda: outdated)
+
+    assert value(metrics, "palaestra_operator_crd_outdated") == shown
+
+
+@pytest.mark.parametrize(("leads", "replicas"), [(True, 2), (False, None)])
+def test_replicas_that_wait_are_counted_by_what_they_wait_for(metrics, leads, replicas):
+    """A typo in an image must not hold a quota in silence."""
+    waiting = [("robots", "ImagePull"), ("robots", "ImagePull"), ("home", "Unschedulable")]
+    metrics.watch(
+        depth=lambda: 0, leads=lambda: leads, phases=list, waits=lambda: waiting, outdated=lambda: None
+    )
+
+    shown = value(metrics, "palaestra_replicas_waiting", job_namespace="robots", reason="ImagePull")
+    assert shown == replicas

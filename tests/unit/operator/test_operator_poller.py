@@ -3,11 +3,13 @@
 import json
 import socketserver
 import threading
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
+from structlog.testing import capture_logs
 
-from palaestra.operator.poller import MOST_BYTES, Poller, Target
+from palaestra.operator.poller import MOST_BYTES, Poller
+from palaestra.operator.schedule import Target
 from palaestra_sim.protocol.status import TrainerStatus
 
 JOB = ("robots", "job")
@@ -22,11 +24,22 @@ class Trainer(socketserver.ThreadingTCPServer):
 
     daemon_threads = True
     block_on_close = False
+    request_queue_size = 128
 
     def __init__(self, answer, silent=None):
         self.answer, self.silent = answer, silent
+        self.questions = threading.Semaphore(0)
         super().__init__(("127.0.0.1", 0), Answering)
         threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True).start()
+
+    def target(self, uid="pod", key=JOB):
+        """Return it as one of the trainers to ask."""
+        return Target(key=key, uid=uid, host="127.0.0.1", port=self.server_address[1])
+
+    def asked(self, count):
+        """Wait until so many more questions are over: the next one begins after them."""
+        for _ in range(count + 1):
+            assert self.questions.acquire(timeout=WAIT_S)
 
 
 class Answering(socketserver.BaseRequestHandler):
@@ -35,6 +48,7 @@ class Answering(socketserver.BaseRequestHandler):
     def handle(self):
         """Answer it."""
         self.request.recv(4096)
+        self.server.questions.release()
         try:
             self.request.sendall(self.server.answer)
         except OSError:
@@ -45,10 +59,10 @@ class Answering(socketserver.BaseRequestHandler):
 
 @contextmanager
 def trainer(answer, silent=None):
-    """Serve one answer; yields where."""
+    """Serve one answer."""
     server = Trainer(answer, silent)
     try:
-        yield Target(key=JOB, uid="pod", host="127.0.0.1", port=server.server_address[1])
+        yield server
     finally:
         if silent is not None:
             silent.set()
@@ -58,32 +72,20 @@ def trainer(answer, silent=None):
 
 @contextmanager
 def polling(*targets, deadline_s=3.0):
-    """Poll in quick rounds; yields the poller, and a function that waits for so many more rounds."""
-    rounds = threading.Semaphore(0)
-    changed = threading.Event()
-
-    def current():
-        rounds.release()
-        return targets
-
-    poller = Poller(current, lambda _: changed.set(), period_s=0.01, deadline_s=deadline_s)
-    poller.changed = changed
-
-    def finished(count):
-        for _ in range(count + 1):  # the start of a round is the end of the one before
-            assert rounds.acquire(timeout=WAIT_S)
-
+    """Poll often; yields the poller, whose targets may be exchanged."""
+    poller = Poller(lambda: poller.asks, lambda _: poller.changed.set(), period_s=0.01, deadline_s=deadline_s)
+    poller.asks, poller.changed = targets, threading.Event()
     poller.start()
     try:
-        yield poller, finished
+        yield poller
     finally:
         poller.stop(WAIT_S)
 
 
 def test_a_running_trainer_says_where_it_stands():
     """The numbers of `kubectl get tj`."""
-    with trainer(OK + BODY) as target, polling(target) as (poller, finished):
-        finished(1)
+    with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
+        pod.asked(1)
 
         assert poller.known()["pod"].status == STATUS
 
@@ -104,8 +106,8 @@ def test_a_running_trainer_says_where_it_stands():
 )
 def test_what_is_no_answer_is_unknown(answer):
     """No exception, no guess, and nothing is followed."""
-    with trainer(answer) as target, polling(target) as (poller, finished):
-        finished(2)
+    with trainer(answer) as pod, polling(pod.target()) as poller:
+        pod.asked(2)
 
         assert poller.known() == {}
 
@@ -113,34 +115,85 @@ def test_what_is_no_answer_is_unknown(answer):
 def test_a_trainer_that_drips_does_not_hold_the_others_up():
     """The deadline is for the whole answer, not for the next byte."""
     silent = threading.Event()
-    with trainer(OK + BODY[:20], silent) as slow, trainer(OK + BODY) as quick:
-        targets = [slow, Target(key=JOB, uid="quick", host=quick.host, port=quick.port)]
-        with polling(*targets, deadline_s=1.0) as (poller, finished):
-            finished(1)
+    with (
+        trainer(OK + BODY[:20], silent) as slow,
+        trainer(OK + BODY) as quick,
+        polling(slow.target("slow"), quick.target("quick"), deadline_s=1.0) as poller,
+    ):
+        quick.asked(3)
 
-            assert set(poller.known()) == {"quick"}
+        assert set(poller.known()) == {"quick"}
+
+
+def test_silent_pods_delay_nobody():
+    """640 of them: each of ten others is asked every period, and its answer is used when it comes."""
+    silent, quick = threading.Event(), [trainer(OK + BODY) for _ in range(10)]
+    with ExitStack() as stack:
+        ten = [stack.enter_context(each) for each in quick]
+        mute = stack.enter_context(trainer(b"", silent))
+        targets = [mute.target(f"silent {number}", ("theirs", "job")) for number in range(640)]
+        targets += [pod.target(f"quick {number}") for number, pod in enumerate(ten)]
+        with polling(*targets, deadline_s=1.5) as poller:
+            for pod in ten:
+                pod.asked(20)
+
+            assert set(poller.known()) == {f"quick {number}" for number in range(10)}
 
 
 def test_who_stops_answering_becomes_unknown_again():
     """What was true once is no sign of life; stalled is for the trainer to say."""
-    with trainer(OK + BODY) as target:
-        targets = [target]
-        with polling(target) as (poller, finished):
-            finished(1)
-            assert set(poller.known()) == {"pod"}
-            targets.clear()
+    with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
+        pod.asked(1)
+        before = set(poller.known())
+        pod.answer = b""
+        pod.asked(2)
 
-    with polling(target) as (poller, finished):
-        finished(1)
+        assert (before, dict(poller.known())) == ({"pod"}, {})
 
+
+def test_what_a_pod_said_is_forgotten_with_it():
+    """The uid of a pod that went comes never again, and memory is finite."""
+    with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
+        pod.asked(1)
+        poller.changed.clear()
+        poller.asks = ()
+
+        assert poller.changed.wait(WAIT_S)
         assert poller.known() == {}
 
 
+def test_an_answer_that_nobody_foresaw_ends_no_other_question(monkeypatch):
+    """One pod's bytes must not end the thread, and with it the operator of everybody."""
+    read = TrainerStatus.from_json
+    monkeypatch.setattr(TrainerStatus, "from_json", lambda body: read(body) if body["step"] != 8 else 1 // 0)
+    with (
+        trainer(OK + BODY.replace(b'"step": 7', b'"step": 8')) as odd,
+        trainer(OK + BODY) as sound,
+        polling(odd.target("odd"), sound.target("sound")) as poller,
+    ):
+        odd.asked(2)
+        sound.asked(2)
+
+        assert set(poller.known()) == {"sound"}
+
+
+def test_a_pod_that_lies_for_ever_is_logged_once():
+    """A thousand of them would fill the log that everybody reads."""
+    with trainer(OK + b"[]") as pod, capture_logs() as logs, polling(pod.target()):
+        pod.asked(5)
+
+    assert [each["event"] for each in logs if each["log_level"] == "warning"] == ["answer refused"]
+
+
 def test_a_job_is_looked_at_when_its_trainer_says_something_new_only():
-    """A hundred idle trainers make no work."""
-    with trainer(OK + BODY) as target, polling(target) as (poller, finished):
+    """A hundred idle trainers make no work, though they get older."""
+    with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         assert poller.changed.wait(WAIT_S)
         poller.changed.clear()
-        finished(3)
+        pod.answer = OK + json.dumps(STATUS.to_json() | {"last_progress_age_s": 5.0}).encode()
+        pod.asked(3)
+        quiet = not poller.changed.is_set()
+        pod.answer = OK + json.dumps(STATUS.to_json() | {"step": 8}).encode()
 
-        assert not poller.changed.is_set()
+        assert poller.changed.wait(WAIT_S)
+        assert quiet

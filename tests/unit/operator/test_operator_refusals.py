@@ -3,26 +3,38 @@
 import pytest
 
 from palaestra.cluster import NotFound
-from palaestra.operator.refusals import PATIENCE_S, RECHECK_S, REMEMBERED, Refusals
+from palaestra.operator.refusals import (
+    EXPIRES_S,
+    LONGEST_PAUSE_S,
+    PATIENCE_S,
+    RECHECK_S,
+    REMEMBERED,
+    Refusals,
+    Told,
+)
 from palaestra.operator.strangers import Strangers
 
 KEY = ("robots", "job")
-FAILED = {"reason": "FailedCreate", "message": "exceeded quota"}
+FAILED = {"reason": "FailedCreate", "message": "exceeded quota", "lastTimestamp": "2026-01-31T12:00:00+00:00"}
+BEFORE = {**FAILED, "message": "no such class", "lastTimestamp": "2026-01-31T11:00:00Z"}
+LAST = {"involvedObject": {"uid": "u"}, **FAILED}
 
 
 class Server:
     """An API server of Jobs and events, and a clock beside it."""
 
     def __init__(self):
-        self.now, self.asked, self.jobs = 100.0, 0, {}
+        self.now, self.asked, self.jobs, self.times = 100.0, 0, {}, []
         self.about = "reason=FailedCreate"
 
     def list(self, resource, namespace, *, fields):
         """Return the one event that there is."""
         assert (resource.plural, namespace) == ("events", "robots")
-        assert fields == f"involvedObject.uid=u,{self.about}"
+        assert fields.startswith("involvedObject.uid=u")
+        assert fields.endswith(f",{self.about}")
         self.asked += 1
-        return [FAILED]
+        self.times.append(self.now)
+        return [FAILED, BEFORE, {"reason": "Scheduled"}]
 
     def get(self, resource, namespace, name):
         """Return a Job."""
@@ -61,10 +73,10 @@ def test_a_new_job_is_given_some_seconds(server):
     """Nearly all have a pod at once; nobody is asked."""
     refusals = Refusals(server, lambda: server.now)
 
-    events, again_s = refusals.of([job()], [])
+    found = refusals.of([job()], [])
 
-    assert (events, server.asked) == ([], 0)
-    assert again_s == PATIENCE_S
+    assert (found.events, server.asked) == ((), 0)
+    assert found.again_s == PATIENCE_S
 
 
 def test_after_that_its_events_are_read_now_and_then(server):
@@ -73,12 +85,65 @@ def test_after_that_its_events_are_read_now_and_then(server):
     refusals.of([job()], [])
     server.now += PATIENCE_S
 
-    assert refusals.of([job()], []) == ([FAILED], RECHECK_S)
-    assert refusals.of([job()], []) == ([FAILED], RECHECK_S)
-    assert server.asked == 1
-    server.now += RECHECK_S
+    first, second = refusals.of([job()], []), refusals.of([job()], [])
+    assert first == second
+    assert (first.events, first.again_s, server.asked) == ((LAST,), RECHECK_S, 1)
+
+
+def test_the_pauses_grow_to_five_minutes(server):
+    """A quota that is spent for a night is no news."""
+    refusals = Refusals(server, lambda: server.now)
     refusals.of([job()], [])
-    assert server.asked == 2
+    server.now += PATIENCE_S
+
+    pauses = []
+    for _ in range(7):
+        pauses.append(refusals.of([job()], []).again_s)
+        server.now += pauses[-1]
+
+    assert pauses == [15, 30, 60, 120, 240, 300, 300]
+    assert server.asked == 7
+
+
+def numbered(number):
+    """Return one of many Jobs that should have a pod."""
+    return job(metadata={"name": f"job-{number}", "namespace": "robots", "uid": f"u{number}"})
+
+
+def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
+    """Whatever a namespace does; a look before the turn asks nobody."""
+    refusals = Refusals(server, lambda: server.now)
+    due = {number: refusals.of([numbered(number)], []).again_s for number in range(1500)}
+    looks = 0
+
+    begun = server.now
+    due = {number: begun + wait_s for number, wait_s in due.items()}
+    while server.asked < 1500:
+        number = min(due, key=due.__getitem__)
+        server.now = due[number]
+        due[number] = server.now + refusals.of([numbered(number)], []).again_s
+        looks += 1
+
+    busiest = max(sum(at <= each < at + 1 for each in server.times) for at in server.times)
+    assert busiest <= 5
+    assert {bool(refusals.of([numbered(number)], []).events) for number in range(1500)} == {True}
+    assert server.now - begun < 900
+    assert looks < 5 * 1500
+
+
+def test_beyond_the_bound_nobody_is_asked_and_that_is_told(server):
+    """Those that are remembered keep their place, so that each gets its answer."""
+    refusals = Refusals(server, lambda: server.now)
+    for number in range(REMEMBERED):
+        refusals.of([numbered(number)], [])
+    server.now += PATIENCE_S
+
+    beyond = refusals.of([numbered(REMEMBERED)], [])
+    within = refusals.of([numbered(0)], [])
+
+    assert (beyond.events, beyond.unasked) == ((), {f"u{REMEMBERED}"})
+    assert beyond.again_s == LONGEST_PAUSE_S
+    assert [each["message"] for each in within.events] == ["exceeded quota"]
 
 
 def test_a_job_whose_last_pod_has_failed_lacks_one(server):
@@ -87,7 +152,7 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     refusals.of([job()], [pod("Failed")])
     server.now += PATIENCE_S
 
-    assert refusals.of([job()], [pod("Failed")])[0] == [FAILED]
+    assert refusals.of([job()], [pod("Failed")]).events == (LAST,)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +171,7 @@ def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
     refusals.of(jobs, pods)
     server.now += PATIENCE_S
 
-    assert refusals.of(jobs, pods) == ([], None)
+    assert refusals.of(jobs, pods) == Told()
     assert server.asked == 0
 
 
@@ -127,7 +192,8 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     assert server.asked == 0
     server.now += PATIENCE_S
 
-    assert refusals.of([], [waiting_pod()]) == ([FAILED], RECHECK_S)
+    found = refusals.of([], [waiting_pod()])
+    assert (found.events, found.again_s) == ((LAST,), RECHECK_S)
 
 
 @pytest.mark.parametrize(
@@ -146,19 +212,20 @@ def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
     refusals.of([], [pod])
     server.now += PATIENCE_S
 
-    assert refusals.of([], [pod]) == ([], None)
+    assert refusals.of([], [pod]) == Told()
     assert server.asked == 0
 
 
 def test_what_was_deleted_while_it_lacked_something_is_forgotten_in_the_end(server):
     """Nobody tells of it; an operator runs for months."""
     refusals = Refusals(server, lambda: server.now)
-    refusals.of([job()], [])
-    server.now += PATIENCE_S
-    for i in range(REMEMBERED):
-        refusals.of([job(metadata={"name": "x", "namespace": "robots", "uid": f"u{i}"})], [])
+    for number in range(REMEMBERED):
+        refusals.of([numbered(number)], [])
+    assert refusals.of([job()], []).unasked == {"u"}
 
-    assert refusals.of([job()], []) == ([], PATIENCE_S)
+    server.now += EXPIRES_S
+
+    assert refusals.of([job()], []).unasked == set()
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):

@@ -3,10 +3,12 @@
 import threading
 
 import pytest
+import structlog.testing
 from prometheus_client import CollectorRegistry, Histogram
 
 from palaestra.cluster import Conflict, WorkQueue
 from palaestra.cluster.backoff import Backoff
+from palaestra.operator.confirming import Outdated
 from palaestra.operator.workers import Workers
 from palaestra.operator.writing import NotLeading
 
@@ -110,3 +112,22 @@ def test_nothing_is_begun_while_another_leads(desk):
     at_work.gate.set()
 
     assert done.wait(WAIT_S)
+
+
+def test_a_conflict_that_repeats_is_logged_and_ever_more_rarely(desk):
+    """One is harmless; a job that hangs for one must not hang in silence, nor fill the log."""
+    tries = threading.Semaphore(0)
+
+    def reconcile(key):
+        del key
+        tries.release()
+        raise Outdated("pod job-0-x is not as in the cache; nothing was created")
+
+    with structlog.testing.capture_logs() as lines:
+        at_work = desk(reconcile)
+        at_work.queue.add(BAD)
+        assert all(tries.acquire(timeout=WAIT_S) for _ in range(20))
+        at_work.workers.stop(WAIT_S)
+
+    assert [line["times"] for line in lines if line["event"] == "conflict repeats"][:3] == [4, 8, 16]
+    assert "pod job-0-x" in lines[0]["error"]

@@ -1,9 +1,10 @@
-"""The merge patch of a status: what it changes, and what it leaves alone."""
+"""Who may write when, and the merge patch of a status: what it changes, and what it leaves alone."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra.operator.writing import difference
+from palaestra.operator.writing import NotLeading, Writer, difference
 
 LEAVES = st.integers() | st.text(max_size=3) | st.lists(st.integers(), max_size=2)
 OBJECTS = st.recursive(
@@ -41,3 +42,46 @@ def test_a_status_that_did_not_change_needs_no_patch(status):
 def test_a_job_without_a_status_gets_all_of_it():
     """The API server shows none before the first write."""
     assert difference(None, {"phase": "Pending"}) == {"phase": "Pending"}
+
+
+class Server:
+    """An API server that counts deletions."""
+
+    deleted = 0
+
+    def delete(self, *_, **__):
+        """Delete."""
+        self.deleted += 1
+
+
+def delete(writer):
+    """Write something."""
+    writer.delete(None, "robots", "job", uid="u", version="1")
+
+
+@pytest.mark.parametrize("later", [None, 2], ids=["lost", "lost and regained"])
+def test_what_was_decided_in_one_tenure_is_not_written_in_another(later):
+    """Another operator may have led in between, and have done something else."""
+    api, terms = Server(), [1]
+    writer = Writer(api, lambda: terms[-1])
+    writer.begin()
+    delete(writer)
+    terms.append(later)
+
+    with pytest.raises(NotLeading):
+        delete(writer)
+
+    assert api.deleted == 1
+
+
+def test_a_look_that_begins_after_the_lease_was_regained_may_write():
+    """It has read what the other left."""
+    api, terms = Server(), [1]
+    writer = Writer(api, lambda: terms[-1])
+    writer.begin()
+    terms.append(2)
+
+    writer.begin()
+    delete(writer)
+
+    assert api.deleted == 1

@@ -24,7 +24,7 @@ def test_all_pods_of_the_job_and_no_others_are_meant(in_cluster):
     planned = in_cluster(replicas=2)
     selected = policy(planned)["podSelector"]["matchLabels"]
 
-    templates = [each.job["spec"]["template"]["metadata"]["labels"] for each in planned.replicas]
+    templates = [each.job["spec"]["template"]["metadata"]["labels"] for each in planned.replicas.values()]
     assert selected == {"palaestra.dev/job": "job"}
     assert all(selected.items() <= labels.items() for labels in templates)
 

@@ -126,7 +126,7 @@ def test_each_replica_goes_on_from_the_replica_of_the_other_job_with_its_number(
 
     planned = plan(job, LAYOUT)
 
-    told = [yaml.safe_load(each.config_map["data"]["training.yaml"]) for each in planned.replicas]
+    told = [yaml.safe_load(each.config_map["data"]["training.yaml"]) for each in planned.replicas.values()]
     assert [each["resumeFrom"] for each in told] == [f"/var/lib/palaestra/5a0c/{index}" for index in (0, 1)]
 
 
@@ -150,6 +150,18 @@ def test_the_pod_is_restricted(in_cluster):
         assert security["readOnlyRootFilesystem"]
         assert not security["allowPrivilegeEscalation"]
         assert security["capabilities"] == {"drop": ["ALL"]}
+
+
+def test_a_job_s_own_node_label_wins_over_the_installation_s(make_job):
+    """The installation's is a default for jobs that say nothing: an own image may be for another machine."""
+    layout = ClusterLayout(
+        images=LAYOUT.images, node_selector={"kubernetes.io/arch": "amd64", "pool": "robots"}
+    )
+    job = make_job(scheduling={"nodeSelector": {"kubernetes.io/arch": "arm64"}})
+
+    spec = pod(plan(job, layout))
+
+    assert spec["nodeSelector"] == {"kubernetes.io/arch": "arm64", "pool": "robots"}
 
 
 def test_scheduling_reaches_the_pod(in_cluster):
@@ -192,7 +204,7 @@ def test_seeds_of_replicas_differ(in_cluster):
     """Replicas are the same training with other luck."""
     seeds = [
         yaml.safe_load(each.config_map["data"]["training.yaml"])["seed"]
-        for each in in_cluster(seed=7, replicas=3).replicas
+        for each in in_cluster(seed=7, replicas=3).replicas.values()
     ]
 
     assert seeds == [7, 8, 9]

@@ -1,14 +1,20 @@
-"""The worlds of a replica: generated here where they can be, and each simulator's own."""
+"""The worlds of a replica: checked once, shipped once a group, named by the sidecars alone."""
+
+import sys
+from itertools import chain
+from pathlib import PurePath
 
 import pytest
 import yaml
 
 from palaestra.plan import ClusterLayout, Images, PlanError, plan
 from palaestra.plan.worlds import MOST_BYTES
-from palaestra_sim.world import WorldError, builtin, robots
+from palaestra_sim.sidecar.options import parse as read_options
+from palaestra_sim.world import RunIdentity, WorldError, builtin, generate, parse, robots
 
 LAYOUT = ClusterLayout(images=Images.of_release("1"))
 ARENA = builtin("arena").decode()
+EARLIER = "job-0-b4a6144287"  # what a5276f3 called the ConfigMap of the job below
 
 
 def group(name="collect", role="Collect", **fields):
@@ -29,43 +35,115 @@ def training(planned, replica=0):
     return yaml.safe_load(data(planned, replica)["training.yaml"])
 
 
+def sidecars(planned, replica=0):
+    """Return the containers of a replica that prepare a world."""
+    containers = planned.replicas[replica].job["spec"]["template"]["spec"]["initContainers"]
+    return [each for each in containers if each["name"].startswith("sim-")]
+
+
+def named(planned, replica=0):
+    """Return the worlds of a replica's simulators, by container, as their sidecars make them."""
+    worlds = {}
+    for container in sidecars(planned, replica):
+        given = read_options(container["args"])
+        identity = RunIdentity(
+            job=given.job,
+            namespace=given.namespace,
+            uid=given.uid,
+            replica=given.replica,
+            group=given.group,
+            index=given.index,
+        )
+        source = data(planned, replica)[PurePath(given.world).name].encode()
+        worlds[container["name"]] = generate(source, identity, clock=given.clock).decode()
+    return worlds
+
+
+def calls_of(function, work):
+    """Return how often a function is called while `work` is done."""
+    calls = []
+
+    def note(frame, event, _):
+        if event == "call" and frame.f_code is function.__code__:
+            calls.append(event)
+
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(None)
+    return len(calls)
+
+
 def test_every_simulator_of_every_replica_has_ros_names_of_its_own(in_cluster):
     """The limit of one simulator a master is what Palaestra removes."""
     planned = in_cluster(replicas=2, simulators=[group(count=3), EVALUATE])
-    names = [
-        robot.ros_name
-        for replica in range(2)
-        for key, text in data(planned, replica).items()
-        if key.endswith(".wbt")
-        for robot in robots(text.encode())
-    ]
+    worlds = chain(*(named(planned, replica).values() for replica in range(2)))
+    names = [robot.ros_name for world in worlds for robot in robots(world.encode())]
 
     assert len(names) == len(set(names)) == 8
+
+
+def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
+    """Seventeen copies that differ in a name are seventeen times the bytes, in etcd and on the wire."""
+    world = {"inline": ARENA}
+    planned = in_cluster(simulators=[group(count=16, world=world), group("evaluate", "Evaluate")])
+
+    assert data(planned).keys() == {"training.yaml", "collect.wbt", "evaluate.wbt"}
+    assert data(planned)["collect.wbt"] == ARENA
+
+
+def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(make_job):
+    """Thirty replicas of seventeen simulators took the operator fifteen seconds, a look."""
+    job = make_job(replicas=3, simulators=[group(count=4), EVALUATE])
+
+    assert calls_of(parse, lambda: plan(job, LAYOUT)) == 1
+
+
+def test_only_the_replicas_that_are_asked_for_are_planned(make_job):
+    """A job with hundred replicas, of which one lacks an object, is planned for that one."""
+    planned = plan(make_job(replicas=3), LAYOUT, mounted={1: ()})
+
+    assert planned.replicas.keys() == {1}
+    assert planned.replicas[1] == plan(make_job(replicas=3), LAYOUT).replicas[1]
+
+
+def test_a_job_of_an_earlier_version_gets_its_own_config_map_again(make_job):
+    """Those held a world a simulator; the name has a hash of every byte of it and of training.yaml."""
+    job = make_job(simulators=[group(count=2), EVALUATE])
+    planned = plan(job, LAYOUT, mounted={0: {EARLIER}})
+
+    assert planned.replicas[0].config_map["metadata"]["name"] == EARLIER
+    assert data(planned).keys() == {"training.yaml", "collect-0.wbt", "collect-1.wbt", "evaluate-0.wbt"}
+
+
+def test_names_are_those_that_earlier_versions_wrote(make_job):
+    """A sidecar makes the same bytes of a source as of a world that has its names already."""
+    job = make_job(simulators=[group(count=2), EVALUATE])
+    earlier = data(plan(job, LAYOUT, mounted={0: {EARLIER}}))
+
+    assert list(named(plan(job, LAYOUT)).values()) == [
+        earlier["collect-0.wbt"],
+        earlier["collect-1.wbt"],
+        earlier["evaluate-0.wbt"],
+    ]
 
 
 def test_the_trainer_and_the_sidecar_are_told_the_same_world(in_cluster):
     """training.yaml says where the world is that the simulator runs."""
     planned = in_cluster()
     told = [each["world"] for each in training(planned)["simulators"]]
-    sidecars = planned.replicas[0].job["spec"]["template"]["spec"]["initContainers"][1:]
 
-    assert told == ["/etc/palaestra/worlds/collect-0.wbt", "/etc/palaestra/worlds/evaluate-0.wbt"]
-    for world, sidecar in zip(told, sidecars, strict=True):
+    assert told == ["/etc/palaestra/worlds/collect.wbt", "/etc/palaestra/worlds/evaluate.wbt"]
+    for world, sidecar in zip(told, sidecars(planned), strict=True):
         assert f"--world={world}" in sidecar["args"]
-
-
-def test_an_inline_world_is_generated_here(in_cluster):
-    """Anyone can read it in the ConfigMap."""
-    planned = in_cluster(simulators=[group(world={"inline": ARENA}), EVALUATE])
-
-    assert "--name=job_r0_collect_0a_robotino_" in data(planned)["collect-0.wbt"]
 
 
 def test_a_file_is_left_to_the_sidecar(in_cluster):
     """It lies in the image, with what it refers to beside it."""
     planned = in_cluster(simulators=[group(world={"file": "/worlds/my.wbt"}), EVALUATE])
 
-    assert "collect-0.wbt" not in data(planned)
+    assert "collect.wbt" not in data(planned)
     assert training(planned)["simulators"][0]["world"] == "/worlds/my.wbt"
 
 
@@ -76,7 +154,7 @@ def test_a_config_map_is_given_by_who_can_read_it(make_job):
 
     planned = plan(job, LAYOUT, {("worlds", "a.wbt"): ARENA.encode()})
 
-    assert "collect-0.wbt" in data(planned)
+    assert data(planned)["collect.wbt"] == ARENA
     with pytest.raises(PlanError, match=r"spec\.simulators\[0\]\.world\.configMap: .* worlds .* a.wbt"):
         plan(job, LAYOUT)
 
@@ -89,15 +167,22 @@ def test_a_broken_world_is_told_with_its_field_line_and_column(in_cluster):
         in_cluster(simulators=[group(world={"inline": broken}), EVALUATE])
 
 
-def test_worlds_that_would_not_fit_go_in_once_and_are_copied_by_the_sidecars(in_cluster):
-    """A ConfigMap holds a megabyte, and sixteen copies of a big world are more."""
-    big = ARENA + "# " + "x" * (MOST_BYTES // 5)
-    planned = in_cluster(simulators=[group(world={"inline": big}, count=8), EVALUATE])
+def test_a_world_that_no_sidecar_could_name_is_refused_before_anything_is_created(in_cluster):
+    """A simulator that cannot start is found hours later, a refusal at once."""
+    twice = '#VRML_SIM R2023b utf8\nRobot { controller "ros" }\nRobot { controller "ros" }\n'
 
-    assert [key for key in data(planned) if key.endswith(".wbt")] == ["collect.wbt", "evaluate.wbt"]
-    assert {each["world"] for each in training(planned)["simulators"][:8]} == {
-        "/etc/palaestra/worlds/collect.wbt"
-    }
+    with pytest.raises(WorldError, match=r'^spec\.simulators\[1\]\.world\.inline:3:1: .* called "robot"'):
+        in_cluster(simulators=[group(), group("evaluate", "Evaluate", world={"inline": twice})])
+
+
+def test_a_job_of_an_earlier_version_whose_worlds_did_not_fit_has_its_sources(make_job):
+    """Sixteen copies of a big world were more than a ConfigMap holds."""
+    big = ARENA + "# " + "x" * (MOST_BYTES // 5)
+    job = make_job(simulators=[group(world={"inline": big}, count=8), EVALUATE])
+
+    planned = plan(job, LAYOUT, mounted={0: {"of-an-earlier-version"}})
+
+    assert data(planned).keys() == {"training.yaml", "collect.wbt", "evaluate.wbt"}
 
 
 def test_worlds_that_fit_nowhere_are_refused(make_job):

@@ -80,6 +80,7 @@ SHAPES = {
         ).map(tuple),
         last_checkpoint=st.none() | checkpoints,
         last_progress=st.none() | times,
+        last_progress_age_s=st.none() | st.floats(0.0, 1e9),
         attempt=st.none() | st.integers(1, 2**53),
         faults=st.dictionaries(st.sampled_from([kind.value for kind in FaultKind]), counts),
         goodput=st.dictionaries(st.sampled_from([cause.value for cause in Cause]), st.floats(0.0, 1e9)),

@@ -204,6 +204,30 @@ def test_a_time_is_one_that_kubernetes_takes(status, time) -> None:
         TrainerStatus.from_json(content)
 
 
+def test_an_age_that_is_not_known_is_absent(status) -> None:
+    """A reader of an older release never sees the field then; a null would be one more thing to read."""
+    assert "last_progress_age_s" not in status().to_json()
+    assert "last_progress_age_s" not in status(last_progress_age_s=math.inf).to_json()
+    assert status(last_progress_age_s=0.0).to_json()["last_progress_age_s"] == 0.0
+
+
+@pytest.mark.parametrize("age_s", [-0.1, math.nan, math.inf, 10**400, "5", True])
+def test_an_age_is_a_number_of_seconds(status, age_s) -> None:
+    """Stalls are judged by it: a negative age, or an endless one, is a lie."""
+    content = status().to_json() | {"last_progress_age_s": age_s}
+
+    with pytest.raises(ProtocolError, match=r"^last_progress_age_s: "):
+        TrainerStatus.from_json(content)
+
+
+def test_a_trainer_of_an_older_release_reports_no_age(status) -> None:
+    """It stays readable; its steps are all that is seen of its progress then."""
+    content = status(last_progress="2025-01-31T12:00:00Z", last_progress_age_s=7.0).to_json()
+    del content["last_progress_age_s"]
+
+    assert TrainerStatus.from_json(content).last_progress_age_s is None
+
+
 def test_a_nested_mistake_says_where_it_is(status) -> None:
     """There may be sixteen simulators in the list."""
     good = SimulatorStatus(name="collect-0", role="Collect", state="ready")

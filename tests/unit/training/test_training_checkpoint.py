@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
@@ -481,6 +482,23 @@ def test_another_run_is_not_continued(trained, make_configuration, changes, fiel
 
     with pytest.raises(ConfigurationError, match=f"{field}: the run in .* use another run directory"):
         checkpoint.refuse_another_run(checkpoint.newest(model.folder), other)
+
+
+def test_a_checkpoint_is_of_the_same_run_where_only_a_default_is_new(trained, make_configuration):
+    """An upgrade between two attempts: the field was not there to be saved."""
+    model = trained()
+    model.save()
+    newest = checkpoint.newest(model.folder)
+    algorithm = {"normalize": {}} | model.configuration.algorithm.model_dump(exclude={"normalize"})
+    wanted = make_configuration(algorithm=algorithm)
+    saved = wanted.algorithm.model_dump(mode="json")
+    del saved["normalize"]["clip_rewards"]
+    environment = {"id": newest.manifest.environment["id"]}
+
+    manifest = dataclasses.replace(newest.manifest, algorithm=saved, environment=environment)
+    older = dataclasses.replace(newest, manifest=manifest)
+
+    checkpoint.refuse_another_run(older, wanted)
 
 
 def test_tensors_of_another_shape_are_a_configuration_error(trained, make_member, tmp_path):

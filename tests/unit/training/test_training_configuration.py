@@ -6,6 +6,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from structlog.testing import capture_logs
 
 from palaestra_trainer.configuration import dump, load, parse
 from palaestra_trainer.errors import ConfigurationError
@@ -68,13 +69,13 @@ def test_what_is_dumped_is_read_back_as_the_same():
 
 def test_all_mistakes_are_told_at_once():
     """Whoever mends one mistake at a time starts a pod for each."""
-    wrong = MINIMAL | {"steps": 0, "evaluation": {"evrySteps": 3}, "seed": -1}
+    wrong = MINIMAL | {"steps": 0, "evaluation": {"episodes": 0}, "seed": -1}
 
     with pytest.raises(ConfigurationError) as caught:
         parse(wrong)
 
     assert sorted(str(caught.value).splitlines()) == [
-        "training.yaml: evaluation.evrySteps: is not a known field; did you mean everySteps?",
+        "training.yaml: evaluation.episodes: 0 is refused; Input should be greater than or equal to 1",
         "training.yaml: seed: -1 is refused; Input should be greater than or equal to 0",
         "training.yaml: steps: 0 is refused; Input should be greater than or equal to 1",
     ]
@@ -82,10 +83,28 @@ def test_all_mistakes_are_told_at_once():
 
 def test_a_mistake_in_a_list_names_its_place():
     """There may be thirty simulators."""
-    wrong = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"rolle": "Collect"}]}
+    wrong = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"role": "Colect"}]}
 
-    with pytest.raises(ConfigurationError, match=r"simulators\[0\].rolle: .* did you mean role\?"):
+    with pytest.raises(ConfigurationError, match=r"simulators\[0\].role: 'Colect' is refused"):
         parse(wrong)
+
+
+def test_an_unknown_field_is_logged_with_its_place_and_ignored():
+    """An operator newer than the job's own trainer image may write one; the run goes on as it can."""
+    newer = MINIMAL | {"simulators": [MINIMAL["simulators"][0] | {"roll": 1}], "ofTomorrow": {"a": [1]}}
+
+    with capture_logs() as logs:
+        read = parse(newer)
+
+    assert read == parse(MINIMAL)
+    assert [each["field"] for each in logs] == ["simulators[0].roll", "ofTomorrow"]
+    assert logs[0]["hint"] == "did you mean role?"
+
+
+def test_an_unknown_field_hides_no_mistake_of_another():
+    """What is wrong beside it is refused as ever, also what only the whole can show."""
+    with pytest.raises(ConfigurationError, match="none has role Collect"):
+        parse(MINIMAL | {"ofTomorrow": 1, "simulators": [MINIMAL["simulators"][0] | {"role": "Evaluate"}]})
 
 
 @pytest.mark.parametrize(

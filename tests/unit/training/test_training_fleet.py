@@ -9,6 +9,7 @@ from concurrent.futures import wait
 from pathlib import Path
 
 import pytest
+import structlog
 
 from palaestra_trainer.configuration import parse
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
@@ -70,6 +71,23 @@ def test_one_that_does_not_come_up_ends_the_start(make_fleet):
         fleet.start()
 
     assert members[0].log == ["start", *["restart"] * 10]
+
+
+def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member, monkeypatch):
+    """Who waits for the first step sees which of them it is, before a deadline makes a fault of it."""
+    monkeypatch.setattr("palaestra_trainer.simulators.fleet.LONG_S", 0.0)
+    released = threading.Event()
+    member = make_member("collect-0")
+    member.start = lambda: released.wait(DEADLINE_S)
+    fleet, _ = make_fleet(member)
+
+    with structlog.testing.capture_logs() as logs:
+        fleet.start(lambda: released.set() if logs else None)
+    fleet.stop()
+
+    waits = [each for each in logs if each["event"] == "waiting for simulators"]
+    assert "collect-0" in waits[0]["names"]
+    assert waits[0]["waited_s"] == 0
 
 
 def test_a_signal_does_not_wait_for_simulators_that_start(make_fleet, make_member):

@@ -44,6 +44,7 @@ def test_at_the_start_nothing_is_known(progress):
     assert status.success_rate is None
     assert status.steps_per_second is None
     assert status.last_progress is None
+    assert status.last_progress_age_s is None
 
 
 def test_steps_and_episodes_are_counted(progress):
@@ -119,6 +120,26 @@ def test_idleness_ends_with_a_step_of_any_simulator(progress, clock):
     progress.stepped(1)
 
     assert (before, progress.idle_s()) == (50.0, 0.0)
+
+
+def test_the_age_of_progress_is_by_a_clock_that_nobody_sets(progress, clock, monkeypatch):
+    """A node's time of day may jump by an hour; how long no step was taken does not change by that."""
+    clock.now = 50.0
+    progress.stepped(1)
+    monkeypatch.setattr("time.time", lambda: 0.0)
+    clock.now = 57.5
+
+    assert progress.status().last_progress_age_s == 7.5
+
+
+def test_a_step_ends_the_age_of_progress(progress, clock):
+    """Also one of an evaluation: the keeper of any simulator reports it."""
+    progress.stepped(1)
+    clock.now = 60.0
+    before = progress.status().last_progress_age_s
+    progress.stepped(1)
+
+    assert (before, progress.status().last_progress_age_s) == (60.0, 0.0)
 
 
 def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.world import RunIdentity, WorldError, builtin, generate, parse
+from palaestra_sim.world import RunIdentity, WorldError, builtin, check, generate, parse
 
 IDENTITY = RunIdentity(job="job", replica=0, group="collect", index=0)
 
@@ -124,10 +124,12 @@ def test_arbitrary_bytes_are_a_world_or_a_world_error(data: bytes) -> None:
     ),
 )
 def test_a_damaged_world_is_generated_from_or_refused(at: float, cut: int, new: bytes) -> None:
-    """Half-saved files, lost braces, editors gone wrong."""
+    """Half-saved files, lost braces, editors gone wrong; the check finds what the generator would."""
     arena = builtin("two_robots")
     place = int(at * len(arena))
+    damaged = arena[:place] + new + arena[place + cut :]
 
-    error = problem(lambda: generate(arena[:place] + new + arena[place + cut :], IDENTITY, clock=True))
+    error = problem(lambda: generate(damaged, IDENTITY, clock=True))
 
     assert error is None or str(error).startswith(f"world:{error.line}:{error.column}: ")
+    assert str(problem(lambda: check(damaged))) == str(error)

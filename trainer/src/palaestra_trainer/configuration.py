@@ -5,6 +5,12 @@ wrong file is refused before anything is started, with all its mistakes at
 once, each as field, fact and remedy. Which hyperparameters an algorithm takes
 is not known here but in `palaestra_trainer.algorithms`: reading a
 configuration must not cost the import of a learning library.
+
+Unknown fields are logged and ignored. A job may name a `trainer.image` of its
+own, older than the operator that writes the file, and a newer operator writes
+a new field only where the job sets it. A person's mistakes do not come here:
+the job is checked before the file is written. A value that is not known is
+refused: it changes what is learned.
 """
 
 from __future__ import annotations
@@ -15,12 +21,17 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import structlog
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.alias_generators import to_camel
 from pydantic_core import ErrorDetails
 
 from palaestra_trainer.errors import ConfigurationError
+
+log = structlog.get_logger(__name__)
+
+_UNKNOWN = "extra_forbidden"  # pydantic's name of the mistake
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
 
@@ -31,7 +42,7 @@ Device = Literal["cpu", "cuda"]
 
 
 class _Section(BaseModel):
-    """A part of the file: camelCase in YAML, unknown fields refused, immutable."""
+    """A part of the file: camelCase in YAML, immutable; `parse` decides on unknown fields."""
 
     model_config = ConfigDict(
         alias_generator=to_camel,
@@ -232,6 +243,12 @@ def parse(content: object, *, source: str = "training.yaml") -> Configuration:
     try:
         return Configuration.model_validate(content)
     except ValidationError as error:
+        for mistake in error.errors():
+            if mistake["type"] == _UNKNOWN:
+                log.warning("unknown field ignored", **_unknown(mistake), file=source)
+    try:
+        return Configuration.model_validate(content, extra="ignore")
+    except ValidationError as error:
         lines = (f"{source}: {line}" for line in _mistakes(error))
         raise ConfigurationError("\n".join(lines)) from error
 
@@ -261,12 +278,14 @@ def _mistakes(error: ValidationError) -> Iterator[str]:
         match mistake["type"]:
             case "missing":
                 yield f"{field}: is missing; add it"
-            case "extra_forbidden":
-                yield f"{field}: is not a known field; {_nearest_field(mistake)}"
             case "value_error" if not mistake["loc"]:
                 yield mistake["msg"].removeprefix("Value error, ")
             case _:
                 yield f"{field}: {mistake['input']!r} is refused; {mistake['msg']}"
+
+
+def _unknown(mistake: ErrorDetails) -> dict[str, str]:
+    return {"field": _field(mistake["loc"]), "hint": _nearest_field(mistake)}
 
 
 def _field(location: tuple[int | str, ...]) -> str:

@@ -313,6 +313,7 @@ class Progress:
                 simulators=self._standings.statuses(),
                 last_checkpoint=self.checkpoint,
                 last_progress=None if self._moved_at is None else timestamp(self._moved_at),
+                last_progress_age_s=None if self._moved_at is None else round(max(self.idle_s(), 0.0), 3),
                 phase=self.phase,
                 attempt=self.attempt,
                 faults={kind.value: counters.faults[kind] for kind in FaultKind},

@@ -8,7 +8,15 @@ Patterns are read by two engines, Rust's here and Go's in the API server: plain 
 import json
 from typing import Annotated, Any, Protocol, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WithJsonSchema,
+    WrapValidator,
+)
 from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
@@ -17,6 +25,7 @@ T = TypeVar("T")
 MAY_CHANGE = "x-may-change"
 
 LABEL = "^[a-z]([-a-z0-9]*[a-z0-9])?$"
+DIGIT_LABEL = "^[a-z0-9]([-a-z0-9]*[a-z0-9])?$"
 SUBDOMAIN = "^[a-z0-9]([-a-z0-9]*[a-z0-9])?([.][a-z0-9]([-a-z0-9]*[a-z0-9])?)*$"
 QUALIFIED = "^[a-z0-9]([-a-z0-9.]*[a-z0-9])?/[A-Za-z0-9]([-A-Za-z0-9_.]*[A-Za-z0-9])?$"
 FILE_KEY = "^[-._a-zA-Z0-9]+$"
@@ -32,6 +41,7 @@ ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$
 # For each pattern: what a value that does not match is not, and what to write instead.
 PATTERNS: dict[str, tuple[str, str]] = {
     LABEL: ("a name", "use a-z first, then a-z, 0-9 and '-', no '-' at the end"),
+    DIGIT_LABEL: ("a namespace", "use a-z, 0-9 and '-', no '-' at the beginning or the end"),
     SUBDOMAIN: ("the name of an object", "use a-z, 0-9, '-' and '.'"),
     QUALIFIED: ("a name with a domain", "write it as example.com/name"),
     FILE_KEY: ("a key", "use letters, digits, '-', '_' and '.'"),
@@ -51,7 +61,9 @@ PATTERNS: dict[str, tuple[str, str]] = {
 # The pods' names, hash included, have to be DNS labels of at most 63 characters.
 JobName = Annotated[str, Field(min_length=1, max_length=48, pattern=LABEL)]
 GroupName = Annotated[str, Field(min_length=1, max_length=20, pattern=LABEL)]
-Label = Annotated[str, Field(min_length=1, max_length=63, pattern=LABEL)]
+# A name of a job becomes part of names of Services and ROS nodes, which begin with a letter; a namespace
+# does not. Source: RFC 1123
+Namespace = Annotated[str, Field(min_length=1, max_length=63, pattern=DIGIT_LABEL)]
 ObjectName = Annotated[str, Field(min_length=1, max_length=253, pattern=SUBDOMAIN)]
 FileKey = Annotated[str, Field(min_length=1, max_length=253, pattern=FILE_KEY)]
 Image = Annotated[str, Field(min_length=1, max_length=512, pattern=IMAGE)]
@@ -67,6 +79,22 @@ Memory = Annotated[str, Field(max_length=32, pattern=MEMORY)]
 # Lists come from YAML as lists and are kept as tuples, so that a job cannot change.
 Listed = Annotated[tuple[T, ...], Field(strict=False)]
 Words = Annotated[Listed[Word], Field(max_length=64)]
+
+
+def _without_unknown_words(items: Any, read: ValidatorFunctionWrapHandler) -> Any:
+    """Return what `read` makes of the items, without those that have an unknown value of an enum."""
+    try:
+        return read(items)
+    except ValidationError as error:
+        unknown = {each["loc"][0] for each in error.errors(include_url=False) if each["type"] == "enum"}
+        if not unknown:
+            raise
+        return read([item for place, item in enumerate(items) if place not in unknown])
+
+
+# For a list of a status that is only shown, or made anew at each look: a newer release may report items
+# of a kind that this one does not have.
+KNOWN_ONES = WrapValidator(_without_unknown_words)
 
 
 class Named(Protocol):

@@ -10,14 +10,14 @@ from typing import Annotated
 from pydantic import Field
 
 from palaestra.api.fields import Count, Listed, Sentence, Word
-from palaestra.api.model import ApiModel
+from palaestra.api.model import Reported
 from palaestra_sim.protocol.status import MOST_FAULTS, MOST_LINE, MOST_LINES
 
 Line = Annotated[str, Field(max_length=MOST_LINE)]
 Seconds = Annotated[int, Field(ge=0, le=2_000_000_000)]
 
 
-class Fault(ApiModel):
+class Fault(Reported):
     """One fault of one simulator."""
 
     time: datetime = Field(strict=False)
@@ -36,7 +36,7 @@ class Fault(ApiModel):
     """Environment steps learned from by then."""
 
 
-class LastAttempt(ApiModel):
+class LastAttempt(Reported):
     """How the newest attempt that has ended did so; it stays when the pod is gone."""
 
     attempt: Count
@@ -61,7 +61,7 @@ class LastAttempt(ApiModel):
     """Simulators that were started again after a fault."""
 
 
-class Faults(ApiModel):
+class Faults(Reported):
     """How often simulators broke, over all attempts."""
 
     dead: Count = 0
@@ -77,7 +77,7 @@ class Faults(ApiModel):
     """Answers that cannot be right."""
 
 
-class Goodput(ApiModel):
+class Goodput(Reported):
     """What the trainer's time was spent on, over all attempts, in whole seconds."""
 
     stepping: Seconds = 0
@@ -103,7 +103,7 @@ class Goodput(ApiModel):
     back to where it was."""
 
 
-class MemoryKills(ApiModel):
+class MemoryKills(Reported):
     """How often one container was killed for its memory."""
 
     container: Word
@@ -116,4 +116,10 @@ class MemoryKills(ApiModel):
     """Its memory limit, as `512Mi`; absent: it has none, so its node ran short."""
 
     last: datetime = Field(strict=False)
-    """When it was killed last."""
+    """When it was killed last, by its node's clock."""
+
+    pod: Word | None = None
+    """UID of the pod in which it was killed last; absent: an older release has counted."""
+
+    run: Count | None = None
+    """Which run of the container in that pod was killed last, from 0; absent as `pod` is."""

@@ -3,14 +3,15 @@
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from palaestra.api.fields import (
     MAY_CHANGE,
     QUALIFIED,
     Count,
     JobName,
-    Label,
     NamedList,
+    Namespace,
     ObjectName,
     Seconds,
     Word,
@@ -25,7 +26,10 @@ from palaestra.api.trainer import Trainer
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
 KIND: Final = "TrainingJob"
+START_TIMEOUT_S = 21_600  # a night without the registry, not a weekend
+FRUITLESS_PODS = 6  # as many as Kubernetes' own default for failures
 MOST_SIMULATORS = 32  # in one pod; their ports are 7100+k and 7200+k
+MOST_INLINE = 900_000  # characters of all inline worlds; the plan refuses more bytes than that
 
 
 # Parts of an object's metadata that a file has when it was read back from a cluster.
@@ -35,6 +39,7 @@ _WRITTEN_BY_SERVERS = frozenset(
         "deletionGracePeriodSeconds",
         "deletionTimestamp",
         "finalizers",
+        "generateName",
         "managedFields",
         "ownerReferences",
         "resourceVersion",
@@ -49,7 +54,7 @@ class Metadata(ApiModel):
     name: JobName
     """Name of the job: a DNS label of at most 48 characters; pods and claims are named after it."""
 
-    namespace: Label = "default"
+    namespace: Namespace = "default"
     """Namespace; `default` when absent."""
 
     uid: Word | None = None
@@ -71,6 +76,8 @@ class Metadata(ApiModel):
     def _drop_what_servers_write(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
+        if "generateName" in data and "name" not in data:
+            raise PydanticCustomError("generated", "has generateName and no name; add a name")
         return {key: value for key, value in data.items() if key not in _WRITTEN_BY_SERVERS}
 
 
@@ -116,8 +123,22 @@ class Spec(ApiModel):
 
     stall_deadline_seconds: Seconds = Field(default=600, json_schema_extra={MAY_CHANGE: True})
     """Seconds without a step that is learned from or evaluated after which a trainer ends itself and
-    is tried again. It goes by the value that its replica was started with; the operator ends a
-    replica for good whose step count stands two minutes longer than the value of now."""
+    is tried again. It goes by the value that its replica was started with; the operator replaces the pod
+    of a trainer that answers and whose step count stands two minutes longer than the value of now, at
+    most `backoffLimit` times."""
+
+    start_timeout_seconds: Seconds | None = Field(default=None, json_schema_extra={MAY_CHANGE: True})
+    """Seconds that a replica may wait for its first step, for an image or a node, for instance; then it
+    fails with the reason that it waits for. Absent: 21,600. Time in a queue or suspended is not counted,
+    nor is that of a running trainer whose simulators are up. Once a step was made, only
+    `activeDeadlineSeconds` bounds a wait.
+    `palaestra run` has nothing of the kind to wait for."""
+
+    no_progress_limit: Annotated[int, Field(ge=0, le=100)] | None = Field(
+        default=None, json_schema_extra={MAY_CHANGE: True}
+    )
+    """Pods in a row that the cluster may take without one new step before the replica fails; absent: 6,
+    0: any number. Counted once a step was reported, and only for pods whose trainer ran."""
 
     ttl_seconds_after_finished: Annotated[int, Field(ge=0, le=315_360_000)] | None = Field(
         default=None, json_schema_extra={MAY_CHANGE: True}
@@ -137,6 +158,16 @@ class Spec(ApiModel):
     """Controller that looks after this job, as `example.com/name`; absent: Palaestra's operator,
     which leaves a job with another value alone."""
 
+    @property
+    def start_timeout_s(self) -> int:
+        """Return how long a replica may wait for its first step."""
+        return START_TIMEOUT_S if self.start_timeout_seconds is None else self.start_timeout_seconds
+
+    @property
+    def most_fruitless(self) -> int:
+        """Return how many pods in a row may be taken without a step; 0: any number."""
+        return FRUITLESS_PODS if self.no_progress_limit is None else self.no_progress_limit
+
     rules = (
         Rule(
             field="simulators",
@@ -149,6 +180,14 @@ class Spec(ApiModel):
             holds=lambda spec: sum(group.count for group in spec.simulators) <= MOST_SIMULATORS,
             cel="self.simulators.map(group, group.count).sum() <= 32",
             message="more than 32 simulators in one pod; lower the counts or use replicas",
+        ),
+        Rule(
+            field="simulators",
+            holds=lambda spec: sum(len(group.world.inline or "") for group in spec.simulators) <= MOST_INLINE,
+            cel="self.simulators.map(group, has(group.world.inline) ? size(group.world.inline) : 0).sum()"
+            " <= 900000",
+            message="their inline worlds have more than 900,000 characters; put the worlds into the images"
+            " and name them with world.file",
         ),
         Rule(
             field="trainer.evaluation",

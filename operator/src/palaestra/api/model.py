@@ -88,3 +88,13 @@ class ApiModel(BaseModel):
                 rule.validation() for rule in cls.rules if rule.cel
             ]
         return schema
+
+
+class Reported(ApiModel):
+    """One object of a status: as every other, but fields that it does not have are ignored.
+
+    A program reads statuses that another release wrote. A newer one may report more, and what a
+    person writes is never read through here.
+    """
+
+    model_config = ConfigDict(extra="ignore")

@@ -29,8 +29,10 @@ class Reason(StrEnum):
     SECRET_NOT_FOR_JOBS = "SecretNotForJobs"  # noqa: S105 - a reason
     CLAIM_MISSING = "ClaimMissing"
     CLAIM_NOT_FOR_JOBS = "ClaimNotForJobs"
+    POD_METADATA_NOT_ALLOWED = "PodMetadataNotAllowed"
     NO_KUEUE = "NoKueue"
     NAME_TAKEN = "NameTaken"
+    OLD_POD_TERMINATING = "OldPodTerminating"
     PLANNED = "Planned"
     QUEUED = "Queued"
     SUSPENDED = "Suspended"
@@ -50,6 +52,7 @@ class Reason(StrEnum):
     SIDECAR_CRASH_LOOP = "SidecarCrashLoop"
     SIMULATOR_START_DEADLINE = "SimulatorStartDeadline"
     TRAINER_NOT_STARTED = "TrainerNotStarted"
+    START_TIMEOUT = "StartTimeout"
     SIMULATOR_OUT_OF_MEMORY = "SimulatorOutOfMemory"
     TRAINER_OUT_OF_MEMORY = "TrainerOutOfMemory"
     EPHEMERAL_STORAGE = "EphemeralStorage"
@@ -67,6 +70,12 @@ class Reason(StrEnum):
     SUCCEEDED = "Succeeded"
     SOME_REPLICAS_FAILED = "SomeReplicasFailed"
     EXPIRED = "Expired"
+    EDITED = "Edited"
+
+    @classmethod
+    def known(cls, word: str) -> "Reason":
+        """Return the reason of this word; one that nobody knows, as a newer release's, is `JobFailed`."""
+        return cls(word) if word in set(cls) else cls.JOB_FAILED
 
     @classmethod
     def _missing_(cls, value: object) -> "Reason | None":
@@ -74,6 +83,25 @@ class Reason(StrEnum):
 
 
 _RENAMED = {"FaultBudgetSpent": Reason.SIMULATOR_BUDGET_SPENT}
+
+
+# What a replica waits for while nothing has ended: the cluster tries again, or a person has to act. The
+# metric palaestra_replicas_waiting counts these.
+WAITING = (
+    Reason.NAME_TAKEN,
+    Reason.OLD_POD_TERMINATING,
+    Reason.PODS_REFUSED,
+    Reason.NODE_LOST,
+    Reason.RESTART_POLICY_DROPPED,
+    Reason.UNSCHEDULABLE,
+    Reason.VOLUME_NOT_MOUNTED,
+    Reason.IMAGE_PULL,
+    Reason.CONTAINER_REFUSED,
+    Reason.SIMULATOR_OUT_OF_MEMORY,
+    Reason.SIDECAR_CRASH_LOOP,
+    Reason.SIMULATOR_START_DEADLINE,
+    Reason.TRAINER_NOT_STARTED,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +167,14 @@ ROWS: dict[Reason, Row] = {
         "a job may write only where somebody has opened a volume to jobs",
         "whoever owns the claim sets the label",
     ),
+    Reason.POD_METADATA_NOT_ALLOWED: Row(
+        "{field}: key {key} is not allowed in this cluster; allow it with the chart's value {value}, "
+        "or make a new TrainingJob without it",
+        "other controllers obey labels and annotations of pods: who may write a TrainingJob and no pod "
+        "must not reach them; an installation allows none unless it names them",
+        "add the key, or its domain with a `/` at the end, to `jobs.allowedPodLabels` or "
+        "`jobs.allowedPodAnnotations` ([install](install.md#what-pods-may-carry)): the job starts then",
+    ),
     Reason.NO_KUEUE: Row(
         "spec.scheduling.queueName: this cluster has no Kueue; install it, or make a job without a queue",
         "a queue is named and nothing would ever admit the job",
@@ -148,6 +184,13 @@ ROWS: dict[Reason, Row] = {
         "Job {name} belongs to somebody else{deleting}; remove it or rename this TrainingJob",
         "a Job of another owner has the name of a replica's",
         "wait while it is being deleted; otherwise remove it, or rename the TrainingJob",
+    ),
+    Reason.OLD_POD_TERMINATING: Row(
+        "pod {pod} of an earlier TrainingJob of this name has not ended and mounts claim {claim}; "
+        "if node {node} is lost, delete the Node object or taint it node.kubernetes.io/out-of-service",
+        "the TrainingJob was made again while a pod of the one before still terminates, as on a lost node, "
+        "and both mount the same `existingClaim`: no second pod is made while the first may still write",
+        "wait; once the machine is off, `kubectl delete node NODE`, or use another claim",
     ),
     Reason.PLANNED: Row(
         "created {objects}", "the objects of a replica were created", "nothing", warning=False
@@ -159,9 +202,11 @@ ROWS: dict[Reason, Row] = {
         warning=False,
     ),
     Reason.SUSPENDED: Row(
-        "suspended by spec.suspend; set it to false to go on from the last checkpoint",
-        "the pods were deleted after a checkpoint",
-        "set `spec.suspend: false`",
+        "suspended by {by}",
+        "the pods were deleted after a checkpoint; the message says who set `suspend`: the TrainingJob's "
+        "`spec.suspend`, or a field manager that changed the Job, such as Kueue. "
+        "The operator does not undo what another has set",
+        "set `spec.suspend: false`; what another has suspended, it has to resume",
         warning=False,
     ),
     Reason.RESUMED: Row(
@@ -205,13 +250,14 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.IMAGE_PULL: Row(
         "container {container}: image {image} cannot be pulled ({words}); name one that can",
-        "an image does not exist, or the registry refuses it; after the start deadline the replica fails",
-        "correct the image's name, or give `imagePullSecrets`",
+        "an image does not exist, or the registry refuses it; the kubelet tries again, and before the first "
+        "step `startTimeoutSeconds` bounds it",
+        "push the image, give `imagePullSecrets`, or name another one in a new TrainingJob",
     ),
     Reason.CONTAINER_REFUSED: Row(
         "container {container}: the node cannot make it ({words}); mend what it names",
         "a program, a key of a Secret or a device that the container needs is not there; "
-        "after the start deadline the replica fails",
+        "the kubelet tries again, and before the first step `startTimeoutSeconds` bounds it",
         "the words are the kubelet's and name what is missing",
     ),
     Reason.VOLUME_NOT_MOUNTED: Row(
@@ -230,24 +276,34 @@ ROWS: dict[Reason, Row] = {
     Reason.RESTART_POLICY_DROPPED: Row(
         "pod {pod}: {containers} lost restartPolicy: Always, so that the trainer would wait for ever; "
         "update the webhook or scheduler that rewrites pods",
-        "something between operator and kubelet does not know sidecar containers and has dropped the field",
+        "something between operator and kubelet does not know sidecar containers and has dropped the field; "
+        "the pod is replaced, at most `backoffLimit` times",
         "update or remove the mutating webhook",
     ),
     Reason.SIDECAR_CRASH_LOOP: Row(
         "container {container} has crashed {times} times ({how}); read its log",
-        "a sidecar does not stay up, which Kubernetes never tells of",
+        "a sidecar does not stay up; the kubelet starts it again and again, and while it trains the "
+        "trainer's budget of faults ends the run",
         "`kubectl logs POD -c CONTAINER --previous`",
     ),
     Reason.SIMULATOR_START_DEADLINE: Row(
         "{what}; read the simulator's log or raise startDeadlineSeconds",
-        "a simulator did not come up within `startDeadlineSeconds` of its container's start",
+        "a simulator did not come up within `startDeadlineSeconds`; its trainer tries again, and gives up by "
+        "its own budget (`SimulatorBudgetSpent`)",
         "`kubectl logs POD -c sim-GROUP-N`; raise the deadline if it is only slow",
     ),
     Reason.TRAINER_NOT_STARTED: Row(
         "all sidecars of pod {pod} run and the node has not started the trainer for {seconds} s; "
         "update the node's Kubernetes",
-        "a kubelet forgets the main container when a sidecar's first start failed (Kubernetes issue 132826)",
+        "a kubelet forgets the main container when a sidecar's first start failed (Kubernetes issue 132826); "
+        "the pod is replaced, at most `backoffLimit` times",
         "update the nodes to 1.34 or newer",
+    ),
+    Reason.START_TIMEOUT: Row(
+        "{what}",
+        "the replica has waited for its first step as long as `startTimeoutSeconds` allows, and nobody says "
+        "what for",
+        "`kubectl describe pod`; raise `startTimeoutSeconds`, in a new TrainingJob, if it may take longer",
     ),
     Reason.SIMULATOR_OUT_OF_MEMORY: Row(
         "container {container} was killed for its memory ({limit}, {times} so far); "
@@ -273,7 +329,7 @@ ROWS: dict[Reason, Row] = {
         "delete old runs on the volume, enlarge the claim, or lower `spec.trainer.checkpoint.keep`",
     ),
     Reason.NODE_LOST: Row(
-        "pod {pod} was to be gone {seconds} s ago and node {node} does not confirm it; "
+        "pod {pod} was to be gone more than {seconds} s ago and node {node} does not confirm it; "
         "delete the Node object or taint it node.kubernetes.io/out-of-service",
         "the node does not answer; no second pod is made while the first may still write",
         "`kubectl delete node NODE` once the machine is off",
@@ -287,7 +343,8 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.STALLED: Row(
         "{what}; read the stacks in the trainer's log",
-        "no step was learned from for `stallDeadlineSeconds`, by the trainer's word, though it may answer",
+        "no step was learned from for `stallDeadlineSeconds`: the trainer ended itself and is tried again, "
+        "or answers all the same, and its pod is replaced, at most `backoffLimit` times",
         "`kubectl logs POD -c trainer`; raise the deadline, in a new TrainingJob, "
         "if a step may take that long",
     ),
@@ -321,7 +378,8 @@ ROWS: dict[Reason, Row] = {
     Reason.NO_PROGRESS: Row(
         "{pods} pods in a row were taken or interrupted without one new step; "
         "ask for nodes that stay, or checkpoint more often",
-        "the cluster takes pods faster than they come forward, or the trainer always exits with 75",
+        "`noProgressLimit`: the cluster takes pods faster than they come forward, or the trainer always "
+        "exits with 75",
         "lower `spec.trainer.checkpoint.everySteps`, or use nodes that are not taken away",
     ),
     Reason.JOB_FAILED: Row(
@@ -342,6 +400,12 @@ ROWS: dict[Reason, Row] = {
         "the TrainingJob is deleted; its claims stay unless `retain: Delete`",
         "nothing",
         warning=False,
+    ),
+    Reason.EDITED: Row(
+        "{what} was changed by somebody else: {fact}",
+        "an object that the operator made is not as it was made; it is said once for each edit, "
+        "and nothing is put back",
+        "undo the edit if nobody meant it",
     ),
 }
 

@@ -106,10 +106,12 @@ class Scheduling(ApiModel):
 
     pod_labels: LabelMap = Field(default={})
     """Labels for the pods, beside Palaestra's own, under a domain of yours such as `example.com/team`:
-    Services and NetworkPolicies of others select pods by the usual ones."""
+    Services and NetworkPolicies of others select pods by the usual ones. A cluster takes those that its
+    installation allows (`jobs.allowedPodLabels`)."""
 
     pod_annotations: TextMap = Field(default={})
-    """Annotations for the pods, beside Palaestra's own."""
+    """Annotations for the pods, beside Palaestra's own. A cluster takes those that its installation allows
+    (`jobs.allowedPodAnnotations`)."""
 
     rules = (
         Rule(

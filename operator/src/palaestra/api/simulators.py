@@ -65,7 +65,8 @@ class World(ApiModel):
     """
 
     inline: Annotated[str, Field(min_length=1, max_length=200_000)] | None = None
-    """The text of a `.wbt` file. It names no other file: relative addresses are refused."""
+    """The text of a `.wbt` file. It names no other file: relative addresses are refused. If the inline
+    worlds of a job have more than 256 KiB together, use `kubectl apply --server-side`."""
 
     config_map: ConfigMapKey | None = None
     """A ConfigMap that holds the text of a `.wbt` file; relative addresses are refused."""
@@ -178,8 +179,8 @@ class SimulatorGroup(ApiModel):
     """How many faults of one simulator are survived."""
 
     start_deadline_seconds: Seconds = Field(default=60, json_schema_extra={MAY_CHANGE: True})
-    """Seconds a simulator may take to come up, counted from the start of its container; image
-    pulls are not counted."""
+    """Seconds that the trainer gives a simulator to come up, from when it asks for it; image pulls are not
+    counted. The operator ends nothing by it."""
 
     env: Environment = ()
     """Environment variables of the simulator's container."""

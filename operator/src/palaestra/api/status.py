@@ -2,6 +2,11 @@
 
 Numbers come from the trainers and are as old as the last poll. What is not known is absent, never
 zero.
+
+A status may have been written by another release. Unknown fields are ignored, and so are conditions
+and simulators with an unknown word. An unknown phase, or a value of another type, is refused: it could
+mean that a replica has ended. A field that is new since a5276f3 is absent unless it is set: the
+programs of that release refuse a status with an unknown field.
 """
 
 from datetime import datetime
@@ -10,9 +15,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from palaestra.api.fields import Count, Fraction, Image, Listed, Sentence, Word
+from palaestra.api.fields import KNOWN_ONES, Count, Fraction, Image, Listed, Sentence, Word
 from palaestra.api.history import Faults, Goodput, LastAttempt, MemoryKills
-from palaestra.api.model import ApiModel
+from palaestra.api.model import Reported
 from palaestra.api.simulators import Role
 
 
@@ -57,7 +62,7 @@ class ConditionStatus(StrEnum):
     UNKNOWN = "Unknown"
 
 
-class Condition(ApiModel):
+class Condition(Reported):
     """One claim about the job, with its reason, as Kubernetes' own conditions."""
 
     type: ConditionType = Field(strict=False)
@@ -79,7 +84,7 @@ class Condition(ApiModel):
     """Generation of the spec that this speaks of; absent: unknown."""
 
 
-class LastCheckpoint(ApiModel):
+class LastCheckpoint(Reported):
     """The newest checkpoint in the run directory."""
 
     step: Count
@@ -89,10 +94,10 @@ class LastCheckpoint(ApiModel):
     """When it was written."""
 
 
-class Restarts(ApiModel):
+class Restarts(Reported):
     """What was started again in a replica, by cause.
 
-    The attempt's number is 1 + trainer + disruption + suspension.
+    The attempt's number is 1 + trainer + disruption + suspension + operator.
     """
 
     trainer: Count = 0
@@ -108,8 +113,12 @@ class Restarts(ApiModel):
     suspension: Count = 0
     """Pods that were replaced because the job was suspended and resumed."""
 
+    operator: Count | None = None
+    """Pods that the operator replaced because no kubelet heals them: `TrainerNotStarted`,
+    `RestartPolicyDropped`, `Stalled`. At most `backoffLimit` are; absent: none was."""
 
-class PodReference(ApiModel):
+
+class PodReference(Reported):
     """The pod of the current attempt."""
 
     name: Word
@@ -122,7 +131,7 @@ class PodReference(ApiModel):
     """When it was made."""
 
 
-class SimulatorStatus(ApiModel):
+class SimulatorStatus(Reported):
     """One simulator of a replica, as the trainer tells it."""
 
     name: Word
@@ -150,7 +159,7 @@ class SimulatorStatus(ApiModel):
     """`starting` or `ready`: its spare; absent: it has none."""
 
 
-class ReplicaStatus(ApiModel):
+class ReplicaStatus(Reported):
     """One training run."""
 
     index: Count
@@ -189,22 +198,23 @@ class ReplicaStatus(ApiModel):
     steps_per_second: Annotated[float, Field(ge=0)] | None = None
     """Environment steps a second, lately; absent: not known, or not running."""
 
-    simulators: Annotated[Listed[SimulatorStatus], Field(max_length=32)] = ()
+    simulators: Annotated[Listed[SimulatorStatus], Field(max_length=32), KNOWN_ONES] = ()
     """Its simulators; empty: not known yet."""
 
     last_checkpoint: LastCheckpoint | None = None
     """The newest checkpoint; absent: none yet."""
 
     last_progress: datetime | None = Field(default=None, strict=False)
-    """When `step` last moved, or an evaluation did; `stallDeadlineSeconds` counts from here. Absent: the
-    current attempt has not begun to train."""
+    """When `step` last moved, or an evaluation did, by the operator's clock; for people, nothing is counted
+    from it. Absent: the current attempt has not begun to train."""
 
     furthest_step: Count | None = None
     """The highest step of all attempts; a new attempt goes on from the last checkpoint, which may
     be behind it. Absent: not known yet."""
 
     fruitless: Count = 0
-    """Pods in a row that were taken or interrupted without a step beyond `furthestStep`."""
+    """Pods in a row whose trainer ran and that were taken or interrupted without a step beyond
+    `furthestStep`; `noProgressLimit` bounds them. None is counted before a step was reported."""
 
     simulator_restarts: Count = 0
     """Simulators that were started again after a fault in the current attempt."""
@@ -229,7 +239,7 @@ class ReplicaStatus(ApiModel):
     interruption, over all attempts; absent: not known yet."""
 
 
-class Release(ApiModel):
+class Release(Reported):
     """The images that were fixed when the job was accepted, for whatever names none of its own."""
 
     trainer: Image
@@ -242,7 +252,7 @@ class Release(ApiModel):
     """Image of Webots, which is not built here yet."""
 
 
-class Status(ApiModel):
+class Status(Reported):
     """What the operator tells about a TrainingJob; never written by its author."""
 
     observed_generation: Count | None = None
@@ -264,20 +274,24 @@ class Status(ApiModel):
                 "x-kubernetes-list-map-keys": ["type"],
             },
         ),
+        KNOWN_ONES,
     ] = ()
     """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason."""
 
     start_time: datetime | None = Field(default=None, strict=False)
-    """When the first pod started; absent: none has."""
+    """When the first pod started, by its node's clock; absent: none has."""
 
     completion_time: datetime | None = Field(default=None, strict=False)
-    """When the last replica ended; absent: not all have."""
+    """When the operator found that the last replica had ended, by its own clock;
+    `ttlSecondsAfterFinished` counts from here. Absent: not all have ended."""
 
     active_seconds: Count = 0
-    """Seconds that the job was active before `activeSince`; suspended time is not counted."""
+    """Seconds that the job was active before `activeSince`; suspended time is not counted. They are written
+    with whatever else changes."""
 
     active_since: datetime | None = Field(default=None, strict=False)
-    """Since when the job is active; absent: it is suspended, has ended, or was not seen yet."""
+    """When `activeSeconds` was counted, by the operator's clock; absent: the job is suspended, has ended, or
+    was not seen yet."""
 
     running: Word | None = None
     """Replicas that run or have succeeded, of all: `2/2`; absent: not seen yet."""

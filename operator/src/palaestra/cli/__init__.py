@@ -3,22 +3,28 @@
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from palaestra.cli import changing, doctor, documents, fetching, looking, operator, run, trial, watching
 from palaestra.cli.parsing import EXIT_CODES, WRONG_INPUT
 from palaestra.errors import PalaestraError
-from palaestra.local.errors import LocalError
-from palaestra.local.replica import KILLED
+from palaestra.local.errors import KILLED, LocalError
 from palaestra_sim.errors import SimError
 
 __all__ = ["main"]
 
+# Modules with commands, in the order of the help. The operator runs for months, and needs no other.
+COMMANDS = (
+    "run", "documents", "operator", "looking", "watching", "changing", "fetching", "doctor", "trial",
+)  # fmt: skip
+OPERATOR = ["operator"]
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    options = _parser().parse_args(arguments)
+    typed = sys.argv[1:] if arguments is None else arguments
+    options = _parser(typed[:1]).parse_args(typed)
     command: Callable[[argparse.Namespace], int] = options.command
     try:
         return command(options)
@@ -40,7 +46,7 @@ def _typed() -> str:
     return "kubectl palaestra" if Path(sys.argv[0]).name == "kubectl-palaestra" else "palaestra"
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=_typed(),
         description="Train robots in simulators, from a TrainingJob.",
@@ -49,13 +55,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"palaestra {version('palaestra')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    run.add(commands)
-    documents.add(commands)
-    operator.add(commands)
-    looking.add(commands)
-    watching.add(commands)
-    changing.add(commands)
-    fetching.add(commands)
-    doctor.add(commands)
-    trial.add(commands)
+    if first == OPERATOR:
+        _leave_out("rich", "structlog")
+    for name in OPERATOR if first == OPERATOR else COMMANDS:
+        import_module(f"palaestra.cli.{name}").add(commands)
     return parser
+
+
+def _leave_out(part: str, module: str) -> None:
+    """Import a module as if a part that it can do without were not installed.
+
+    structlog takes rich, 4 MiB with its own imports, to draw tracebacks on terminals.
+    """
+    if part not in sys.modules and module not in sys.modules:
+        sys.modules[part] = None  # type: ignore[assignment]  # so Python documents how to forbid an import
+        import_module(module)
+        del sys.modules[part]

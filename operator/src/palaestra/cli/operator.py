@@ -1,6 +1,7 @@
 """`palaestra operator`: look after the TrainingJobs of a cluster."""
 
 import argparse
+import re
 from importlib.metadata import version
 
 from palaestra.cli.parsing import Commands, command
@@ -15,6 +16,11 @@ Watches the TrainingJobs of a cluster, makes what they need, and writes their st
 kubeconfig as kubectl does, inside a pod the pod's own account. Writes log lines, one JSON object each,
 to standard error; ends within 2 s of SIGTERM. Only one leads at a time, the others wait.
 """
+
+NAME = r"[A-Za-z0-9]([-A-Za-z0-9_.]{0,61}[A-Za-z0-9])?"
+DOMAIN = r"[a-z0-9]([-a-z0-9.]{0,251}[a-z0-9])?/"
+ALLOWED = re.compile(rf"({DOMAIN})?{NAME}|{DOMAIN}")
+NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 
 
 def add(commands: Commands) -> None:
@@ -51,7 +57,49 @@ def add(commands: Commands) -> None:
         help="of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
     )
     _add_cluster(parser)
+    _add_pods(parser)
     _add_images(parser)
+
+
+def _add_pods(parser: argparse.ArgumentParser) -> None:
+    for kind in ("label", "annotation"):
+        parser.add_argument(
+            f"--allow-pod-{kind}",
+            metavar="KEY",
+            type=_allowed,
+            dest=f"allowed_pod_{kind}s",
+            action="append",
+            default=[],
+            help=f"{kind} that jobs may give their pods, or its domain with a / at the end; "
+            "may be repeated; default: none",
+        )
+    parser.add_argument(
+        "--node-selector",
+        metavar="KEY=VALUE",
+        type=_node_label,
+        dest="node_selector",
+        action="append",
+        default=[],
+        help="label that the nodes of training pods must have, unless a job names another value; "
+        "may be repeated; default: none",
+    )
+
+
+def _allowed(text: str) -> str:
+    if not ALLOWED.fullmatch(text):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is refused; give a key such as example.com/team, or a domain such as example.com/"
+        )
+    return text
+
+
+def _node_label(text: str) -> tuple[str, str]:
+    if not NODE_LABEL.fullmatch(text):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is refused; give a label such as kubernetes.io/arch=amd64"
+        )
+    key, _, value = text.partition("=")
+    return key, value
 
 
 def _add_cluster(parser: argparse.ArgumentParser) -> None:
@@ -91,6 +139,9 @@ def _operator(options: argparse.Namespace) -> int:
             resync_s=options.resync,
             leader_elect=options.leader_elect,
             metrics_address=address(options.metrics_address),
+            node_selector=dict(options.node_selector),
+            allowed_pod_labels=tuple(options.allowed_pod_labels),
+            allowed_pod_annotations=tuple(options.allowed_pod_annotations),
             kubeconfig=options.kubeconfig,
             context=options.context,
         )

@@ -11,7 +11,7 @@ from palaestra_sim.typed import MOST_PORT, whole
 
 RUN = """\
 Reads the TrainingJob in FILE and writes <dir>/<job name>/<replica>/: checkpoints/, tensorboard/,
-evaluations.jsonl, model.zip, the generated worlds, training.yaml and logs/. Typed again it goes on from
+evaluations.jsonl, model.zip, the source worlds, training.yaml and logs/. Typed again it goes on from
 the newest checkpoint. Replicas run one after another; --replica picks one.
 Ctrl-C ends it with a checkpoint, a second one at once.
 """

@@ -14,8 +14,8 @@ from palaestra_sim.typed import seconds
 
 TRY = """\
 Creates the TrainingJob in FILE under a name of its own, waits until it has ended, and deletes it,
-whatever came of it. Writes a line for each phase to standard output. A job that did not succeed in time
-ends it with 1.
+whatever came of it. Writes a line for each phase, and for each reason why a replica waits, to standard
+output. A job that did not succeed in time ends it with 1.
 """
 
 

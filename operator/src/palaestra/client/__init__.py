@@ -6,8 +6,9 @@
         client.apply(Path("job.yaml"))
         job = client.wait("job", deadline_s=3600)
 
-`client` is what people call; `reading` understands a status, `following` waits for changes, `happenings`
-reads events, `fetching` copies a run out of its volume, with the pod of `reading_pod`, which runs `packing`.
+`client` is what people call; `reading` understands a status, `following` waits for changes, `waiting` puts
+them into lines, `happenings` reads events, `fetching` copies a run out of its volume, with the pod of
+`reading_pod`, which runs `packing`.
 """
 
 from palaestra.client.client import Client

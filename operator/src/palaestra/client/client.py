@@ -1,7 +1,7 @@
 """The client: one method for each thing that people do with a TrainingJob of a cluster."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -14,6 +14,7 @@ from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
 from palaestra.client.happenings import Happening, happenings
 from palaestra.client.reading import current, why
+from palaestra.client.waiting import News
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
 from palaestra.cluster.api import Object
 from palaestra.cluster.resources import TRAINING_JOBS
@@ -126,18 +127,36 @@ class Client:
         for job in self.changes(name, deadline_s=deadline_s):
             yield job.status
 
-    def wait(self, name: str, *, until: Until = "ended", deadline_s: float) -> TrainingJob:
+    def wait(
+        self,
+        name: str,
+        *,
+        until: Until = "ended",
+        deadline_s: float,
+        report: Callable[[str], object] | None = None,
+    ) -> TrainingJob:
         """Return the job once it is in a phase, or has ended in any.
+
+        Args:
+            name: of the job.
+            until: the phase, or `ended`.
+            deadline_s: for all of it.
+            report: is called with a line for each phase that the job comes to and for each reason why a
+                replica waits, with since when, such as `print` or `logging.info`; None: nobody reads them.
 
         Raises:
             EndedOtherwise: it has ended, and not as `until` says.
             NoSuchJob: there is none of that name, or it was deleted.
             TookTooLong: it did not come to that within `deadline_s`.
         """
+        news = News(name)
         for job in self.changes(name, deadline_s=deadline_s):
             phase = job.status.phase
             if not current(job) or phase is None:
                 continue
+            if report is not None:
+                for line in news.of(phase, job.status):
+                    report(line)
             if phase == until or (until == "ended" and phase in TERMINAL):
                 return job
             if phase in TERMINAL:

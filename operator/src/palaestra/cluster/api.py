@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from palaestra.cluster.errors import Gone, NotFound
-from palaestra.cluster.executing import output
 from palaestra.cluster.lines import lines
 from palaestra.cluster.resources import PODS, Resource, of
 from palaestra.cluster.transport import JSON, Call, OnRequest, Transport
@@ -85,6 +84,24 @@ class Api:
             return False
         return True
 
+    def schema(self, group_version: str, kind: str) -> Object:
+        """Return the OpenAPI schema of a kind, as the API server publishes it to every account.
+
+        One of a custom resource is published some seconds after its definition.
+
+        Raises:
+            NotFound: the kind is not published.
+        """
+        path = f"/openapi/v3/apis/{group_version}"
+        document = self._object(Call(verb="get", plural="openapi", path=path))
+        group, _, version = group_version.rpartition("/")
+        name = {"group": group, "version": version, "kind": kind}
+        found: Objects = list(document.get("components", {}).get("schemas", {}).values())
+        for each in found:
+            if name in each.get("x-kubernetes-group-version-kind", ()):
+                return each
+        raise NotFound(404, "NotFound", f"{path} has no {kind}")
+
     def list(
         self,
         resource: Resource,
@@ -126,10 +143,9 @@ class Api:
         while True:
             answer = self._object(_call("list", resource, namespace, query=query))
             metadata = answer.get("metadata") or {}
-            yield Page(
-                items=tuple(_complete(resource, item) for item in answer.get("items") or ()),
-                version=str(metadata.get("resourceVersion", "")),
-            )
+            items = tuple(_complete(resource, item) for item in answer.pop("items", None) or ())
+            yield Page(items=items, version=str(metadata.get("resourceVersion", "")))
+            del items  # as all that was read of this page, before the next one is
             query["continue"] = metadata.get("continue")
             if not query["continue"]:
                 return
@@ -216,20 +232,42 @@ class Api:
         name: str,
         *,
         uid: str | None = None,
+        resource_version: str | None = None,
         propagation: str = "Background",
     ) -> None:
         """Delete one object, and what it owns by `propagation`: `Background`, `Foreground` or `Orphan`.
 
-        With a `uid` this object only, not a later one of the same name.
+        With a `uid` this object only, not a later one of the same name; with a `resource_version` only while
+        the object is this version.
 
         Raises:
             NotFound: there is none.
-            Conflict: the object of this name has another uid.
+            Conflict: the object of this name has another uid, or is another version.
         """
         options: Object = {"kind": "DeleteOptions", "apiVersion": "v1", "propagationPolicy": propagation}
-        if uid is not None:
-            options["preconditions"] = {"uid": uid}
+        wanted = {"uid": uid, "resourceVersion": resource_version}
+        if preconditions := {name: value for name, value in wanted.items() if value is not None}:
+            options["preconditions"] = preconditions
         self._object(_call("delete", resource, namespace, name).sending(options, method="DELETE"))
+
+    def evict(self, namespace: str, name: str, *, uid: str) -> None:
+        """Ask for the eviction of the pod with this uid.
+
+        A disruption budget refuses as a busy server does, maybe for days, so a refusal is not waited out.
+
+        Raises:
+            NotFound: there is none of this name.
+            Conflict: the pod of this name has another uid.
+            TooManyRequests: a disruption budget allows none now, or the server is busy.
+        """
+        eviction = {
+            "apiVersion": "policy/v1",
+            "kind": "Eviction",
+            "metadata": {"namespace": namespace, "name": name},
+            "deleteOptions": {"preconditions": {"uid": uid}},
+        }
+        call = _call("create", PODS, namespace, name, subresource="eviction")
+        self._object(replace(call.sending(eviction, method="POST"), waits=False))
 
     def watch(
         self,
@@ -304,6 +342,8 @@ class Api:
             Unreachable: the connection broke, or the command did not end `within_s`: what came is not whole.
             ApiError: the API server refuses.
         """
+        from palaestra.cluster.executing import output  # noqa: PLC0415 - a library of people's tools
+
         deadline = time.monotonic() + within_s
         query = {"container": container, "command": command, "stdout": "true", "stderr": "true"}
         call = _call("create", PODS, namespace, pod, subresource="exec", query=query)

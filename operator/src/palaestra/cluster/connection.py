@@ -1,28 +1,15 @@
-"""Which API server, and who we are: a kubeconfig (certificates, tokens, plugins) or a pod's service account.
-
-A pod's token is read anew from its file every minute, as kubelets replace it.
-"""
+"""Which API server, and who we are: by a kubeconfig, or as the pod that this process runs in."""
 
 import os
 from pathlib import Path
-from typing import Any
 
-import yaml
-from kubernetes.client.configuration import Configuration
-from kubernetes.config import (
-    ConfigException,
-    list_kube_config_contexts,
-    load_incluster_config,
-    load_kube_config,
-)
-
+from palaestra.cluster.account import FILES, account
 from palaestra.cluster.api import Api
 from palaestra.cluster.errors import NotConfigured
 from palaestra.cluster.limits import Limits
 from palaestra.cluster.transport import Transport
 
-POOL = 32  # connections kept open: more than there are workers and watches
-OWN_NAMESPACE = Path("/var/run/secrets/kubernetes.io/serviceaccount/namespace")
+OWN_NAMESPACE = FILES / "namespace"
 DEFAULT = "default"
 REMEDY = "name a kubeconfig with --kubeconfig or KUBECONFIG, or run in a pod with a service account"
 
@@ -38,18 +25,17 @@ def connect(kubeconfig: str | None = None, context: str | None = None, limits: L
     Raises:
         NotConfigured: no API server is named, or its credentials cannot be read.
     """
-    configuration = Configuration()
-    configuration.connection_pool_maxsize = POOL
     files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
     try:
         if files:
-            load_kube_config(files, context=context, client_configuration=configuration)  # type: ignore[no-untyped-call]  # the client is half typed
+            from palaestra.cluster.kubeconfig import access  # noqa: PLC0415 - 10 MiB that no pod needs
+
+            found = access(files, context)
         else:
-            load_incluster_config(client_configuration=configuration)  # type: ignore[no-untyped-call]  # as above
-    except (ConfigException, OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
-        fact = " ".join(str(error).split())  # YAML's mistakes come on several lines
-        raise NotConfigured(f"{files or 'service account'}: {fact}; {REMEDY}") from error
-    return Api(Transport(configuration, limits or Limits()))
+            found = account()
+    except NotConfigured as error:
+        raise NotConfigured(f"{error}; {REMEDY}") from error
+    return Api(Transport(found, limits or Limits()))
 
 
 def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> str:
@@ -61,17 +47,9 @@ def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> s
     files = kubeconfig or os.environ.get("KUBECONFIG") or _home()
     if not files:
         return own_namespace(DEFAULT)
-    try:
-        contexts: Any = list_kube_config_contexts(files)  # type: ignore[no-untyped-call]  # as above
-    except (ConfigException, OSError, ValueError, TypeError, KeyError, yaml.YAMLError) as error:
-        raise NotConfigured(f"{files}: {' '.join(str(error).split())}; {REMEDY}") from error
-    known, current = contexts
-    chosen = next((each for each in known if each["name"] == context), None) if context else current
-    if chosen is None:
-        raise NotConfigured(
-            f"--context: {files} has no {context!r}; `kubectl config get-contexts` names them"
-        )
-    return str(chosen["context"].get("namespace") or DEFAULT)
+    from palaestra.cluster.kubeconfig import namespace  # noqa: PLC0415 - as above
+
+    return namespace(files, context) or DEFAULT
 
 
 def own_namespace(default: str) -> str:

@@ -16,6 +16,7 @@ CommandFailed               a command in a container ended with another code tha
 A message is the API server's own: it names the object and, for an invalid one, the field.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -159,6 +160,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
 def _seconds(text: str | None) -> float:
     try:
-        return max(float(text), 0.0) if text is not None else DEFAULT_RETRY_AFTER_S
+        seconds = float(text) if text is not None else DEFAULT_RETRY_AFTER_S
     except ValueError:  # a date: allowed by HTTP, never sent by Kubernetes
         return DEFAULT_RETRY_AFTER_S
+    return max(seconds, 0.0) if math.isfinite(seconds) else DEFAULT_RETRY_AFTER_S

@@ -5,14 +5,11 @@ on a stream of its own, whether the command succeeded: output without that word 
 """
 
 import json
-import ssl
 import time
 from collections.abc import Iterator, Mapping
 from typing import Any
-from urllib.parse import urlsplit
 
 import websocket
-from kubernetes.client.configuration import Configuration
 
 from palaestra.cluster.errors import SERVER_ERROR, ApiError, CommandFailed, Unreachable, from_status
 
@@ -24,7 +21,7 @@ UNKNOWN_CODE = -1
 
 
 def open_socket(
-    configuration: Configuration, url: str, headers: Mapping[str, str], wait_s: float
+    url: str, headers: Mapping[str, str], options: Mapping[str, Any], wait_s: float
 ) -> websocket.WebSocket:
     """Return the socket on which a command runs, to be closed by the caller; a read waits `wait_s` at most.
 
@@ -37,10 +34,9 @@ def open_socket(
             timeout=wait_s,
             header=[f"{name}: {value}" for name, value in headers.items()],
             subprotocols=PROTOCOLS,
-            sslopt=_tls(configuration),
             suppress_origin=True,
             skip_utf8_validation=True,
-            **_proxy(configuration),
+            **options,
         )
     except websocket.WebSocketBadStatusException as error:
         raise from_status(error.status_code, _decoded(error.resp_body)) from error
@@ -112,24 +108,3 @@ def _decoded(body: bytes | str | None) -> dict[str, Any]:
     except ValueError:  # a proxy in between speaks HTML
         return {}
     return found if isinstance(found, dict) else {}
-
-
-def _tls(configuration: Configuration) -> dict[str, Any]:
-    """Return what the client's configuration says of TLS, as the websocket library takes it."""
-    verified = configuration.verify_ssl
-    options = {
-        "cert_reqs": ssl.CERT_REQUIRED if verified else ssl.CERT_NONE,
-        "check_hostname": verified and configuration.assert_hostname is not False,
-        "ca_certs": configuration.ssl_ca_cert,
-        "certfile": configuration.cert_file,
-        "keyfile": configuration.key_file,
-        "server_hostname": configuration.tls_server_name,
-    }
-    return {name: value for name, value in options.items() if value is not None}
-
-
-def _proxy(configuration: Configuration) -> dict[str, Any]:
-    if not configuration.proxy:
-        return {}
-    address = urlsplit(configuration.proxy)
-    return {"http_proxy_host": address.hostname, "http_proxy_port": address.port, "proxy_type": "http"}

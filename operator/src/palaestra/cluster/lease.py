@@ -58,6 +58,7 @@ class Leadership:
         self._renew_s = renew_s
         self._sighting = Sighting()
         self._tenure: Tenure | None = None
+        self._terms = 0
         self._version = ""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="leadership", daemon=True)
@@ -88,6 +89,14 @@ class Leadership:
         """Whether this process may act as the leader at this moment."""
         tenure = self._tenure
         return tenure is not None and not self._stopping.is_set() and tenure.holds(time.monotonic())
+
+    def term(self) -> int | None:
+        """Return the number of this tenure, from 1; None: this process may not act as the leader.
+
+        What was decided in one tenure is not to be written in a later one: another may have led in between.
+        """
+        term = self._terms
+        return term if self.leads() else None
 
     def _run(self) -> None:
         while True:
@@ -158,6 +167,7 @@ class Leadership:
 
     def _hold(self, sent: float, written: dict[str, Any]) -> None:
         first = self._tenure is None
+        self._terms += first
         self._version = str(written["metadata"]["resourceVersion"])
         self._tenure = Tenure(sent=sent, duration_s=self._duration_s)
         if first:

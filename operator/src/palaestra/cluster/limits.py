@@ -16,6 +16,7 @@ class Limits:
         silence_s: longest silence on a watch. An API server sends a bookmark about every 60 s, so more than
             that means a connection that only looks alive.
         again: waits between attempts to list and watch.
+        turned_away: waits after an answer 429, added to those that the server asks for, which may be none.
     """
 
     connect_s: float = 5.0
@@ -23,3 +24,4 @@ class Limits:
     watch_s: tuple[float, float] = (300.0, 600.0)
     silence_s: float = 90.0
     again: Backoff = field(default_factory=lambda: Backoff(first_s=0.5, cap_s=30.0))
+    turned_away: Backoff = field(default_factory=lambda: Backoff(first_s=0.2, cap_s=2.0))

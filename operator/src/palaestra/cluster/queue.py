@@ -87,6 +87,11 @@ class WorkQueue(Generic[Key]):
         self.add_after(key, wait_s)
         return wait_s
 
+    def failures(self, key: Key) -> int:
+        """Return how often in a row work on a name has failed."""
+        with self._changed:
+            return self._failures.get(key, 0)
+
     def forget(self, key: Key) -> None:
         """A name's work succeeded: its next failure is its first."""
         with self._changed:

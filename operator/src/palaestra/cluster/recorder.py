@@ -43,7 +43,9 @@ class Recorder:
         self._lock = threading.Lock()
         self._counts: OrderedDict[str, int] = OrderedDict()
 
-    def record(self, obj: Mapping[str, Any], kind: str, reason: str, message: str) -> None:
+    def record(
+        self, obj: Mapping[str, Any], kind: str, reason: str, message: str, *, once: bool = False
+    ) -> None:
         """Say what happened to an object.
 
         Args:
@@ -51,17 +53,20 @@ class Recorder:
             kind: `Normal` or `Warning`.
             reason: one word.
             message: a sentence; cut at 1024 characters.
+            once: an event that is there already is left as it is.
         """
         event = self._event(obj, kind, reason, message)
         try:
-            self._write(event)
+            self._write(event, once=once)
         except ApiError as error:
             log.warning("event not written", reason=reason, name=event["metadata"]["name"], error=str(error))
 
-    def _write(self, event: dict[str, Any]) -> None:
+    def _write(self, event: dict[str, Any], *, once: bool) -> None:
         namespace, name = event["metadata"]["namespace"], event["metadata"]["name"]
         with self._lock:
             count = self._counts.get(name)
+        if once and count is not None:
+            return
         try:
             if count is None:
                 self._api.create(EVENTS, event)
@@ -69,6 +74,9 @@ class Recorder:
             else:
                 self._again(event, count + 1)
         except AlreadyExists:  # an operator before this one has written it
+            if once:
+                self._remember(name, 1)
+                return
             found = self._api.get(EVENTS, namespace, name)
             self._again(event, int(found.get("count") or 1) + 1)
         except NotFound:  # the API server forgets events after an hour

@@ -13,7 +13,7 @@ from typing import Any
 
 import structlog
 
-from palaestra.cluster.api import Api
+from palaestra.cluster.api import Api, Page
 from palaestra.cluster.errors import ApiError, Gone
 from palaestra.cluster.resources import Resource
 from palaestra.cluster.store import Key, Store, key_of
@@ -23,7 +23,6 @@ log = structlog.get_logger("palaestra.cluster")
 
 Keep = Callable[[dict[str, Any]], dict[str, Any]]
 Changed = Callable[[dict[str, Any]], None]
-PAGE = 25  # whole objects of some 25 kB; 200 at a time left 70 MiB of holes in memory, 25 leave 5
 
 
 class Reflector:
@@ -125,16 +124,20 @@ class Reflector:
     def _relist(self) -> str:
         """Bring the store up to date with a whole list and return its version."""
         gone, version = self.store.keys(), ""
-        pages = self._api.pages(self._resource, self._namespace, labels=self._labels, limit=PAGE)
-        for page in pages:
+        size = self._resource.page
+        for page in self._api.pages(self._resource, self._namespace, labels=self._labels, limit=size):
             version = page.version
-            for item in page.items:
-                gone.discard(key_of(item))
-                self._put(item)
+            gone -= self._put_all(page)
+            del page  # else it would stay in memory while the next one is read
         for key in gone:
             self._drop(key)
         self._synced.set()
         return version
+
+    def _put_all(self, page: Page) -> set[Key]:
+        for item in page.items:
+            self._put(item)
+        return {key_of(item) for item in page.items}
 
     def _follow(self, version: str) -> None:
         shortest_s, longest_s = self._api.limits.watch_s
@@ -160,7 +163,11 @@ class Reflector:
     def _put(self, obj: dict[str, Any]) -> None:
         try:
             kept = self._keep(obj)
-            if self.store.put(kept):
+            before = self.store.relabelled(kept)
+            different = self.store.put(kept)
+            if before is not None:  # what it belonged to has lost it; as it is now is reported last
+                self._changed(before)
+            if different:
                 self._changed(kept)
         except Exception:  # one object that nobody foresaw must not hide all others
             log.exception("object not cached", resource=self._resource.plural, key=key_of(obj))

@@ -1,7 +1,7 @@
-"""The bytes of a request: TLS, credentials and connections of the official client, deadlines of our own.
+"""The bytes of a request: an access to the API server, deadlines of our own.
 
-Of the official client only its configuration and its pool are used. Its models cost ten times the time and
-twice the memory of plain JSON, and its calls have no deadline on the answer's body.
+Of the official client no call is used: its models cost ten times the time and twice the memory of plain JSON,
+and its calls have no deadline on the answer's body.
 """
 
 import json
@@ -9,19 +9,18 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
-from kubernetes.client.configuration import Configuration
-from kubernetes.client.rest import RESTClientObject
-from kubernetes.config import ConfigException
 from urllib3 import BaseHTTPResponse, Timeout
 from urllib3.exceptions import HTTPError, ProtocolError
-from websocket import WebSocket
 
+from palaestra.cluster.access import Access
 from palaestra.cluster.errors import ApiError, TooManyRequests, Unreachable, from_status
-from palaestra.cluster.executing import open_socket
 from palaestra.cluster.limits import Limits
+
+if TYPE_CHECKING:
+    from websocket import WebSocket
 
 OnRequest = Callable[[str, str, int, float], None]
 CHUNK = 1 << 16
@@ -51,6 +50,7 @@ class Call:
         query: parameters; those that are None are left out, lists are repeated.
         accept: media type of the answer.
         body: an object, sent as JSON.
+        waits: whether a server that is busy (429) is asked again within the deadline.
     """
 
     verb: str
@@ -61,6 +61,7 @@ class Call:
     accept: str = JSON
     body: Mapping[str, Any] | None = None
     media_type: str = JSON
+    waits: bool = True
 
     def sending(self, body: Mapping[str, Any], *, method: str, media_type: str = JSON) -> "Call":
         """Return the same request with a body."""
@@ -82,13 +83,12 @@ class Transport:
         on_request: told about every request.
     """
 
-    def __init__(self, configuration: Configuration, limits: Limits) -> None:
-        configuration.keep_alive = True  # the kernel finds peers that are gone, also behind silent proxies
+    def __init__(self, access: Access, limits: Limits) -> None:
         self.limits = limits
         self.on_request: OnRequest = nothing
-        self.host = configuration.host.rstrip("/")
-        self._configuration = configuration
-        self._pool = RESTClientObject(configuration).pool_manager
+        self.host = access.host
+        self._access = access
+        self._pool = access.pool
         self._credentials = threading.Lock()
 
     def call(self, call: Call, call_s: float) -> dict[str, Any]:
@@ -100,14 +100,16 @@ class Transport:
             ApiError: any other answer, and none.
         """
         deadline = time.monotonic() + call_s
-        broke = False
+        broke, turned_away = False, 0
         while True:
             try:
                 return self._timed(call, deadline)
             except TooManyRequests as error:  # turned away, so certainly not done
-                if time.monotonic() + error.retry_after_s >= deadline:
+                turned_away += 1
+                wait_s = error.retry_after_s + self.limits.turned_away.wait_s(turned_away)
+                if not call.waits or time.monotonic() + wait_s >= deadline:
                     raise
-                threading.Event().wait(error.retry_after_s)
+                threading.Event().wait(wait_s)
             except ConnectionBroke:
                 if broke or call.method != "GET" or time.monotonic() >= deadline:
                     raise
@@ -126,16 +128,19 @@ class Transport:
             self.on_request(call.verb, call.plural, error.code, time.monotonic() - started)
             raise
 
-    def channel(self, call: Call) -> WebSocket:
+    def channel(self, call: Call) -> "WebSocket":
         """Return the socket of a command in a container, to be closed by the caller.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
         """
+        from palaestra.cluster.executing import open_socket  # noqa: PLC0415 - a library of people's tools
+
         started, code = time.monotonic(), 0
         try:
             headers = {"User-Agent": "palaestra", **self._authorization()}
-            socket = open_socket(self._configuration, self.host + call.address, headers, self.limits.call_s)
+            address, options = self.host + call.address, self._access.channel
+            socket = open_socket(address, headers, options, self.limits.call_s)
             code = SWITCHED
         except ApiError as error:
             code = error.code
@@ -204,14 +209,9 @@ class Transport:
             raise _unreachable(error, f"{call.method} {self.host}{call.path}") from error
 
     def _authorization(self) -> dict[str, str]:
-        with self._credentials:  # reading a token anew, or running a plugin, changes the configuration
-            try:
-                settings = self._configuration.auth_settings()
-            except (ConfigException, OSError) as error:
-                raise Unreachable(0, "NoCredentials", f"credentials for {self.host}: {error}") from error
-        if "BearerToken" not in settings:
-            return {}
-        return {"Authorization": str(settings["BearerToken"]["value"])}
+        with self._credentials:  # a token is read anew, or a plugin runs, once for all that wait
+            header = self._access.authorization()
+        return {} if header is None else {"Authorization": header}
 
     def _refusal(self, response: BaseHTTPResponse, deadline: float) -> ApiError:
         retry_after = response.headers.get("Retry-After")

@@ -1,14 +1,16 @@
 """From a job and what was seen of it to its status and what is to be done.
 
-Pure: the clock is passed in. Decisions are lists of small named checks, in order: what keeps a job from
-starting (`holds`), how a replica ended (`outcomes`), what is wrong with one (`troubles`) and until when
-it has time (`deadlines`).
+Pure: the clocks are passed in. Decisions are lists of small named checks, in order: what keeps a job from
+starting (`holds`), and in `judging` how a replica is judged: how it ended, what ends it, what gets it a new
+pod, and what it waits for.
 
     job = accept(raw)                                  # Refused: decision = reject(raw, refused, now)
     observed = observe(job, objects)
     planned = prepare(job, observed, layout)           # plans only what is still missing
-    decision = decide(job, observed, planned, now)
-    # do decision.actions, write as_data(decision.status) if worth_writing(...), then decision.events
+    decision = decide(job, observed, planned, Times(now=..., clock_s=..., record=...))
+    # do decision.actions, write fitted(raw, as_data(decision.status)) if write_in_s(...) is 0, then
+    # decision.events;
+    # decision.record is for the next look
 
 Objects are created only after the status that accepts the job was written: it holds the release's
 images, so that an upgraded operator plans the same. Terminal replicas are never planned again.
@@ -21,31 +23,42 @@ from palaestra.decide.decision import (
     Create,
     Decision,
     Delete,
+    Discard,
     Happening,
     HappeningType,
+    Replace,
     SetSuspend,
     Stop,
 )
-from palaestra.decide.preparing import Prepared, complete, prepare
-from palaestra.decide.writing import as_data, worth_writing
+from palaestra.decide.fitting import fitted
+from palaestra.decide.preparing import Prepared, complete, prepare, resuming, wants_whole
+from palaestra.decide.times import Record, Times
+from palaestra.decide.writing import as_data, write_in_s
 
 __all__ = [
     "Action",
     "Create",
     "Decision",
     "Delete",
+    "Discard",
     "Happening",
     "HappeningType",
     "Prepared",
+    "Record",
     "Refused",
+    "Replace",
     "SetSuspend",
     "Stop",
+    "Times",
     "accept",
     "as_data",
     "complete",
     "decide",
+    "fitted",
     "managed_here",
     "prepare",
     "reject",
-    "worth_writing",
+    "resuming",
+    "wants_whole",
+    "write_in_s",
 ]

@@ -13,7 +13,7 @@ from palaestra.decide.conditions import Claim, Told, claims, conditions
 from palaestra.decide.decision import Decision
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import happening, of_actions, of_change
-from palaestra.decide.moments import next_of, whole
+from palaestra.decide.moments import first_of, seconds_to, whole
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.reading import count, part, text
 
@@ -77,7 +77,7 @@ def reject(raw: Mapping[str, Any], refused: Refused, now: datetime) -> Decision:
         status=status,
         actions=actions,
         events=(*of_change(old, status), *of_actions(actions)),
-        wake_after_s=next_of([at], now),
+        wake_after_s=first_of([seconds_to(at, now)]),
     )
 
 

@@ -1,13 +1,14 @@
-"""What is to be done, in order: stop what has to end, suspend or resume, then create what is missing."""
+"""What is to be done, in order: stop, replace pods, suspend or resume, discard, create what is missing."""
 
 from collections.abc import Iterator, Sequence
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import TERMINAL, ReplicaStatus
-from palaestra.decide.decision import Action, Create, SetSuspend, Stop
+from palaestra.decide.decision import Action, Basis, Create, Discard, Replace, SetSuspend, Stop
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.replicas import Decided
-from palaestra.observe.views import Observed, ReplicaObserved
+from palaestra.decide.suspending import to_resume, to_set
+from palaestra.observe.views import JobView, Observed, PodView, ReplicaObserved
 from palaestra.plan import Object, Plan, ReplicaPlan
 
 
@@ -17,11 +18,11 @@ def actions(
     """Return everything that is to be done about the replicas of a job."""
     stops = tuple(_stops(observed, each))
     stopping = {stop.replica for stop in stops}
-    switches = tuple(it for it in _switches(job, observed, each) if it.replica not in stopping)
+    switches = tuple(it for it in _switches(job, observed, prepared, each) if it.replica not in stopping)
     creations: tuple[Create, ...] = ()
     if prepared.plan is not None and job.status.release is not None:
         creations = wanted(prepared.plan, observed, tuple(it.status for it in each))
-    return (*stops, *switches, *creations)
+    return (*stops, *_replacements(observed, each), *switches, *_discards(job, observed), *creations)
 
 
 def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) -> tuple[Create, ...]:
@@ -37,7 +38,9 @@ def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) ->
         Create(object=thing) for thing in (plan.network_policy,) if thing and not _there(thing, observed)
     ]
     for seen in going_on:
-        things = _things(plan.replicas[seen.index], seen)
+        if (planned := plan.replicas.get(seen.index)) is None:
+            continue
+        things = _things(planned, seen)
         missing += [Create(object=it, replica=seen.index) for it in things if not _there(it, observed)]
     return tuple(missing)
 
@@ -46,7 +49,7 @@ def _things(planned: ReplicaPlan, seen: ReplicaObserved) -> tuple[Object, ...]:
     volumes = [thing for thing in (planned.config_map, planned.claim) if thing is not None]
     if seen.job is not None:
         return tuple(each for each in volumes if each["metadata"]["name"] in seen.job.volumes)
-    if seen.obstacle is not None or seen.in_the_way or any(not pod.ended for pod in seen.pods):
+    if seen.obstacle is not None or seen.in_the_way or seen.former or any(not it.ended for it in seen.pods):
         return ()
     return (*volumes, planned.job)
 
@@ -61,15 +64,63 @@ def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
         if seen.job is None or seen.job.end is not None:
             continue
         if it.stop is not None and seen.job.stopped is None:
-            yield Stop(job=seen.job.name, replica=seen.index, reason=it.stop.reason, message=it.stop.message)
+            yield Stop(
+                job=seen.job.name,
+                replica=seen.index,
+                reason=it.stop.reason,
+                message=it.stop.message,
+                basis=_basis(seen.job, seen.pods),
+            )
 
 
-def _switches(job: TrainingJob, observed: Observed, each: Sequence[Decided]) -> Iterator[SetSuspend]:
-    """Yield what makes the Jobs as suspended as the spec; with a queue that is Kueue's."""
-    if job.spec.scheduling.queue_name is not None:
-        return
+def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Replace]:
+    """Yield the replacement of each pod that no kubelet heals; one that is being deleted is."""
     for seen, it in zip(observed.replicas, each, strict=True):
-        ours = seen.job is not None and seen.job.end is None and not seen.job.queue
-        going_on = ours and it.status.phase not in TERMINAL
-        if seen.job is not None and going_on and seen.job.suspended != job.spec.suspend:
-            yield SetSuspend(job=seen.job.name, replica=seen.index, suspend=job.spec.suspend)
+        if it.replace is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
+            continue
+        mark = seen.job.replaced
+        marked = mark is not None and mark.pod == seen.pod.uid
+        yield Replace(
+            job=seen.job.name,
+            replica=seen.index,
+            pod=seen.pod.name,
+            uid=seen.pod.uid,
+            times=(mark.times if mark is not None else 0) + (not marked),
+            reason=it.replace.reason,
+            message=it.replace.message,
+            marked=marked,
+            basis=_basis(seen.job, seen.pods),
+        )
+
+
+def _switches(
+    job: TrainingJob, observed: Observed, prepared: Prepared, each: Sequence[Decided]
+) -> Iterator[SetSuspend]:
+    """Yield what makes the Jobs as suspended as the spec; none is resumed while something is closed to it."""
+    for seen, it in zip(observed.replicas, each, strict=True):
+        held = prepared.closed is not None and to_resume(job, seen.job)
+        going_on = it.status.phase not in TERMINAL and not held
+        if seen.job is not None and going_on and to_set(job, seen.job):
+            yield SetSuspend(
+                job=seen.job.name,
+                replica=seen.index,
+                suspend=job.spec.suspend,
+                basis=_basis(seen.job),
+            )
+
+
+def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
+    """Yield the deletion of each Job that is stopped and suspended, once the status says that it ended.
+
+    Its deadline does not run while it is suspended, so nothing else would ever end it.
+    """
+    ended = {each.index for each in job.status.replicas if each.phase in TERMINAL}
+    for seen in observed.replicas:
+        if seen.index not in ended or seen.job is None or seen.job.end is not None or seen.job.deleting:
+            continue
+        if seen.job.suspended and seen.job.stopped is not None:
+            yield Discard(job=seen.job.name, replica=seen.index, basis=_basis(seen.job))
+
+
+def _basis(job: JobView, pods: Sequence[PodView] = ()) -> Basis:
+    return Basis(uid=job.uid, version=job.version, pods=frozenset((each.uid, each.version) for each in pods))

@@ -11,7 +11,8 @@ from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
 from palaestra.decide.situation import Situation, told
-from palaestra.decide.troubles import full_volume, how_it_failed, storage_eviction
+from palaestra.decide.suspending import suspended_by
+from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, storage_eviction
 from palaestra.observe.views import JobView, PodView
 from palaestra.plan.replica import TRAINER
 from palaestra_sim.protocol.status import ExitCode, Termination
@@ -70,6 +71,11 @@ def evicted_for_storage(attempt: Attempt) -> Told | None:
     return None if attempt.pod is None else storage_eviction(attempt.pod)
 
 
+def replaced(attempt: Attempt) -> Told | None:
+    """The operator took the pod, since no kubelet heals it."""
+    return None if attempt.pod is None else mark_of(attempt.it, attempt.pod)
+
+
 def disrupted(attempt: Attempt) -> Told | None:
     """The cluster took the pod, by its own word."""
     if attempt.pod is None or not attempt.pod.disruption:
@@ -84,6 +90,9 @@ def gone(attempt: Attempt) -> Told | None:
     before, after = attempt.it.old.restarts, attempt.it.counted.restarts
     if after.trainer > before.trainer:
         return told(Reason.TRAINER_FAILED, how=GONE)
+    mark = attempt.it.seen.job.replaced if attempt.it.seen.job is not None else None
+    if mark is not None and (after.operator or 0) > (before.operator or 0):
+        return Told(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
     if after.suspension > before.suspension:
         return paused(attempt.it)
     return told(Reason.DISRUPTED, pod=attempt.name, words=GONE)
@@ -173,6 +182,7 @@ CAUSES: tuple[EndCheck, ...] = (
 ENDS: tuple[EndCheck, ...] = (
     completed,
     evicted_for_storage,
+    replaced,
     disrupted,
     gone,
     deleted,
@@ -196,15 +206,14 @@ def stop_of(job: JobView) -> Told | None:
     if job.stopped is None:
         return None
     reason, message = job.stopped
-    known = Reason(reason) if reason in set(Reason) else Reason.JOB_FAILED
-    return Told(reason=known, message=message or f"stopped: {reason}")
+    return Told(reason=Reason.known(reason), message=message or f"stopped: {reason}")
 
 
 def paused(it: Situation) -> Told:
-    """Return why a Job is suspended: with a queue that is Kueue's doing."""
+    """Return why a Job is suspended, and by whom: with a queue that is Kueue's doing."""
     queue = (it.seen.job.queue if it.seen.job else "") or it.job.spec.scheduling.queue_name
     if not queue:
-        return told(Reason.SUSPENDED)
+        return told(Reason.SUSPENDED, by=suspended_by(it.job, it.seen))
     again = ", which took it back; it goes on from the last checkpoint" if it.counted.attempt else ""
     return told(Reason.QUEUED, queue=queue, again=again)
 

@@ -3,9 +3,11 @@
 The status is the memory. It names the pod of the current attempt (`pod`), so that every pod made after
 that one is a new attempt, however many came and went since the status was written; the trainers' record
 in the run directory (`attempt` in /status and in the last word) adds those that nobody saw. Whatever was
-replaced has one of three causes, and 1 + trainer + disruption + suspension is the attempt's number:
+replaced has one of four causes, and 1 + trainer + disruption + suspension + operator is the attempt's
+number:
 
     trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
+    operator    the operator replaced the pod, by the mark on its Job
     suspension  the Job was suspended between the two pods
     disruption  all others: the cluster or a person took the pod, or it exited with 75
 
@@ -18,7 +20,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 
-from palaestra.api.status import PodReference, ReplicaStatus, Restarts
+from palaestra.api.status import Phase, PodReference, ReplicaStatus, Restarts
 from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import PodView, ReplicaObserved
 from palaestra_sim.protocol.status import ExitCode
@@ -47,7 +49,7 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
     restarts = _restarts(old, seen, newer, attempt)
     furthest = _furthest(old, seen)
     came_forward = furthest is not None and furthest > (old.furthest_step or 0)
-    taken = restarts.disruption - old.restarts.disruption
+    taken = min(restarts.disruption - old.restarts.disruption, _have_run(old, seen, newer))
     within = _within_attempt(old, seen, newer)
     return Counted(
         attempt=attempt,
@@ -55,7 +57,7 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
         restarts=restarts.model_copy(update={"simulator": _simulators(old, seen, newer, within)}),
         simulator_restarts=within,
         furthest_step=furthest,
-        fruitless=0 if came_forward else _bounded(old.fruitless + taken),
+        fruitless=0 if came_forward or not furthest else _bounded(old.fruitless + taken),
     )
 
 
@@ -76,6 +78,12 @@ def failed_by_itself(pod: PodView) -> bool:
     return pod.phase == "Failed" and not pod.disruption and not interrupted
 
 
+def has_run(pod: PodView) -> bool:
+    """Return whether a pod's trainer has run, or does."""
+    trainer = pod.trainer
+    return trainer is not None and (trainer.running_since is not None or trainer.exit is not None)
+
+
 def exit_code(pod: PodView) -> int | None:
     """Return the exit code of a pod's trainer; None: it has not ended, or nobody knows."""
     trainer = pod.trainer
@@ -93,15 +101,17 @@ def _attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]
 
 def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView], attempt: int) -> Restarts:
     before = old.restarts
-    explained = before.trainer + before.disruption + before.suspension
+    explained = before.trainer + before.disruption + before.suspension + (before.operator or 0)
     replaced = max(attempt - 1 - explained, 0)
     trainer = min(max(_by_evidence(old, seen, newer), _by_the_job(old, seen)), replaced)
-    suspension = min(_suspended(old, seen, newer), replaced - trainer)
+    operator = min(_by_the_operator(old, seen), replaced - trainer)
+    suspension = min(_suspended(old, seen, newer), replaced - trainer - operator)
     return before.model_copy(
         update={
             "trainer": before.trainer + trainer,
+            "operator": (before.operator or 0) + operator or None,
             "suspension": before.suspension + suspension,
-            "disruption": before.disruption + replaced - trainer - suspension,
+            "disruption": before.disruption + replaced - trainer - operator - suspension,
         }
     )
 
@@ -113,12 +123,29 @@ def _by_evidence(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodV
     return sum(failed_by_itself(each) for each in chain[:-1])
 
 
+def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    """Return how many of the pods that were replaced since had a trainer that ran, as far as is known."""
+    named = [each for each in seen.pods if old.pod is not None and each.uid == old.pod.uid]
+    chain = [*named, *newer]
+    gone = old.pod is not None and not named and old.phase is Phase.RUNNING
+    return int(gone) + sum(has_run(each) for each in chain[:-1])
+
+
 def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
     """Return how many failures the Job has booked that are not counted yet, but the newest pod's own."""
     if seen.job is None:
         return 0
     last = seen.pod is not None and failed_by_itself(seen.pod)
     return max(seen.job.failures - last - old.restarts.trainer, 0)
+
+
+def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
+    """Return how many pods the operator has replaced that are not counted yet, but the newest."""
+    mark = seen.job.replaced if seen.job is not None else None
+    if mark is None:
+        return 0
+    last = seen.pod is not None and seen.pod.uid == mark.pod
+    return max(mark.times - last - (old.restarts.operator or 0), 0)
 
 
 def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:

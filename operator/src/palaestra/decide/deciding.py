@@ -1,7 +1,7 @@
 """The decision: each replica by itself, then the job as a whole, then what is to be done."""
 
 from collections.abc import Sequence
-from datetime import datetime
+from dataclasses import replace
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
@@ -10,56 +10,81 @@ from palaestra.decide.acting import actions
 from palaestra.decide.conditions import Claim, Told, claims, conditions
 from palaestra.decide.counting import counted
 from palaestra.decide.decision import Decision
+from palaestra.decide.edits import edits
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import of_actions, of_change
-from palaestra.decide.moments import after, next_of, whole
+from palaestra.decide.moments import first_of, seconds_to, whole
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.remembering import late_word
 from palaestra.decide.replicas import Decided, decided
 from palaestra.decide.situation import Situation
-from palaestra.decide.summary import active, columns, completed, standing, started
+from palaestra.decide.summary import active, columns, standing, started
+from palaestra.decide.suspending import seen_generation
+from palaestra.decide.times import Record, Times
+from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import Observed, ReplicaObserved
 
 EPHEMERAL = "; the run is ephemeral and goes with its pod"
 
 
-def decide(job: TrainingJob, observed: Observed, prepared: Prepared, now: datetime) -> Decision:
+def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Times) -> Decision:
     """Return the status of a job and what is to be done about it.
 
-    `now` has a time zone. Deciding again on the status that came out, with nothing else changed, gives the
-    same status, no event of a change, and no action but those that have not shown an effect yet.
+    Deciding again on the status and the record that came out, with nothing else changed, gives the same
+    status, no event of a change, and no action but those that have not shown an effect yet.
     """
-    now = whole(now)
-    each = tuple(_replica(job, seen, prepared, now) for seen in observed.replicas)
+    now = whole(times.now)
+    times = replace(times, now=now)
+    each = tuple(_replica(job, seen, prepared, times) for seen in observed.replicas)
     if job.status.phase in TERMINAL:
         kept = {"observed_generation": job.metadata.generation, "replicas": _kept(job, each)}
         status = job.status.model_copy(update=kept)
     else:
-        status = _status(job, observed, prepared, tuple(it.status for it in each), now)
+        status = _status(job, observed, prepared, tuple(it.status for it in each), times)
     expiry = expires(status, job.spec.ttl_seconds_after_finished)
     todo = (
         *actions(job, observed, prepared, each),
         *expired(job.metadata.name, job.metadata.uid, expiry, status, now),
     )
-    moments = [expiry, *(at for it in each for at in it.moments)]
+    waits_s = (seconds_to(expiry, now), *(left_s for it in each for left_s in it.left_s))
     return Decision(
         status=status,
         actions=todo,
-        events=(*of_change(job.status, status), *of_actions(todo)),
-        wake_after_s=next_of(moments, now),
+        events=(*of_change(job.status, status), *of_actions(todo), *edits(job, observed)),
+        wake_after_s=first_of(waits_s),
+        record=_record(job, each, status, times),
     )
 
 
-def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, now: datetime) -> Decided:
+def _record(job: TrainingJob, each: Sequence[Decided], status: Status, times: Times) -> Record:
+    """Return what this look leaves to the next: the waits that go on, and the active time."""
+    return Record(
+        waits={
+            (it.status.index, *wait.key): times.since_s(it.status.index, wait)
+            for it in each
+            for wait in it.waits
+        },
+        active_s=times.active_s(job.status.active_seconds),
+        active_at_s=times.clock_s if status.active_since is not None else None,
+    )
+
+
+def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times: Times) -> Decided:
     before = {each.index: each for each in job.status.replicas}
     old = before.get(seen.index, ReplicaStatus(index=seen.index))
     situation = Situation(
-        job=job, old=old, seen=seen, counted=counted(old, seen), now=now, deadline=_deadline(job, now)
+        job=job,
+        old=old,
+        seen=seen,
+        counted=counted(old, seen),
+        times=times,
+        active_left_s=_active_left_s(job, times),
+        hold=prepared.hold_of(job, seen),
     )
     if old.phase in TERMINAL or job.status.phase in TERMINAL:
         late = old.model_copy(update={"last_attempt": late_word(situation)})
         return Decided(status=late, stop=_still_to_stop(old, seen))
-    return decided(situation, prepared.hold)
+    return decided(situation)
 
 
 def _kept(job: TrainingJob, each: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
@@ -76,12 +101,12 @@ def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Told | None:
     return Told(reason=Reason(old.reason or Reason.JOB_FAILED), message=old.message or "")
 
 
-def _deadline(job: TrainingJob, now: datetime) -> datetime | None:
-    """Return when the active time of a job is over; None: it is suspended, or there is no bound."""
-    bound, spent, since = job.spec.active_deadline_seconds, job.status.active_seconds, job.status.active_since
-    if bound is None or (since is None and spent < bound):
+def _active_left_s(job: TrainingJob, times: Times) -> float | None:
+    """Return how much of its active time a job has left; None: it is suspended, or there is no bound."""
+    bound, spent_s = job.spec.active_deadline_seconds, times.active_s(job.status.active_seconds)
+    if bound is None or (job.status.active_since is None and spent_s < bound):
         return None
-    return after(since or now, bound - spent)
+    return bound - spent_s
 
 
 def _status(
@@ -89,25 +114,29 @@ def _status(
     observed: Observed,
     prepared: Prepared,
     replicas: Sequence[ReplicaStatus],
-    now: datetime,
+    times: Times,
 ) -> Status:
     old = job.status
     where = standing(replicas)
     accepted = _accepted(job, prepared)
-    seconds, since = active(old, where.phase, replicas, now)
-    generation = job.metadata.generation
+    now, generation = times.now, job.metadata.generation
     return Status(
-        observed_generation=generation,
+        observed_generation=old.observed_generation if prepared.closed else seen_generation(job, observed),
         phase=where.phase,
         release=old.release or _release(prepared),
         conditions=conditions(old, claims(accepted, where.phase, where.told), generation, now),
         start_time=started(old, observed),
-        completion_time=completed(where.phase, observed, now),
-        active_seconds=seconds,
-        active_since=since,
+        completion_time=now if where.phase in TERMINAL else None,
+        active_seconds=min(int(times.active_s(old.active_seconds)), MOST_COUNT),
+        active_since=now if active(where.phase, replicas) and not _waits(observed, prepared) else None,
         replicas=tuple(replicas),
         **columns(job, replicas),
     )
+
+
+def _waits(observed: Observed, prepared: Prepared) -> bool:
+    """Return whether a hold keeps all of a job from being planned, so that none of its time passes."""
+    return prepared.hold is not None and all(each.job is None for each in observed.replicas)
 
 
 def _accepted(job: TrainingJob, prepared: Prepared) -> Claim:

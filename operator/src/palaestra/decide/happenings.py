@@ -5,8 +5,19 @@ from collections.abc import Iterator, Sequence
 from palaestra.api.reasons import ROWS, Reason, say
 from palaestra.api.status import Condition, ConditionStatus, ConditionType, Phase, ReplicaStatus, Status
 from palaestra.decide.conditions import condition
-from palaestra.decide.decision import Action, Create, Happening, HappeningType, SetSuspend, Stop
+from palaestra.decide.decision import (
+    Action,
+    Create,
+    Delete,
+    Discard,
+    Happening,
+    HappeningType,
+    Replace,
+    SetSuspend,
+    Stop,
+)
 from palaestra.decide.memory import limit_of
+from palaestra.decide.suspending import BY_SPEC
 from palaestra.plan.replica import TRAINER
 
 _ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
@@ -43,8 +54,10 @@ def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
                 yield happening(reason, message, replica)
             case SetSuspend(suspend=suspend, replica=replica):
                 reason = Reason.SUSPENDED if suspend else Reason.RESUMED
-                yield happening(reason, say(reason), replica)
-            case _:
+                yield happening(reason, say(reason, by=BY_SPEC), replica)
+            case Discard() | Replace():  # the replica's end, or its reason, has an event
+                continue
+            case Delete():
                 yield happening(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
     for replica, names in created.items():
         yield happening(Reason.PLANNED, say(Reason.PLANNED, objects=", ".join(names)), replica)
@@ -68,7 +81,8 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happe
     if before == (new.phase, new.reason) or new.reason is None or new.message is None:
         return
     reason = Reason(new.reason)
-    if reason not in _BY_ACTION | _BY_ATTEMPT:
+    by_another = reason is Reason.SUSPENDED and new.message != say(reason, by=BY_SPEC)
+    if by_another or reason not in _BY_ACTION | _BY_ATTEMPT:
         yield happening(reason, new.message, new.index)
 
 

@@ -4,10 +4,13 @@ On cgroup v2 the kernel kills a container as a whole, its sidecar with it, and t
 within a second. Then nothing but its last end tells a simulator that needed too much from one that crashed.
 """
 
+from datetime import datetime
+
 from palaestra.api.history import MemoryKills
+from palaestra.decide.counting import newer_pods
 from palaestra.decide.situation import Situation
 from palaestra.observe.reading import MOST_COUNT
-from palaestra.observe.views import ContainerView
+from palaestra.observe.views import ContainerView, PodView
 
 OUT_OF_MEMORY = "OOMKilled"
 MOST_CONTAINERS = 64  # as the status holds
@@ -19,20 +22,47 @@ def killed_for_memory(container: ContainerView) -> bool:
 
 
 def memory_kills(it: Situation) -> tuple[MemoryKills, ...]:
-    """Return the kills by container, those that are seen for the first time added."""
+    """Return the kills by container, those that are seen for the first time added.
+
+    A kill is told from another by its pod and the container's run in it. Of the pods before the one that
+    the status names all is known.
+    """
     kills = {each.container: each for each in it.old.memory_kills}
-    for container in (each for pod in it.seen.pods for each in pod.containers):
-        at = container.exit.at if container.exit is not None else None
-        before = kills.get(container.name)
-        known = before is not None and at is not None and at <= before.last
-        if killed_for_memory(container) and at is not None and not known:
-            kills[container.name] = MemoryKills(
-                container=container.name or "unnamed",
-                times=min((before.times if before else 0) + 1, MOST_COUNT),
-                limit=container.memory_limit or None,
-                last=at,
-            )
+    named = [pod for pod in it.seen.pods if it.old.pod is not None and pod.uid == it.old.pod.uid]
+    for pod in (*named, *newer_pods(it.old, it.seen.pods)):
+        for container in pod.containers:
+            before = kills.get(container.name)
+            if killed_for_memory(container) and not _known(before, pod, container):
+                kills[container.name] = _one_more(before, pod, container, it.now)
     return tuple(kills.values())[:MOST_CONTAINERS]
+
+
+def _known(before: MemoryKills | None, pod: PodView, container: ContainerView) -> bool:
+    """Return whether a kill was counted.
+
+    What an older release has counted, or a definition without the fields has kept, is known by the time of
+    the kill: two times of one node's clock, or of two.
+    """
+    if before is None:
+        return False
+    if before.pod is None or before.run is None:
+        at = container.exit.at if container.exit is not None else None
+        return at is None or at <= before.last
+    return before.pod == pod.uid and container.ended_run <= before.run
+
+
+def _one_more(
+    before: MemoryKills | None, pod: PodView, container: ContainerView, now: datetime
+) -> MemoryKills:
+    at = container.exit.at if container.exit is not None else None
+    return MemoryKills(
+        container=container.name or "unnamed",
+        times=min((before.times if before else 0) + 1, MOST_COUNT),
+        limit=container.memory_limit or None,
+        last=at or now,
+        pod=pod.uid,
+        run=container.ended_run,
+    )
 
 
 def kills_of(it: Situation, container: str) -> int:

@@ -19,7 +19,11 @@ def seconds_between(before: datetime, later: datetime) -> int:
     return max(int((later - before).total_seconds()), 0)
 
 
-def next_of(moments: Iterable[datetime | None], now: datetime) -> float | None:
-    """Return the seconds to the first moment after `now`; None where there is none."""
-    ahead = [(at - now).total_seconds() for at in moments if at is not None and at > now]
-    return min(ahead, default=None)
+def seconds_to(at: datetime | None, now: datetime) -> float | None:
+    """Return the seconds from `now` to `at`; None where there is no such moment."""
+    return None if at is None else (at - now).total_seconds()
+
+
+def first_of(waits_s: Iterable[float | None]) -> float | None:
+    """Return the seconds until the first of some waits is over; None: none goes on."""
+    return min((each for each in waits_s if each is not None and each > 0), default=None)

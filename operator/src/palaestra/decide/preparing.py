@@ -1,17 +1,19 @@
 """Plan what is missing, or say what keeps the job from being planned.
 
-A job whose objects are all there is not planned at all: what its ConfigMaps of worlds say by now does
+A replica whose objects are all there is not planned at all: what its ConfigMaps of worlds say by now does
 not matter to it any more, nor does a newer release.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL
 from palaestra.decide.conditions import Told
+from palaestra.decide.suspending import to_resume
 from palaestra.observe.reading import part
+from palaestra.observe.shortening import Lacking
 from palaestra.observe.sources import open_to_jobs, references
 from palaestra.observe.views import Observed, ReplicaObserved, Source, SourceKind
 from palaestra.plan import ClusterLayout, Images, Plan, PlanError, plan
@@ -28,11 +30,21 @@ class Hold:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """The plan and the images that are in it, or why there is none; neither where nothing is missing."""
+    """The plan and the images that are in it, or why there is none; neither where nothing is missing.
+
+    `closed` keeps Jobs that there are from being resumed: something that they use is not for jobs any more.
+    """
 
     plan: Plan | None = None
     images: Images | None = None
     hold: Hold | None = None
+    closed: Hold | None = None
+
+    def hold_of(self, job: TrainingJob, seen: ReplicaObserved) -> Hold | None:
+        """Return what keeps a replica from being planned or resumed."""
+        if seen.job is None:
+            return self.hold
+        return self.closed if to_resume(job, seen.job) else None
 
 
 Check = Callable[[TrainingJob, Observed], Hold | None]
@@ -47,13 +59,19 @@ _MISSING = {SourceKind.SECRET: Reason.SECRET_MISSING, SourceKind.CLAIM: Reason.C
 
 def prepare(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
     """Return the plan of a job of which something is missing, with the images that it was accepted with."""
+    closed = sources_are_still_for_jobs(job, observed) if resuming(job, observed) else None
     if complete(job, observed):
-        return Prepared()
-    if (hold := next((found for check in HOLDS if (found := check(job, observed))), None)) is not None:
+        return Prepared(closed=closed)
+    return replace(_planned(job, observed, layout), closed=closed)
+
+
+def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
+    if (hold := _held(job, observed, layout)) is not None:
         return Prepared(hold=hold)
     layout = _at_acceptance(job, layout)
     try:
-        return Prepared(plan=plan(job, layout, _worlds(job, observed)), images=layout.images)
+        planned = plan(job, layout, _worlds(job, observed), _lacking(job, observed))
+        return Prepared(plan=planned, images=layout.images)
     except PlanError as error:
         return Prepared(hold=_hold(Reason.INVALID_SPEC, final=True, problem=error))
     except WorldError as error:
@@ -61,10 +79,56 @@ def prepare(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prep
         return Prepared(hold=_hold(Reason.WORLD_INVALID, final=not mendable, problem=error))
 
 
+def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold | None:
+    """Return the first hold; what the pods carry is judged before acceptance only."""
+    if job.status.release is None and (hold := pod_metadata_is_allowed(job, layout)) is not None:
+        return hold
+    return next((found for check in HOLDS if (found := check(job, observed))), None)
+
+
+def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:
+    """Return whether more of a job has to be read before it is prepared, as it is planned next.
+
+    `lacks` is what it lacks of the object in the API server. While it waits for something else, its
+    worlds are not read.
+    """
+    if lacks is Lacking.FIELDS and resuming(job, observed):
+        return True
+    if lacks is None or complete(job, observed):
+        return False
+    return lacks is Lacking.FIELDS or _held(job, observed, layout) is None
+
+
 def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, ...]:
-    """Return the replicas that the status does not call ended."""
+    """Return the replicas that the status does not call ended; none of a job that has ended as a whole."""
+    if job.status.phase in TERMINAL:
+        return ()
     ended = {each.index for each in job.status.replicas if each.phase in TERMINAL}
     return tuple(each for each in observed.replicas if each.index not in ended)
+
+
+def pod_metadata_is_allowed(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
+    """Other controllers obey labels and annotations of pods, and an author may not be let make pods."""
+    scheduling = job.spec.scheduling
+    for field, value, keys, allowed in (
+        ("podLabels", "allowedPodLabels", scheduling.pod_labels, layout.allowed_pod_labels),
+        (
+            "podAnnotations",
+            "allowedPodAnnotations",
+            scheduling.pod_annotations,
+            layout.allowed_pod_annotations,
+        ),
+    ):
+        if refused := next((key for key in sorted(keys) if not _allows(allowed, key)), None):
+            where = f"spec.scheduling.{field}"
+            return _hold(Reason.POD_METADATA_NOT_ALLOWED, field=where, key=refused, value=f"jobs.{value}")
+    return None
+
+
+def _allows(allowed: tuple[str, ...], key: str) -> bool:
+    """Return whether a key is among `allowed`, itself or by its domain."""
+    domain, slash, _ = key.partition("/")
+    return key in allowed or (bool(slash) and f"{domain}/" in allowed)
 
 
 def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
@@ -76,20 +140,37 @@ def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
 
 def sources_are_there(job: TrainingJob, observed: Observed) -> Hold | None:
     """Everything that the spec names exists."""
-    for source in references(job):
-        if observed.sources.get(source) is None:
-            fact = f"there is no {source.kind} {source.name} here"
-            reason = _MISSING.get(source.kind, Reason.WORLD_MISSING)
-            return _hold(reason, field=source.field, name=source.name, fact=fact)
-    return None
+    return next((found for each in references(job) if (found := _missing(each, observed))), None)
 
 
 def sources_are_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
     """Whoever writes a TrainingJob must not open what they could not open before."""
+    return next((found for each in references(job) if (found := _closed(each, observed))), None)
+
+
+def sources_are_still_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
+    """A pod of a resumed Job is a new one; of a world there is a copy, so its ConfigMap may be gone."""
     for source in references(job):
-        if not open_to_jobs(observed.sources.get(source)):
-            return _hold(_NOT_FOR_JOBS[source.kind], field=source.field, name=source.name)
+        if (found := _missing(source, observed)) is not None:
+            if source.kind is not SourceKind.CONFIG_MAP:
+                return found
+        elif (found := _closed(source, observed)) is not None:
+            return found
     return None
+
+
+def _missing(source: Source, observed: Observed) -> Hold | None:
+    if observed.sources.get(source) is not None:
+        return None
+    fact = f"there is no {source.kind} {source.name} here"
+    reason = _MISSING.get(source.kind, Reason.WORLD_MISSING)
+    return _hold(reason, field=source.field, name=source.name, fact=fact)
+
+
+def _closed(source: Source, observed: Observed) -> Hold | None:
+    if open_to_jobs(observed.sources.get(source)):
+        return None
+    return _hold(_NOT_FOR_JOBS[source.kind], field=source.field, name=source.name)
 
 
 def worlds_have_their_keys(job: TrainingJob, observed: Observed) -> Hold | None:
@@ -114,15 +195,24 @@ def _hold(reason: Reason, *, final: bool = False, **facts: object) -> Hold:
 
 def complete(job: TrainingJob, observed: Observed) -> bool:
     """Return whether every replica that goes on has its Job, and what the Job's pods mount is there."""
-    there = {name for _, name in observed.present}
-    borrowed = job.spec.storage.existing_claim
     policy = any(kind == "NetworkPolicy" for kind, _ in observed.present)
-    going_on = unfinished(job, observed)
-    return not going_on or (
-        policy
-        and job.status.release is not None
-        and all(each.job is not None and each.job.volumes - {borrowed} <= there for each in going_on)
-    )
+    accepted = job.status.release is not None
+    return not unfinished(job, observed) or (policy and accepted and not _lacking(job, observed))
+
+
+def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str]]:
+    """Return the replicas that go on and lack an object, each with the volumes that its Job mounts."""
+    there = {name for _, name in observed.present} | {job.spec.storage.existing_claim}
+    return {
+        each.index: each.job.volumes if each.job is not None else frozenset()
+        for each in unfinished(job, observed)
+        if each.job is None or not each.job.volumes <= there
+    }
+
+
+def resuming(job: TrainingJob, observed: Observed) -> bool:
+    """Return whether a Job is to be resumed."""
+    return any(to_resume(job, each.job) for each in unfinished(job, observed))
 
 
 def _at_acceptance(job: TrainingJob, layout: ClusterLayout) -> ClusterLayout:

@@ -1,4 +1,4 @@
-"""What the trainer last told, as the status has it, and when it last came forward.
+"""What the trainer last told, as the status has it, and since when it stands still.
 
 What it does not tell any more stays as it was: unknown is neither zero nor stalled.
 """
@@ -9,7 +9,9 @@ from palaestra.api import Role
 from palaestra.api.history import Faults, Goodput
 from palaestra.api.lines import one_line
 from palaestra.api.status import TERMINAL, LastCheckpoint, Phase, SimulatorPhase, SimulatorStatus
+from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation
+from palaestra.decide.times import Wait
 from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra_sim.protocol.status import CheckpointStatus, Termination, TrainerStatus
 
@@ -50,15 +52,32 @@ def last_progress(it: Situation) -> datetime | None:
     """
     same_attempt = it.old.pod is not None and it.counted.pod == it.old.pod
     known = it.old.last_progress if same_attempt else None
-    if it.seen.polled is None or not it.trains:
+    wait = standstill(it)
+    if wait is None or it.seen.polled is None:
         return known
     status = it.seen.polled.status
     step = _step(status)
     moved = (step is not None and step != it.old.step) or status.phase == EVALUATING
     if known is not None and not moved:
         return known
-    stepped = as_time(status.last_progress) if status.last_progress else None
-    return min(stepped or it.now, it.now)
+    return after(it.now, -int(it.waited_s(wait)))
+
+
+def standstill(it: Situation) -> Wait | None:
+    """Return the wait for the next step, or for the next one of an evaluation; None: it does not train.
+
+    Where the trainer tells how long ago an environment stepped, the wait began then. A trainer of an older
+    release tells only when, by its own clock: that is compared with what it told before, and with no time
+    of ours.
+    """
+    polled = it.seen.polled
+    if polled is None or not it.trains or it.pod is None:
+        return None
+    status = polled.status
+    evaluates = status.phase == EVALUATING
+    step = f"evaluates, {status.last_progress}" if evaluates else f"step {_step(status)}"
+    begun_s = polled.at_s - (status.last_progress_age_s or 0.0)
+    return Wait(key=("stalled", it.pod.uid, step), seconds=0.0, begun_s=begun_s)
 
 
 def _step(told: TrainerStatus | Termination) -> int | None:

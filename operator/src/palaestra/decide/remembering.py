@@ -6,7 +6,8 @@ end is remembered once another has taken its place.
 
 from palaestra.api.history import Fault, LastAttempt
 from palaestra.api.lines import one_line
-from palaestra.api.reasons import LONGEST_MESSAGE
+from palaestra.api.reasons import LONGEST_MESSAGE, Reason
+from palaestra.api.status import TERMINAL
 from palaestra.decide.attempts import Attempt, of_pod, why
 from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code, newer_pods
@@ -34,10 +35,19 @@ def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | Non
 
 
 def late_word(it: Situation) -> LastAttempt | None:
-    """Return what is kept of the last attempt of a replica that was called ended before its pod had."""
-    known, newest = it.old.last_attempt, it.seen.pod
-    ours = newest is not None and it.old.pod is not None and newest.uid == it.old.pod.uid
-    if newest is None or not ours or not has_ended(newest) or _knows(known, it.old.attempt):
+    """Return what is kept of the last attempt of a replica that was called ended before its pod had.
+
+    Where the pod goes without a word, that is what the replica's end was: the caches of Jobs and pods follow
+    each other in any order, and what is kept must not depend on it.
+    """
+    known, newest, named = it.old.last_attempt, it.seen.pod, it.old.pod
+    if named is None or _knows(known, it.old.attempt):
+        return known
+    if newest is None and it.old.phase in TERMINAL:
+        gone = Attempt(it=it, number=it.old.attempt, name=named.name, pod=None, code=None)
+        reason = Reason(it.old.reason or Reason.JOB_FAILED)
+        return _record(gone, Told(reason=reason, message=it.old.message or ""))
+    if newest is None or newest.uid != named.uid or not has_ended(newest):
         return known
     attempt = of_pod(it, newest, it.old.attempt)
     return _record(attempt, why(attempt))

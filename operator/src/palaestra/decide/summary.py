@@ -9,9 +9,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus, Status
 from palaestra.decide.conditions import Told
-from palaestra.decide.moments import seconds_between
 from palaestra.decide.situation import Verdict
-from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import Observed
 
 
@@ -28,31 +26,19 @@ def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
     return _as_first(replicas, Phase.PENDING)
 
 
-def active(
-    old: Status, phase: Phase, replicas: Sequence[ReplicaStatus], now: datetime
-) -> tuple[int, datetime | None]:
-    """Return the seconds that the job was active before, and since when it is; suspended time is none."""
+def active(phase: Phase, replicas: Sequence[ReplicaStatus]) -> bool:
+    """Return whether a job is active: it goes on, and not all of it is suspended."""
     suspended = all(each.phase in TERMINAL | {Phase.SUSPENDED} for each in replicas)
-    if phase not in TERMINAL and not suspended:
-        return old.active_seconds, old.active_since or now
-    if old.active_since is None:
-        return old.active_seconds, None
-    return min(old.active_seconds + seconds_between(old.active_since, now), MOST_COUNT), None
+    return phase not in TERMINAL and not suspended
 
 
 def started(old: Status, observed: Observed) -> datetime | None:
-    """Return when the first pod of all was started by a node."""
+    """Return when the first pod of all was started, by its node's clock."""
     if old.start_time is not None:
         return old.start_time
-    begun = [pod.started for each in observed.replicas for pod in each.pods if pod.started]
-    return min(begun, default=None)
-
-
-def completed(phase: Phase, observed: Observed, now: datetime) -> datetime | None:
-    """Return when the last replica ended: when the last Job did, or now where one does not tell."""
-    if phase not in TERMINAL:
-        return None
-    return min(max(each.job.ended or now if each.job else now for each in observed.replicas), now)
+    begun = [pod for each in observed.replicas for pod in each.pods if pod.started is not None]
+    first = min(begun, key=lambda pod: pod.created, default=None)
+    return None if first is None else first.started
 
 
 def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:

@@ -1,21 +1,21 @@
-"""What is wrong with a replica that has not ended: shown at once, fatal only by a deadline.
+"""What a replica waits for: shown with its reason, ended or counted by nobody.
 
-The order is the policy: what keeps pods from being made comes before what keeps them from starting, and
-the cause before its symptom.
+The API server, the scheduler and the kubelet try again by themselves. `palaestra.decide.judging` has the
+order of these checks.
 """
 
-from datetime import datetime
+from dataclasses import replace
 
 from palaestra.api.reasons import Reason
+from palaestra.api.status import Phase
 from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
-from palaestra.decide.moments import after, seconds_between
-from palaestra.decide.situation import Situation, TroubleCheck, first_waiting, told
-from palaestra.observe.pods import dropped
+from palaestra.decide.situation import Finding, Situation, after, first_waiting, found, told
+from palaestra.decide.times import Wait
 from palaestra.observe.views import ContainerKind, ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
-from palaestra_sim.protocol.status import Termination
+from palaestra_sim.protocol.status import SimulatorStatus, Termination
 
 LOST_AFTER_S = 30  # past the moment at which a deleted pod was to be gone
 CRASHES = 3  # of one sidecar, before they are called a loop
@@ -30,139 +30,136 @@ MAKING = frozenset(
 FULL = ("StorageFull", "DiskFull")  # how a last word begins; the second in older releases
 
 
-def name_taken(it: Situation) -> Told | None:
+def objects_refused(it: Situation) -> Finding | None:
+    """The API server makes no object of the replica; nothing in the cluster tells of it."""
+    if it.seen.job is not None or not it.seen.denied or it.pod is not None:
+        return None
+    phase = Phase.SUSPENDED if it.job.spec.suspend else Phase.PENDING
+    return Finding(told=told(Reason.PODS_REFUSED, words=it.seen.denied), phase=phase)
+
+
+def name_taken(it: Situation) -> Finding | None:
     """Another Job has the replica's name."""
     obstacle = it.seen.obstacle
     if it.seen.job is not None or obstacle is None:
         return None
-    return told(
-        Reason.NAME_TAKEN, name=obstacle.name, deleting=" and is being deleted" if obstacle.deleting else ""
-    )
+    deleting = " and is being deleted" if obstacle.deleting else ""
+    return found(Reason.NAME_TAKEN, name=obstacle.name, deleting=deleting)
 
 
-def pods_refused(it: Situation) -> Told | None:
+def old_pod_holds_claim(it: Situation) -> Finding | None:
+    """A pod of an earlier TrainingJob of this name may still write to the claim that both name."""
+    old = next(iter(it.seen.former), None)
+    if it.seen.job is not None or old is None:
+        return None
+    claim, node = it.job.spec.storage.existing_claim, old.node or "unknown"
+    return found(Reason.OLD_POD_TERMINATING, pod=old.name, claim=claim, node=node)
+
+
+def pods_refused(it: Situation) -> Finding | None:
     """The API server makes no pod; only the Job's events tell."""
     refused = it.seen.refused
-    if refused is None or it.pod is not None:
+    words = it.seen.denied or (refused.message if refused is not None else "")
+    return None if it.pod is not None or not words else found(Reason.PODS_REFUSED, words=words)
+
+
+def node_lost(it: Situation) -> Finding | None:
+    """A deleted pod is still there long after its grace."""
+    pod = it.pod
+    if pod is None or pod.gone_by is None:
         return None
-    return told(Reason.PODS_REFUSED, words=refused.message)
+    why = told(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=LOST_AFTER_S)
+    wait = Wait(key=("gone", pod.uid), seconds=pod.grace_s + LOST_AFTER_S)
+    return replace(after(it, wait, why), phase=Phase.PENDING)  # as its node said last, it runs
 
 
-def objects_refused(it: Situation) -> Told | None:
-    """The API server makes no object of ours; what it said is told by nobody else."""
-    if not it.seen.denied or it.pod is not None:
-        return None
-    return told(Reason.PODS_REFUSED, words=it.seen.denied)
-
-
-def node_lost(it: Situation) -> Told | None:
-    """A pod is not gone long after it was to be."""
-    pod, at = it.pod, lost_at(it)
-    if pod is None or pod.gone_by is None or at is None or it.now < at:
-        return None
-    return told(Reason.NODE_LOST, pod=pod.name, node=pod.node, seconds=seconds_between(pod.gone_by, it.now))
-
-
-def restart_policy_dropped(it: Situation) -> Told | None:
-    """Sidecars became ordinary init containers, each of which the next waits for."""
-    names = dropped(it.pod) if it.pod is not None else ()
-    if it.pod is None or not names:
-        return None
-    return told(Reason.RESTART_POLICY_DROPPED, pod=it.pod.name, containers=", ".join(names))
-
-
-def unschedulable(it: Situation) -> Told | None:
+def unschedulable(it: Situation) -> Finding | None:
     """No node takes the pod."""
     if it.pod is None or not it.pod.unschedulable:
         return None
-    return told(Reason.UNSCHEDULABLE, pod=it.pod.name, words=it.pod.unschedulable)
+    return found(Reason.UNSCHEDULABLE, pod=it.pod.name, words=it.pod.unschedulable)
 
 
-def image_does_not_come(it: Situation) -> Told | None:
-    """An image is not there, or not for us."""
-    stuck = first_waiting(it.pod, PULLING)
-    if stuck is None:
+def volume_not_mounted(it: Situation) -> Finding | None:
+    """A node has taken the pod, and a volume is not mounted; only the pod's events tell."""
+    if it.pod is None or not it.seen.unmounted:
         return None
-    words = stuck.waiting_message or stuck.waiting
-    return told(Reason.IMAGE_PULL, container=stuck.name, image=stuck.image, words=words)
+    return found(Reason.VOLUME_NOT_MOUNTED, pod=it.pod.name, words=it.seen.unmounted)
 
 
-def container_refused(it: Situation) -> Told | None:
-    """The node cannot make a container."""
+def image_does_not_come(it: Situation) -> Finding | None:
+    """An image cannot be pulled; the kubelet tries again."""
+    stuck = first_waiting(it.pod, PULLING)
+    return None if stuck is None else of_image(stuck)
+
+
+def container_refused(it: Situation) -> Finding | None:
+    """The node cannot make a container; the kubelet tries again."""
     stuck = first_waiting(it.pod, MAKING)
     if stuck is None:
         return None
     words = stuck.waiting_message or stuck.waiting
-    return told(Reason.CONTAINER_REFUSED, container=stuck.name, words=words)
+    return found(Reason.CONTAINER_REFUSED, container=stuck.name, words=words)
 
 
-def volume_not_mounted(it: Situation) -> Told | None:
-    """The node has the pod, and a volume does not come; only the pod's events tell."""
-    if it.pod is None or not it.seen.unmounted:
-        return None
-    return told(Reason.VOLUME_NOT_MOUNTED, pod=it.pod.name, words=it.seen.unmounted)
-
-
-def sidecar_out_of_memory(it: Situation) -> Told | None:
-    """A sidecar was killed for its memory and is on its way back."""
+def sidecar_out_of_memory(it: Situation) -> Finding | None:
+    """A sidecar was killed for its memory; the kubelet starts it again."""
     stuck = next((each for each in crashing(it.pod) if killed_for_memory(each)), None)
-    return None if stuck is None else of_crash(it, stuck)
+    return None if stuck is None else Finding(told=of_crash(it, stuck))
 
 
-def sidecar_crash_loops(it: Situation) -> Told | None:
-    """A sidecar does not stay up; Kubernetes never fails a pod for that."""
+def sidecar_crash_loops(it: Situation) -> Finding | None:
+    """A sidecar does not stay up; the kubelet starts it again and again."""
     looping = next((each for each in crashing(it.pod) if each.restarts >= CRASHES), None)
-    return None if looping is None else of_crash(it, looping)
+    return None if looping is None else Finding(told=of_crash(it, looping))
 
 
-def pod_filled_its_storage(it: Situation) -> Told | None:
-    """The newest pod wrote more than it may and no other is there yet."""
-    return None if it.seen.pod is None else storage_eviction(it.seen.pod)
+def simulator_not_up(it: Situation) -> Finding | None:
+    """A simulator takes long to start; its trainer's own budget ends that."""
+    polled = it.seen.polled
+    if it.pod is None or polled is None or it.trains or not it.fresh:
+        return None
+    up = {each.name: each for each in it.pod.sidecars if each.running_since is not None}
+    states = (
+        (each, up.get(f"sim-{each.name}")) for each in polled.status.simulators if each.state != "ready"
+    )
+    late = [_not_up(it, it.pod, each, sidecar) for each, sidecar in states if sidecar is not None]
+    return min(late, key=lambda each: each.left_s, default=None)
 
 
-def pod_was_taken(it: Situation) -> Told | None:
-    """The newest pod was interrupted and no other is there yet."""
+def pod_filled_its_storage(it: Situation) -> Finding | None:
+    """The newest pod was evicted for what it wrote, and no other is there yet."""
+    why = None if it.seen.pod is None else storage_eviction(it.seen.pod)
+    return None if why is None else Finding(told=why)
+
+
+def pod_was_taken(it: Situation) -> Finding | None:
+    """The newest pod was interrupted, and no other is there yet."""
     pod = it.seen.pod
     if pod is None or pod.phase != "Failed" or failed_by_itself(pod):
         return None
+    if (mark := mark_of(it, pod)) is not None:
+        return Finding(told=mark)
     if pod.disruption or pod.gone_by is not None:
-        return told(Reason.DISRUPTED, pod=pod.name, words=pod.disruption or "it was deleted")
-    return told(Reason.INTERRUPTED, pod=pod.name, how=how_it_failed(it, pod))
+        return found(Reason.DISRUPTED, pod=pod.name, words=pod.disruption or "it was deleted")
+    return found(Reason.INTERRUPTED, pod=pod.name, how=how_it_failed(it, pod))
 
 
-def volume_is_full(it: Situation) -> Told | None:
+def volume_is_full(it: Situation) -> Finding | None:
     """The newest pod could not write to the volume, and another will try."""
     pod = it.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(it, pod):
         return None
-    return full_volume(it.seen.termination)
+    why = full_volume(it.seen.termination)
+    return None if why is None else Finding(told=why)
 
 
-def pod_failed(it: Situation) -> Told | None:
-    """The newest pod failed and another will come."""
+def pod_failed(it: Situation) -> Finding | None:
+    """The newest pod failed, and another will come."""
     pod = it.seen.pod
     if pod is None or not failed_by_itself(pod) or no_other_comes(it, pod):
         return None
-    return told(Reason.RETRYING, pod=pod.name, how=how_it_failed(it, pod))
-
-
-TROUBLES: tuple[TroubleCheck, ...] = (
-    name_taken,
-    objects_refused,
-    pods_refused,
-    node_lost,
-    restart_policy_dropped,
-    unschedulable,
-    volume_not_mounted,
-    image_does_not_come,
-    container_refused,
-    sidecar_out_of_memory,
-    sidecar_crash_loops,
-    pod_filled_its_storage,
-    pod_was_taken,
-    volume_is_full,
-    pod_failed,
-)
+    return found(Reason.RETRYING, pod=pod.name, how=how_it_failed(it, pod))
 
 
 def no_other_comes(it: Situation, pod: PodView) -> bool:
@@ -172,9 +169,26 @@ def no_other_comes(it: Situation, pod: PodView) -> bool:
     return failures > it.job.spec.backoff_limit or exit_code(pod) in GIVEN_UP
 
 
-def lost_at(it: Situation) -> datetime | None:
-    """Return when a pod that was deleted and is still there is called lost."""
-    return None if it.pod is None or it.pod.gone_by is None else after(it.pod.gone_by, LOST_AFTER_S)
+def of_image(stuck: ContainerView) -> Finding:
+    """Return what to say of a container whose image cannot be pulled."""
+    words = stuck.waiting_message or stuck.waiting
+    return found(Reason.IMAGE_PULL, container=stuck.name, image=stuck.image, words=words)
+
+
+def mark_of(it: Situation, pod: PodView) -> Told | None:
+    """Return why the operator replaces a pod, by the mark on its Job; None: it does not."""
+    mark = it.seen.job.replaced if it.seen.job is not None else None
+    if mark is None or mark.pod != pod.uid:
+        return None
+    return Told(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
+
+
+def _not_up(it: Situation, pod: PodView, simulator: SimulatorStatus, sidecar: ContainerView) -> Finding:
+    seconds = it.start_deadline_s(sidecar.name)
+    fault = f": {simulator.last_fault}" if simulator.last_fault else ""
+    what = f"{sidecar.name} is not up within {seconds} s of its container's start{fault}"
+    wait = Wait(key=("start", pod.uid, sidecar.name, str(sidecar.restarts)), seconds=seconds)
+    return after(it, wait, told(Reason.SIMULATOR_START_DEADLINE, what=what))
 
 
 def crashing(pod: PodView | None) -> tuple[ContainerView, ...]:

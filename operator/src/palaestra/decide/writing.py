@@ -1,12 +1,12 @@
 """When a status is worth a write: what people wait for at once, progress every half minute but its first."""
 
 from collections.abc import Mapping
-from datetime import datetime
 from typing import Any
 
 from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
+_WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with what else changes, never alone
 _OF_JOB = frozenset({"step", "successRate"})
 _FIRST = frozenset({"step", "target", "successRate", "lastCheckpoint"})  # never absent once they were there
 _OF_REPLICA = frozenset(
@@ -20,30 +20,30 @@ def as_data(status: Status) -> dict[str, Any]:
     return status.model_dump(mode="json", by_alias=True, exclude_none=True)
 
 
-def worth_writing(
-    old: Mapping[str, Any] | None,
-    new: Mapping[str, Any],
-    last_written: datetime | None,
-    now: datetime,
-) -> bool:
-    """Return whether to write a status now.
+def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: float | None) -> float | None:
+    """Return the seconds after which a status is to be written, 0: now; None: it is not.
 
     Args:
         old: as the API server holds it.
         new: as `as_data` gives it.
-        last_written: when this job's status was last written; None: not by this process.
-        now: with a time zone, as `last_written`.
+        since_s: seconds since this job's status was last written, on a monotonic clock; None: this process
+            has not written it.
     """
-    before = old if isinstance(old, Mapping) else {}
-    if before == new:
-        return False
-    if _without_progress(before) != _without_progress(new) or last_written is None:
-        return True
-    return (now - last_written).total_seconds() >= PROGRESS_EVERY_S
+    before = _without(old if isinstance(old, Mapping) else {}, _WITH_OTHERS)
+    after = _without(new, _WITH_OTHERS)
+    if before == after:
+        return None
+    if since_s is None or _without_progress(before) != _without_progress(after):
+        return 0.0
+    return max(PROGRESS_EVERY_S - since_s, 0.0)
+
+
+def _without(status: Mapping[str, Any], names: frozenset[str]) -> dict[str, Any]:
+    return {name: value for name, value in status.items() if name not in names}
 
 
 def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
-    rest = {name: value for name, value in status.items() if name not in _OF_JOB}
+    rest = _without(status, _OF_JOB)
     replicas = rest.get("replicas")
     if isinstance(replicas, list):
         rest["replicas"] = [_rest(each) for each in replicas]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from palaestra.cluster import ApiError, Forbidden
 from palaestra.doctor.finding import Check, Finding, Site, Verdict, unknown, wrong
-from palaestra.doctor.installation import leads, metrics, operator_rights, runs
+from palaestra.doctor.installation import images, leads, metrics, operator_rights, runs
 from palaestra.doctor.platform import answers, definition, nodes, sidecars, storage
 from palaestra.doctor.rights import own_rights
 
@@ -16,6 +16,7 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     ("sidecars", sidecars),
     ("storage class", storage),
     ("operator", runs),
+    ("images", images),
     ("leader", leads),
     ("operator's rights", operator_rights),
     ("metrics", metrics),

@@ -11,6 +11,7 @@ class Verdict(StrEnum):
     """How something is."""
 
     RIGHT = "ok"
+    WARNING = "warning"  # it works; something about it may surprise later
     WRONG = "wrong"
     UNKNOWN = "unknown"
 
@@ -58,6 +59,11 @@ def right(what: str, fact: str) -> Finding:
 def wrong(what: str, fact: str, remedy: str) -> Finding:
     """Return that something is not as it must be."""
     return Finding(what=what, verdict=Verdict.WRONG, fact=fact, remedy=remedy)
+
+
+def warning(what: str, fact: str, remedy: str) -> Finding:
+    """Return that something works, and that it could be better."""
+    return Finding(what=what, verdict=Verdict.WARNING, fact=fact, remedy=remedy)
 
 
 def unknown(what: str, fact: str, remedy: str) -> Finding:

@@ -1,4 +1,4 @@
-"""The operator: is it there, does one lead, may it do its work, can it be measured?"""
+"""The operator: is it there, are its images fixed, does one lead, may it do its work, can it be measured?"""
 
 import time
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from palaestra.client.following import changes
 from palaestra.cluster import ApiError, Forbidden, NotFound
 from palaestra.cluster.api import Object
 from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS
-from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
+from palaestra.doctor.finding import Finding, Site, right, unknown, warning, wrong
 from palaestra.doctor.rights import OPERATOR, Account, allowed
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
@@ -17,6 +17,8 @@ from palaestra.plan.network_policy import OPERATOR_LABEL
 
 LOGS = "`kubectl logs -n {namespace} deploy/{name}` says why"
 TRAINER_IMAGE = "--trainer-image="
+STUB_IMAGE = "--stub-image="
+DIGEST = "@sha256:"
 NOT_ELECTED = "--no-leader-elect"
 PORT_NAME = "metrics"
 RENEWED_WITHIN_S = 20.0  # a Lease lasts 15
@@ -37,6 +39,31 @@ def runs(site: Site) -> Iterator[Finding]:
     ready = deployment.get("status", {}).get("readyReplicas", 0)
     fact = f"{ready} of {wanted} are ready in {site.operator_namespace}, image {image}"
     yield right("operator", fact) if ready else wrong("operator", fact, _logs(site))
+
+
+def images(site: Site) -> Iterator[Finding]:
+    """Tell whether the operator's image, and those of jobs that name none, are named by digest."""
+    deployment = _deployment(site)
+    if deployment is not None:  # that there is none is what `runs` tells
+        yield judged_images(_container(deployment))
+
+
+def judged_images(container: Object) -> Finding:
+    """Return what the images mean that the operator's container names: a tag can come to name another."""
+    release = Images.of_release(version("palaestra"))
+    named = (
+        container["image"],
+        _chosen(container, TRAINER_IMAGE, release.trainer),
+        _chosen(container, STUB_IMAGE, release.stub),
+    )
+    tags = [each for each in named if DIGEST not in each]
+    if not tags:
+        return right("images", "are named by digest")
+    return warning(
+        "images",
+        f"{', '.join(tags)}: a tag may name another image tomorrow, also for the next pod of a job",
+        "set images.<name>.digest of the chart, see docs/install.md",
+    )
 
 
 def leads(site: Site) -> Iterator[Finding]:
@@ -112,9 +139,14 @@ def trainer_image(site: Site) -> str:
         deployment = _deployment(site)
     except Forbidden:
         deployment = None
-    given = _container(deployment).get("command", ()) if deployment else ()
-    chosen = (each.removeprefix(TRAINER_IMAGE) for each in given if each.startswith(TRAINER_IMAGE))
-    return next(chosen, Images.of_release(version("palaestra")).trainer)
+    release = Images.of_release(version("palaestra")).trainer
+    return _chosen(_container(deployment), TRAINER_IMAGE, release) if deployment else release
+
+
+def _chosen(container: Object, option: str, otherwise: str) -> str:
+    """Return the value of an option of the operator's command line."""
+    given = container.get("command", ())
+    return next((each.removeprefix(option) for each in given if each.startswith(option)), otherwise)
 
 
 def _deployment(site: Site) -> Object | None:

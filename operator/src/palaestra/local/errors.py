@@ -6,8 +6,12 @@ LocalError              one line for a person, and the exit code of `palaestra r
 └── StorageFailed       exit 1: the run directory cannot be written (full disk, no permission)
 """
 
+import signal
+
 from palaestra.errors import PalaestraError
 from palaestra_sim.protocol.status import ExitCode
+
+KILLED = 128 + signal.SIGINT  # the exit code after a second Ctrl-C
 
 
 class LocalError(PalaestraError):

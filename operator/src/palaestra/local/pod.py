@@ -7,26 +7,34 @@ first, so that a simulator can still be used while the last checkpoint is writte
 """
 
 import asyncio
-from collections.abc import Coroutine, Mapping
+import time
+from collections.abc import Coroutine, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 from palaestra.local.container import BackOff, Running
 from palaestra.local.errors import StartFailed
-from palaestra.local.output import Log
+from palaestra.local.output import Log, Show
 from palaestra.local.process import Watchdog
 from palaestra.local.spec import Container, Pod
 
+LONG_S = 10.0  # for a container to come up; importing PyTorch takes several seconds
 TRIES = 3  # lives of a sidecar that others wait for, before the pod is given up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kubelet:
-    """What this machine adds to a pod: where output goes, and how patient it is."""
+    """What this machine adds to a pod: where output goes, and how patient it is.
+
+    `show` is called with a line for each container that does not come up within `long_s`.
+    """
 
     logs: Mapping[str, Log]  # by container
     backoff: BackOff = field(default_factory=BackOff)
     start_deadline_s: float = 60.0
+    show: Show | None = None
+    long_s: float = LONG_S
     terminal: int | None = None  # of a person, for the main container to draw on
 
 
@@ -67,7 +75,9 @@ class RunningPod:
         self._watchdog = Watchdog(self._pod.uid)
         try:
             for spec in self._pod.init:
-                await self._unless_stopped(self._bring_up(self._add(spec)))
+                running = self._add(spec)
+                with self._reported(running):
+                    await self._unless_stopped(self._bring_up(running))
             return await self._run_main()
         except _Stopped:
             return None
@@ -107,11 +117,33 @@ class RunningPod:
         main = self._add(self._pod.main)
         life = asyncio.create_task(main.run_once(self._kubelet.terminal))
         stop = asyncio.create_task(self._stop.wait())
-        await asyncio.wait({life, stop}, return_when=asyncio.FIRST_COMPLETED)
+        with self._reported(main):
+            await asyncio.wait({life, stop}, return_when=asyncio.FIRST_COMPLETED)
         if not life.done():
             await main.stop(self._grace_left_s())
         stop.cancel()
         return await life
+
+    @contextmanager
+    def _reported(self, running: Running) -> Iterator[None]:
+        """Show that a container has not come up, and since when, if the block takes long.
+
+        A main container is up once it has written a line: it reports itself what it waits for.
+        """
+        since = time.strftime("%H:%M:%S")
+        main = running.spec is self._pod.main
+
+        def report() -> None:
+            if self._kubelet.show is None or (main and running.log.last_lines):
+                return
+            fact = f"{running.spec.name} has written nothing" if main else f"waits for {running.spec.name}"
+            self._kubelet.show(f"{fact} since {since}; see {running.log.path}")
+
+        timer = asyncio.get_running_loop().call_later(self._kubelet.long_s, report)
+        try:
+            yield
+        finally:
+            timer.cancel()
 
     async def _unless_stopped(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)

@@ -11,7 +11,8 @@ from pathlib import Path
 from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import Refused
 from palaestra.local.process import program_path
-from palaestra_sim.world import RunIdentity, WorldError, generate
+from palaestra_sim import world
+from palaestra_sim.errors import WorldError
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
 INSTALLATION = "this installation"
@@ -72,7 +73,7 @@ def worlds_are_right(request: Request) -> Iterator[str]:
     for index, group in enumerate(request.job.spec.simulators):
         if group.world.file is not None:
             field = f"spec.simulators[{index}].world.file"
-            yield from (f"{field}: {problem}" for problem in _problems(Path(group.world.file), group))
+            yield from (f"{field}: {problem}" for problem in _problems(Path(group.world.file)))
 
 
 def space_is_left(request: Request) -> Iterator[str]:
@@ -106,10 +107,9 @@ def _simulator_program(group: SimulatorGroup) -> str:
             return group.command[0]
 
 
-def _problems(path: Path, group: SimulatorGroup) -> Iterator[str]:
-    identity = RunIdentity(job="check", replica=0, group=group.name, index=0)
+def _problems(path: Path) -> Iterator[str]:
     try:
-        generate(path.read_bytes(), identity, clock=False, name=str(path), relative_addresses=True)
+        world.check(path.read_bytes(), str(path), relative_addresses=True)
     except OSError as error:
         yield f"{path}: {error.strerror}; name a world of this machine"
     except WorldError as error:

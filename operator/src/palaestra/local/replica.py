@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import json
-import signal
 import uuid
 from collections.abc import Container
 from dataclasses import dataclass, field, replace
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from palaestra.local.container import BackOff
+from palaestra.local.errors import KILLED
 from palaestra.local.interrupt import Interrupt
 from palaestra.local.jobs import Tries, verdict
 from palaestra.local.outcome import Outcome
@@ -21,7 +21,6 @@ from palaestra.local.volumes import mount
 from palaestra.plan import ReplicaPlan
 from palaestra_sim.protocol.status import ExitCode
 
-KILLED = 128 + signal.SIGINT
 FAILED = 1
 DEADLINE_EXCEEDED = "DeadlineExceeded"
 
@@ -82,7 +81,12 @@ async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt)
     mount(pod, template["spec"]["volumes"], planned.config_map)
     _termination(setting.directory).unlink(missing_ok=True)
     with contextlib.ExitStack() as logs:
-        kubelet = Kubelet(logs=_logs(pod, setting, logs), backoff=setting.backoff, terminal=setting.terminal)
+        kubelet = Kubelet(
+            logs=_logs(pod, setting, logs),
+            backoff=setting.backoff,
+            show=setting.show,
+            terminal=setting.terminal,
+        )
         running = RunningPod(pod, kubelet)
         interrupt.pass_to(running)
         return await running.run()

@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from palaestra.api import TrainingJob
-from palaestra.api.loading import as_data
 from palaestra.local import preflight, rundir
-from palaestra.local.errors import Refused
+from palaestra.local.errors import KILLED, Refused
 from palaestra.local.outcome import Outcome, summary
 from palaestra.local.output import say
 from palaestra.local.ports import HeldPorts
-from palaestra.local.replica import DEADLINE_EXCEEDED, KILLED, Setting, meaning, run_replica
+from palaestra.local.replica import DEADLINE_EXCEEDED, Setting, meaning, run_replica
 from palaestra.local.spec import read_pod
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
 from palaestra.plan.replica import TRAINER
@@ -60,9 +59,9 @@ def run(job: TrainingJob, options: Options) -> int:
 
 def check(job: TrainingJob, directory: Path, chosen: range, options: Options) -> None:
     """Find what can be known to be wrong before anything is written; raises as `run` does."""
-    planned = plan(job, layout(directory, options, Ports()))
-    for replica in chosen:
-        read_pod(planned.replicas[replica].job["spec"]["template"], uid="")
+    planned = plan(job, layout(directory, options, Ports()), mounted=dict.fromkeys(chosen, ()))
+    for each in planned.replicas.values():
+        read_pod(each.job["spec"]["template"], uid="")
     preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
 
 
@@ -99,7 +98,7 @@ def _chosen(job: TrainingJob, replica: int | None) -> range:
 
 
 def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Outcome:
-    record = {field: value for field, value in as_data(job).items() if field != "status"}
+    record = rundir.record_of(job)
     with rundir.locked(path), HeldPorts() as held:
         ports = chosen_ports(held, job, options)
         if options.fresh and (aside := rundir.set_aside(path)):
@@ -111,7 +110,7 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Ou
             _tell(before, path)
             return before
         rundir.prepare(path, record)
-        planned = plan(job, layout(path.parent, options, ports)).replicas[replica]
+        planned = plan(job, layout(path.parent, options, ports), mounted={replica: ()}).replicas[replica]
         say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")
         say(f"ROS_MASTER_URI=http://127.0.0.1:{ports.ros_master}")
         return _trained(planned, path, options, job.spec.active_deadline_seconds)

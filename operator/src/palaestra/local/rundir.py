@@ -21,27 +21,33 @@ from typing import Any
 
 import yaml
 
+from palaestra.api import TrainingJob, as_data, validate
+from palaestra.api.fields import MAY_CHANGE
+from palaestra.api.paths import shown
+from palaestra.api.tree import fields_of, walk
+from palaestra.errors import SpecErrors
 from palaestra.local.errors import Refused
 from palaestra.local.files import make_folder, storage, write
 
 RECORD = "job.yaml"
-# What may differ between two runs of one directory: it changes when training ends or stops, or which
-# replicas there are, never what one replica learns.
-MUTABLE = frozenset(
-    f"spec.{field}"
-    for field in (
-        "activeDeadlineSeconds",
-        "backoffLimit",
-        "replicas",
-        "simulators[].startDeadlineSeconds",
-        "stallDeadlineSeconds",
-        "suspend",
-        "ttlSecondsAfterFinished",
-    )
-)
-_ANY = re.compile(r"\[[0-9]+\]")
+_INDEX = re.compile(r"\[[0-9]+\]")
 
 Record = Mapping[str, Any]
+
+
+def _mutable() -> Iterator[str]:
+    """Yield what may differ between two runs of one directory.
+
+    It changes when training ends or stops, or which replicas there are, never what one replica learns.
+    """
+    yield from ("spec.backoffLimit", "spec.replicas")
+    for path, model in walk(TrainingJob):
+        for name, field in fields_of(model).items():
+            if isinstance(field.json_schema_extra, dict) and MAY_CHANGE in field.json_schema_extra:
+                yield shown((*path, name))
+
+
+MUTABLE = frozenset(_mutable())
 
 
 def job_directory(runs: Path, job: str) -> Path:
@@ -83,6 +89,11 @@ def locked(directory: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
+def record_of(job: TrainingJob) -> dict[str, Any]:
+    """Return what is written down of a job: all that was asked for, defaults included."""
+    return {field: value for field, value in as_data(job).items() if field != "status"}
+
+
 def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare what is asked for with what the directory's run was started with.
 
@@ -93,7 +104,7 @@ def refuse_another_job(directory: Path, record: Record) -> None:
         before = yaml.safe_load((directory / RECORD).read_bytes())
     except FileNotFoundError:
         return
-    if changes := tuple(changed_fields(before, record)):
+    if changes := tuple(changed_fields(_completed(before), record)):
         raise Refused(
             "\n".join(changes) + f"\n{directory}: holds a run of the job as it was; "
             "change the file back, give the job another name, or begin anew with --fresh"
@@ -104,8 +115,20 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
     """Yield `field: was x, is y` for every field that differs and may not."""
     old, new = dict(_flat(before)), dict(_flat(now))
     for field in sorted(old.keys() | new.keys()):
-        if old.get(field) != new.get(field) and _ANY.sub("[]", field) not in MUTABLE:
+        if old.get(field) != new.get(field) and _INDEX.sub("", field) not in MUTABLE:
             yield f"{field}: was {_short(old.get(field))}, is {_short(new.get(field))}"
+
+
+def _completed(record: Any) -> Record:
+    """Return the record of an older release with the fields that are new since, at their defaults.
+
+    What was not asked for then is the same job now. A record that this release cannot read, as that of
+    a newer one, is compared as it stands.
+    """
+    try:
+        return record_of(validate(record))
+    except SpecErrors:
+        return record if isinstance(record, Mapping) else {}
 
 
 def prepare(directory: Path, record: Record) -> None:

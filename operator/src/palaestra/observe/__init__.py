@@ -3,13 +3,15 @@
 Pure, and total: whatever an API server or a pod answers, there is an `Observed` and no exception. What
 cannot be read is as if it were not there.
 
-    objects = Objects(jobs=..., pods=..., sources={each: lookup(each) for each in references(job)}, ...)
-    observed = observe(job, objects)
+    observed = observe(job, Objects(jobs=..., pods=..., ...))
+    if not complete(job, observed):  # of palaestra.decide
+        observed = replace(observed, sources={each: lookup(each) for each in references(job)}, kueue=...)
 """
 
-from palaestra.observe.observing import observe
+from palaestra.observe.observing import last_refusal, observe
+from palaestra.observe.shortening import Lacking, lacking
 from palaestra.observe.sources import references
-from palaestra.observe.trim import trimmed
+from palaestra.observe.trim import trimmed, whole
 from palaestra.observe.views import (
     ContainerKind,
     ContainerView,
@@ -23,6 +25,7 @@ from palaestra.observe.views import (
     PodView,
     Polled,
     Raw,
+    Replaced,
     ReplicaObserved,
     Source,
     SourceKind,
@@ -35,16 +38,21 @@ __all__ = [
     "Exit",
     "JobEnd",
     "JobView",
+    "Lacking",
     "Objects",
     "Observed",
     "Obstacle",
     "PodView",
     "Polled",
     "Raw",
+    "Replaced",
     "ReplicaObserved",
     "Source",
     "SourceKind",
+    "lacking",
+    "last_refusal",
     "observe",
     "references",
     "trimmed",
+    "whole",
 ]

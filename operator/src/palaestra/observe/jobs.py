@@ -1,10 +1,16 @@
 """The batch/v1 Job of a replica, as the API server shows it."""
 
-from palaestra.observe.reading import condition, count, holds, part, parts, text, time
-from palaestra.observe.views import JobEnd, JobView, Raw
-from palaestra.plan.job import QUEUE_LABEL
+import re
 
+from palaestra.observe.reading import condition, count, holds, part, parts, text, time
+from palaestra.observe.views import JobEnd, JobView, Raw, Replaced
+from palaestra.plan.job import QUEUE_LABEL, SUSPEND_SET
+
+# What others may change in the spec of a Job of ours, besides `suspend`.
+SETTINGS = ("parallelism", "backoffLimit", "activeDeadlineSeconds", "ttlSecondsAfterFinished")
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
+REPLACED = "palaestra.dev/replaced"  # annotation of a Job: "<times> <uid of the pod> <reason>: <message>"
+_REPLACED = re.compile(r"(\d{1,9}) (\S{1,253}) (\w{1,60}): (.{0,1024})")
 
 # The outcome is certain before the last pod has ended: a pod on a lost node never does.
 _ENDS = (
@@ -25,15 +31,18 @@ def job_view(raw: Raw) -> JobView:
     return JobView(
         name=text(metadata, "name", 253),
         uid=text(metadata, "uid", 253),
+        version=text(metadata, "resourceVersion", 253),
         suspended=part(raw, "spec").get("suspend") is True,
+        suspend_set=_suspend_set(part(metadata, "annotations")),
         paused=turned.get("True"),
         resumed=turned.get("False"),
         stopped=_stopped(part(metadata, "annotations")),
+        replaced=_replaced(part(metadata, "annotations")),
         failures=_failures(status),
         end=end,
         end_reason=text(ending, "reason", 60),
         end_message=text(ending, "message"),
-        ended=time(ending, "lastTransitionTime"),
+        settings={name: count(part(raw, "spec"), name) for name in SETTINGS if name in part(raw, "spec")},
         deleting="deletionTimestamp" in metadata,
         volumes=_volumes(raw),
         queue=text(part(metadata, "labels"), QUEUE_LABEL, 63),
@@ -45,6 +54,18 @@ def _stopped(annotations: dict[str, object]) -> tuple[str, str] | None:
         return None
     reason, _, message = text(annotations, STOPPED, 1100).partition(": ")
     return reason, message
+
+
+def _suspend_set(annotations: dict[str, object]) -> bool | None:
+    return {"true": True, "false": False}.get(text(annotations, SUSPEND_SET, 10))
+
+
+def _replaced(annotations: dict[str, object]) -> Replaced | None:
+    """Return the mark of the pods that were replaced; None: there is none that could be ours."""
+    mark = _REPLACED.fullmatch(text(annotations, REPLACED, 1400))
+    if mark is None:
+        return None
+    return Replaced(times=int(mark[1]), pod=mark[2], reason=mark[3], message=mark[4])
 
 
 def _failures(status: dict[str, object]) -> int:

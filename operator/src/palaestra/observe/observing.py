@@ -1,13 +1,15 @@
 """Sort what was read by replica, and make values of it."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from datetime import datetime
+from typing import Any
 
 from palaestra.api import TrainingJob
 from palaestra.api.lines import one_line
 from palaestra.observe.jobs import job_view
+from palaestra.observe.managers import MOST_NAME
 from palaestra.observe.pods import BEGINNING, pod_view
-from palaestra.observe.reading import MOST_TEXT, owners, part, text, time
+from palaestra.observe.reading import MOST_TEXT, count, owners, part, text, time
 from palaestra.observe.views import (
     CreateFailure,
     JobView,
@@ -36,10 +38,19 @@ def observe(job: TrainingJob, objects: Objects) -> Observed:
                 ("NetworkPolicy", objects.policies),
             )
             for raw in group
+            if kind == "PersistentVolumeClaim" or job.metadata.uid in owners(raw)
         ),
-        sources=dict(objects.sources),
-        kueue=objects.kueue,
+        edited=tuple(_edited(job, objects)),
     )
+
+
+def _edited(job: TrainingJob, objects: Objects) -> Iterator[tuple[str, int]]:
+    """Yield name and generation of the job's policies that were changed: the API server begins with 1."""
+    for raw in objects.policies:
+        metadata = part(raw, "metadata")
+        generation = count(metadata, "generation")
+        if generation > 1 and job.metadata.uid in owners(raw):
+            yield text(metadata, "name", 253), generation
 
 
 def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
@@ -54,11 +65,14 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
         obstacle=next((_obstacle(raw, name) for raw in named if job.metadata.uid not in owners(raw)), None),
         pods=pods,
         in_the_way=tuple(each.name for each in others if not each.ended),
+        former=tuple(_former(job, index, objects)),
         polled=objects.polled.get(newest.uid) if newest and not newest.ended else None,
         terminations={each.uid: word for each in pods if (word := _last_word(each)) is not None},
         refused=_refused(ours, newest, objects) if ours else None,
         denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
         unmounted=_unmounted(newest, objects) if newest else "",
+        unasked=not objects.unasked.isdisjoint({ours.uid if ours else "", newest.uid if newest else ""}),
+        switcher=one_line(objects.switchers.get(ours.uid) or "", MOST_NAME) if ours else "",
     )
 
 
@@ -88,6 +102,22 @@ def _pods(
     return tuple(in_order), tuple(others.values())
 
 
+def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]:
+    """Yield the pods of an earlier TrainingJob of this name that may still hold the claim of a replica.
+
+    The earlier job's own claims have its uid in their names, so only a claim that both name is shared.
+    """
+    shared = job.spec.storage.existing_claim
+    if shared is None:
+        return
+    for raw in objects.pods:
+        labels = part(raw, "metadata", "labels")
+        if labels.get(UID_LABEL) != job.metadata.uid and labels.get(REPLICA_LABEL) == str(index):
+            view = pod_view(raw)
+            if shared in view.claims and not view.ended:
+                yield view
+
+
 def _last_word(pod: PodView) -> Termination | None:
     """Return the trainer's last word; None for the end of a log, or whatever else a pod may write."""
     trainer = pod.trainer
@@ -112,6 +142,17 @@ def _unmounted(newest: PodView, objects: Objects) -> str:
     waits = newest.phase == "Pending" and not newest.mounted
     last = _last_event(objects, newest.uid, UNMOUNTED) if waits else None
     return text(last, "message")
+
+
+def last_refusal(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
+    """Return the last event that says what the object with this uid lacks, as far as it is read here."""
+    found = (raw for raw in events if text(raw, "reason") in {"FailedCreate", *UNMOUNTED})
+    last = max(found, key=_when, default=None)
+    if last is None:
+        return None
+    at = _when(last).isoformat()
+    words = {"reason": text(last, "reason"), "message": text(last, "message"), "lastTimestamp": at}
+    return {"involvedObject": {"uid": uid}, **words}
 
 
 def _last_event(objects: Objects, uid: str, reasons: Collection[str]) -> Raw | None:

@@ -5,10 +5,12 @@ from typing import Any
 
 from palaestra.observe.reading import condition, count, holds, part, parts, text, time
 from palaestra.observe.views import ContainerKind, ContainerView, Exit, PodView, Raw
+from palaestra.plan.pod import GRACE_S
 
 MOST_MESSAGE = 4096  # of a termination message: Kubernetes cuts it there
 BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # of what has no readable time
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
+GRACE = "deletionGracePeriodSeconds"
 SIDECARS = ("sim-", "ros-master")  # names of the containers that have to be restarted
 
 
@@ -20,6 +22,7 @@ def pod_view(raw: Raw) -> PodView:
         name=text(metadata, "name", 253),
         uid=text(metadata, "uid", 253),
         created=time(metadata, "creationTimestamp") or BEGINNING,
+        version=text(metadata, "resourceVersion", 253),
         phase=text(status, "phase", 20) or "Pending",
         started=time(status, "startTime"),
         reason=text(status, "reason", 60),
@@ -30,7 +33,9 @@ def pod_view(raw: Raw) -> PodView:
         unschedulable=text(scheduled, "message") if _unschedulable(scheduled) else "",
         disruption=_disruption(raw),
         gone_by=time(metadata, "deletionTimestamp"),
+        grace_s=count(metadata, GRACE) if GRACE in metadata else GRACE_S,
         containers=_containers(raw),
+        claims=claims(part(raw, "spec")),
     )
 
 
@@ -41,6 +46,14 @@ def dropped(view: PodView) -> tuple[str, ...]:
         for each in view.containers
         if each.kind is ContainerKind.INIT and each.name.startswith(SIDECARS)
     )
+
+
+def claims(spec: dict[str, Any]) -> frozenset[str]:
+    """Return the names of the PersistentVolumeClaims that a pod's spec mounts."""
+    names = (
+        text(part(volume, "persistentVolumeClaim"), "claimName", 253) for volume in parts(spec, "volumes")
+    )
+    return frozenset(name for name in names if name)
 
 
 def _unschedulable(scheduled: dict[str, Any]) -> bool:

@@ -4,25 +4,32 @@ Most of an object is its template and who wrote which field; two hundred jobs wi
 fit into little memory. Observing what was trimmed shows the same as observing the whole.
 """
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
+from palaestra.observe.jobs import SETTINGS
+from palaestra.observe.shortening import shortened
+
 _METADATA = (
     "name", "namespace", "uid", "resourceVersion", "generation", "creationTimestamp",
-    "deletionTimestamp", "labels", "ownerReferences",
+    "deletionTimestamp", "deletionGracePeriodSeconds", "labels", "ownerReferences",
 )  # fmt: skip
 _CONTAINER = ("name", "image", "restartPolicy", "resources")
 _POD_STATUS = (
     "phase", "reason", "message", "startTime", "podIP", "conditions",
     "initContainerStatuses", "containerStatuses",
 )  # fmt: skip
-_ANNOTATIONS = ("palaestra.dev/stopped",)
+_ANNOTATIONS = ("palaestra.dev/stopped", "palaestra.dev/replaced", "palaestra.dev/suspend-set")
+
+SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: the bytes of the whole without its status
+SMALL = 65_536  # bytes; one that is not larger is kept without it
 
 
 def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a Job, pod, ConfigMap, claim, NetworkPolicy or event as far as it is read.
+    """Return an object as far as it is read while nothing of it is planned.
 
-    Any other kind is returned whole, without what is told of its writers.
+    Kinds that nobody here reads are returned whole, without what is told of their writers.
     """
     kind = raw.get("kind")
     kept = {name: raw[name] for name in ("apiVersion", "kind") if name in raw}
@@ -33,7 +40,23 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
         return kept | {"spec": _pod_spec(raw), "status": _some(raw.get("status"), _POD_STATUS)}
     if kind in {"ConfigMap", "PersistentVolumeClaim", "NetworkPolicy"}:
         return kept
-    return {**raw, "metadata": kept["metadata"]}
+    return _measured(raw, shortened(whole(raw))) if kind == "TrainingJob" else whole(raw)
+
+
+def whole(raw: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an object with all that it holds, without what is told of its writers."""
+    return {**raw, "metadata": _metadata(raw)}
+
+
+def _measured(job: Mapping[str, Any], kept: dict[str, Any]) -> dict[str, Any]:
+    """Return what is kept of a job; of a large one with its size, everybody's annotations included."""
+    metadata = job.get("metadata")
+    given = {**metadata, "managedFields": None} if isinstance(metadata, Mapping) else None
+    size = len(json.dumps({**job, "metadata": given, "status": None}))
+    if size <= SMALL:
+        return kept
+    annotations = {**kept["metadata"].get("annotations", {}), SIZE: str(size)}
+    return {**kept, "metadata": {**kept["metadata"], "annotations": annotations}}
 
 
 def _metadata(raw: Mapping[str, Any]) -> dict[str, Any]:
@@ -45,7 +68,7 @@ def _metadata(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 def _job_spec(raw: Mapping[str, Any]) -> dict[str, Any]:
     spec = raw.get("spec")
-    kept = _some(spec, ("suspend",))
+    kept = _some(spec, ("suspend", *SETTINGS))
     template = spec.get("template") if isinstance(spec, Mapping) else None
     pod = template.get("spec") if isinstance(template, Mapping) else None
     volumes = pod.get("volumes") if isinstance(pod, Mapping) else None
@@ -55,6 +78,10 @@ def _job_spec(raw: Mapping[str, Any]) -> dict[str, Any]:
 def _pod_spec(raw: Mapping[str, Any]) -> dict[str, Any]:
     spec = raw.get("spec")
     kept = _some(spec, ("nodeName",))
+    volumes = spec.get("volumes") if isinstance(spec, Mapping) else None
+    if isinstance(volumes, list):
+        claims = [_some(each, ("persistentVolumeClaim",)) for each in volumes]
+        kept["volumes"] = [each for each in claims if each]
     for field in ("initContainers", "containers"):
         items = spec.get(field) if isinstance(spec, Mapping) else None
         kept[field] = [_some(each, _CONTAINER) for each in items] if isinstance(items, list) else []

@@ -10,6 +10,7 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any
 
+from palaestra.plan.pod import GRACE_S
 from palaestra_sim.protocol.status import Termination, TrainerStatus
 
 Raw = Mapping[str, Any]  # an object as its JSON, of which nothing is believed
@@ -37,10 +38,10 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polled:
-    """What a trainer answered, and when (by this machine's clock, with a time zone)."""
+    """What a trainer answered, and when on this process's monotonic clock."""
 
     status: TrainerStatus
-    at: datetime
+    at_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,12 +52,12 @@ class Objects:
         jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
             a Job that was found to have one of our names belongs among `jobs`, whoever owns it.
         events: FailedCreate events about those Jobs, and warnings about pods that wait for volumes.
+        unasked: uids of Jobs and pods about which no event was asked for, though they lack something.
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
-        sources: what `references(job)` names; None: there is no such object. Of a Secret the
-            metadata is enough.
         denied: what the API server said when it last refused an object of a replica; None: an object of
             the whole job. Absent: nothing is refused.
-        kueue: whether the cluster has Kueue.
+        switchers: by a Job's uid the field manager that set its `spec.suspend`, where it is not as the
+            operator set it.
     """
 
     jobs: Sequence[Raw] = ()
@@ -65,10 +66,10 @@ class Objects:
     config_maps: Sequence[Raw] = ()
     policies: Sequence[Raw] = ()
     events: Sequence[Raw] = ()
+    unasked: frozenset[str] = frozenset()
     polled: Mapping[str, Polled] = field(default_factory=dict)
-    sources: Mapping[Source, Raw | None] = field(default_factory=dict)
     denied: Mapping[int | None, str] = field(default_factory=dict)
-    kueue: bool = False
+    switchers: Mapping[str, str] = field(default_factory=dict)
 
 
 class ContainerKind(StrEnum):
@@ -113,12 +114,18 @@ class ContainerView:
     restarts: int = 0
     memory_limit: str = ""
 
+    @property
+    def ended_run(self) -> int:
+        """Return which run of the container `exit` is the end of, from 0."""
+        return self.restarts if self.running_since is None else max(self.restarts - 1, 0)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PodView:
     """One pod of a replica.
 
     Attributes:
+        version: its resourceVersion.
         started: when a kubelet took it.
         phase: Pending, Running, Succeeded, Failed or Unknown.
         reason, message: the pod's own, as of an eviction; mostly "".
@@ -126,13 +133,17 @@ class PodView:
         mounted: its volumes are there: it has begun to pull images, or is past that.
         unschedulable: the scheduler's words; "": it was scheduled.
         disruption: why the cluster took it (condition DisruptionTarget); "": it did not.
-        gone_by: when it was to be gone, its grace period included; None: nobody deleted it.
+        gone_by: when it was to be gone, its grace period included; None: nobody deleted it. A time of the
+            API server, so it is compared with no clock of ours.
+        grace_s: seconds between its deletion and `gone_by`.
         containers: in the order in which they start, the trainer last.
+        claims: names of the PersistentVolumeClaims that it mounts.
     """
 
     name: str
     uid: str
     created: datetime
+    version: str = ""
     phase: str = "Pending"
     started: datetime | None = None
     reason: str = ""
@@ -143,7 +154,9 @@ class PodView:
     unschedulable: str = ""
     disruption: str = ""
     gone_by: datetime | None = None
+    grace_s: int = GRACE_S
     containers: tuple[ContainerView, ...] = ()
+    claims: frozenset[str] = frozenset()
 
     @property
     def ended(self) -> bool:
@@ -169,16 +182,37 @@ class JobEnd(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Replaced:
+    """The mark on a Job whose pod the operator replaces.
+
+    Attributes:
+        times: pods that were replaced so, this one among them.
+        pod: uid of the last one.
+        reason, message: why.
+    """
+
+    times: int
+    pod: str
+    reason: str
+    message: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JobView:
     """The batch/v1 Job of a replica.
 
     Attributes:
+        version: its resourceVersion.
         suspended: as its spec says.
+        suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: an earlier
+            release made the Job, or the Job has a queue.
         paused: since when it is, by its controller's word; None: it is not.
         resumed: when it last was, by its controller's word; None: it never was suspended or still is.
         stopped: reason and message of our stop mark; None: it has none.
+        replaced: our mark of the pods that we replaced; None: it has none.
         failures: pods that failed and count against backoffLimit.
-        end, end_reason, end_message, ended: what its conditions say; None and "" while it goes on.
+        end, end_reason, end_message: what its conditions say; None and "" while it goes on.
+        settings: fields of its spec that others may change; one that it lacks is absent.
         deleting: somebody deleted it.
         volumes: names of the ConfigMaps and claims that its pods mount.
         queue: the queue that Kueue knows it by, from the spec or a namespace's default; "": it has none.
@@ -186,15 +220,18 @@ class JobView:
 
     name: str
     uid: str
+    version: str = ""
     suspended: bool = False
+    suspend_set: bool | None = None
     paused: datetime | None = None
     resumed: datetime | None = None
     stopped: tuple[str, str] | None = None
+    replaced: Replaced | None = None
     failures: int = 0
     end: JobEnd | None = None
     end_reason: str = ""
     end_message: str = ""
-    ended: datetime | None = None
+    settings: Mapping[str, int] = field(default_factory=dict)
     deleting: bool = False
     volumes: frozenset[str] = frozenset()
     queue: str = ""
@@ -224,12 +261,17 @@ class ReplicaObserved:
         pods: those of its Job, and the one that the status names; oldest first.
         in_the_way: names of all other pods that say they are the replica's and have not ended. What they
             tell is not believed; they may write to its volume all the same.
+        former: pods of an earlier TrainingJob of the same name that have not ended and mount the existing
+            claim that this replica is to mount.
         polled: the answer of the newest pod's trainer; None: unknown.
         terminations: last words of trainers by pod UID, those that are of our protocol.
         refused: why no pod could be made, if that is newer than the newest pod.
         denied: why an object of the replica could not be made; "": it could.
         unmounted: why the newest pod's volumes are not there, in the cluster's words; "": they are, or
             nobody said so.
+        unasked: its pod, or the pod's volumes, are not there, and nobody was asked why.
+        switcher: the field manager that set the Job's `spec.suspend`, where it is not as the operator set it;
+            "": it is, or the manager is unknown.
     """
 
     index: int
@@ -237,11 +279,14 @@ class ReplicaObserved:
     obstacle: Obstacle | None = None
     pods: tuple[PodView, ...] = ()
     in_the_way: tuple[str, ...] = ()
+    former: tuple[PodView, ...] = ()
     polled: Polled | None = None
     terminations: Mapping[str, Termination] = field(default_factory=dict)
     refused: CreateFailure | None = None
     denied: str = ""
     unmounted: str = ""
+    unasked: bool = False
+    switcher: str = ""
 
     @property
     def pod(self) -> PodView | None:
@@ -258,13 +303,20 @@ class ReplicaObserved:
 class Observed:
     """What the cluster shows of a TrainingJob.
 
+    `sources` and `kueue` are asked for only while something of the job is missing, which `observe` shows:
+    the operator adds them.
+
     Attributes:
         replicas: one for each replica of the spec, by index.
         present: kind and name of the ConfigMaps, claims and NetworkPolicies that there are.
-        sources: as in `Objects`.
+        edited: name and generation of each NetworkPolicy whose spec was changed since it was made.
+        sources: what `references(job)` names; None: there is no such object. Of a Secret the
+            metadata is enough.
+        kueue: whether the cluster has Kueue.
     """
 
     replicas: tuple[ReplicaObserved, ...]
     present: frozenset[tuple[str, str]] = frozenset()
+    edited: tuple[tuple[str, int], ...] = ()
     sources: Mapping[Source, Raw | None] = field(default_factory=dict)
     kueue: bool = False

@@ -4,6 +4,8 @@
     reading      what the caches hold of one TrainingJob
     sources      what a job refers to, fetched on demand
     poller       the trainers' own word, over the pod network
+    schedule     which trainer is asked next, so that silent pods cost nobody else a turn
+    trainers     which pods are asked
     writing      every write to the cluster; none while another operator leads
     workers      threads that take keys from the queue
     families     every metric by name, as data

@@ -1,4 +1,4 @@
-"""Do what was decided: create what is missing, stop, suspend, resume, delete.
+"""Do what was decided: create what is missing, stop, replace, suspend, resume, delete.
 
 Names make it safe to do anything twice: what is there already is refused by the API server. One action
 that fails keeps no other replica from its own.
@@ -10,25 +10,19 @@ from typing import Any
 
 import structlog
 
-from palaestra.cluster import AlreadyExists, Api, ApiError, NotFound
-from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, PODS, TRAINING_JOBS, of
-from palaestra.decide import Action, Create, Delete, SetSuspend, Stop
-from palaestra.errors import PalaestraError
+from palaestra.cluster import AlreadyExists, Api, ApiError, Conflict, NotFound
+from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, TRAINING_JOBS, of
+from palaestra.decide import Action, Create, Delete, Discard, Replace, SetSuspend, Stop
 from palaestra.observe.reading import owners
-from palaestra.operator.caches import Caches
+from palaestra.operator.confirming import Outdated, confirm
 from palaestra.operator.denials import Denials, Denied
 from palaestra.operator.poller import Key
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.writing import Writer
-from palaestra.plan.replica import JOB_LABEL, REPLICA_LABEL
 
 log = structlog.get_logger(__name__)
 
 Object = Mapping[str, Any]
-
-
-class Outdated(PalaestraError):
-    """The cache was behind the cluster, so nothing was created; look again when it has caught up."""
 
 
 class Acting:
@@ -37,17 +31,13 @@ class Acting:
     Args:
         api: to read what no cache may be believed about.
         writer: to write.
-        caches: whose Jobs are patched.
         strangers: told of Jobs whose names are taken.
         denials: told what could not be created.
     """
 
-    def __init__(
-        self, api: Api, writer: Writer, caches: Caches, strangers: Strangers, denials: Denials
-    ) -> None:
+    def __init__(self, api: Api, writer: Writer, strangers: Strangers, denials: Denials) -> None:
         self._api = api
         self._writer = writer
-        self._caches = caches
         self._strangers = strangers
         self._denials = denials
 
@@ -58,12 +48,13 @@ class Acting:
         was about the whole job: no pod runs without its network policy.
 
         Raises:
-            Outdated: something is to be created, and the job is not as it was when this was decided.
+            Outdated: the cluster is not as it was when this was decided; some of it may be done.
             NotLeading: another operator may lead.
         """
-        self._confirm(raw, [each for each in actions if isinstance(each, Create)])
+        confirm(self._api, raw, actions)
         refused: dict[int | None, ApiError] = {}
         denied: dict[int | None, ApiError] = {}
+        changed: Conflict | NotFound | None = None
         for action in actions:
             replica = None if isinstance(action, Delete) else action.replica
             if replica in refused or (None in refused and isinstance(action, Create)):
@@ -72,27 +63,14 @@ class Acting:
                 self._do(raw, action)
             except ApiError as error:
                 refused[replica] = error
-                if isinstance(action, Create):
+                if isinstance(error, (Conflict, NotFound)) and not isinstance(action, Create):
+                    changed = error
+                elif isinstance(action, Create | Replace):
                     denied[replica] = error
         self._denials.learn((raw["metadata"]["namespace"], raw["metadata"]["name"]), denied)
+        if changed is not None:
+            raise Outdated(str(changed)) from changed
         return refused
-
-    def _confirm(self, raw: Object, creations: list[Create]) -> None:
-        """See that the cluster is as the caches say, before anything is created.
-
-        A replica that has ended is never trained again, and none ever has two pods.
-        """
-        if not creations:
-            return
-        namespace, name = raw["metadata"]["namespace"], raw["metadata"]["name"]
-        try:
-            found = self._api.get(TRAINING_JOBS, namespace, name)["metadata"]["resourceVersion"]
-        except NotFound:
-            found = None
-        begun = {str(each.replica) for each in creations if of(each.object) == JOBS}
-        pods = self._api.list(PODS, namespace, labels=f"{JOB_LABEL}={name}") if begun else []
-        if found != raw["metadata"]["resourceVersion"] or any(_occupies(pod, begun) for pod in pods):
-            raise Outdated("the caches are behind the cluster; nothing was created")
 
     def _do(self, raw: Object, action: Action) -> None:
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
@@ -100,13 +78,20 @@ class Acting:
             case Create():
                 self._create(key, action.object)
             case Stop():
-                self._patch(key, action.job, action.patch)
+                self._patch(key, action)
                 log.info("stopped", job=key, name=action.job, reason=action.reason)
+            case Replace():
+                self._replace(key, action)
             case SetSuspend():
-                self._patch(key, action.job, action.patch)
+                self._patch(key, action)
                 log.info("suspended" if action.suspend else "resumed", job=key, name=action.job)
+            case Discard(job=name, basis=basis):
+                self._writer.delete(JOBS, key[0], name, uid=basis.uid, version=basis.version)
+                log.info("deleted", job=key, kind=JOBS.kind, name=name)
             case Delete():
-                self._delete(key, action)
+                version = raw["metadata"]["resourceVersion"]
+                self._writer.delete(TRAINING_JOBS, *key, uid=action.uid, version=version)
+                log.info("deleted", job=key, kind=TRAINING_JOBS.kind, name=key[1])
 
     def _create(self, key: Key, obj: Object) -> None:
         kind, name = obj["kind"], obj["metadata"]["name"]
@@ -120,7 +105,7 @@ class Acting:
             if of(obj) == JOBS:
                 self._see_owner(key, obj)
             if of(obj) == CONFIG_MAPS:
-                self._see_content(key[0], obj)
+                self._see_config_map(key[0], obj)
             return
         log.info("applied", job=key, kind=kind, name=name)
 
@@ -136,33 +121,41 @@ class Acting:
             words = f"Job {name} is there already, and is not this job's; delete it"
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
-    def _see_content(self, namespace: str, obj: Object) -> None:
-        """See that a ConfigMap that is there holds what it should: pods would train whatever it says.
+    def _see_config_map(self, namespace: str, obj: Object) -> None:
+        """See that a ConfigMap that is there is the TrainingJob's own, and can never hold anything else.
 
         Raises:
-            AlreadyExists: it does not.
+            AlreadyExists: it is not; pods would train whatever it says.
         """
         name = obj["metadata"]["name"]
-        if self._api.get(CONFIG_MAPS, namespace, name).get("data") != obj["data"]:
-            words = f"ConfigMap {name} is there already, with other content; delete it"
+        found = self._api.get(CONFIG_MAPS, namespace, name)
+        wrong = _wrong_with(found, obj)
+        if wrong:
+            words = f"ConfigMap {name} is there already, {wrong}; delete it"
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
-    def _patch(self, key: Key, name: str, patch: Object) -> None:
-        """Change a Job, if it is the one that was decided about."""
-        found = self._caches.job(key[0], name)
-        if found is not None:
-            metadata = {**patch.get("metadata", {}), "uid": found["metadata"]["uid"]}
-            self._writer.merge(JOBS, key[0], name, {**patch, "metadata": metadata})
+    def _patch(self, key: Key, action: Stop | Replace | SetSuspend) -> None:
+        """Change a Job, if it still is the one that was decided about, and as it was."""
+        metadata = {**action.patch.get("metadata", {}), "uid": action.basis.uid}
+        patch = {**action.patch, "metadata": metadata}
+        self._writer.merge(JOBS, key[0], action.job, patch, action.basis.version)
 
-    def _delete(self, key: Key, action: Delete) -> None:
-        try:
-            self._writer.delete(TRAINING_JOBS, *key, action.uid)
-        except NotFound:
-            return
-        log.info("deleted", job=key)
+    def _replace(self, key: Key, action: Replace) -> None:
+        """Mark the Job, then evict the pod.
+
+        Raises:
+            ApiError: the mark was not written, or a disruption budget allows no eviction now.
+        """
+        if not action.marked:
+            self._patch(key, action)
+        self._writer.evict(key[0], action.pod, action.uid)
+        log.info("replaced", job=key, name=action.pod, reason=action.reason)
 
 
-def _occupies(pod: Object, replicas: set[str]) -> bool:
-    """Return whether a pod of one of these replicas may still write to its volume."""
-    ended = (pod.get("status") or {}).get("phase") in {"Succeeded", "Failed"}
-    return not ended and pod["metadata"]["labels"].get(REPLICA_LABEL) in replicas
+def _wrong_with(found: Object, planned: Object) -> str:
+    """Return what a ConfigMap that is there has that the planned one has not; "": nothing."""
+    if found.get("data") != planned["data"]:
+        return "with other content"
+    if not owners(found) & owners(planned):
+        return "and is not this job's"
+    return "" if found.get("immutable") is True else "and is not immutable, so that anybody may change it"

@@ -6,6 +6,7 @@ memory does not grow with what others run in the cluster.
 
 import time
 from collections.abc import Callable, Collection, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 from palaestra.api.status import Phase
@@ -19,11 +20,12 @@ from palaestra.cluster.resources import (
     TRAINING_JOBS,
 )
 from palaestra.observe import trimmed
-from palaestra.observe.reading import owners
 from palaestra.operator.following import Followed
-from palaestra.operator.poller import Key, Target
-from palaestra.plan.layout import STATUS_PORT
-from palaestra.plan.replica import JOB_LABEL, TRAINER
+from palaestra.operator.poller import Key
+from palaestra.operator.schedule import Target
+from palaestra.operator.trainers import Trainers
+from palaestra.operator.waiting import waits
+from palaestra.plan.replica import JOB_LABEL
 
 Object = dict[str, Any]
 Changed = Callable[[Key], None]
@@ -43,6 +45,8 @@ class Caches:
     def __init__(self, api: Api, namespaces: Sequence[str], changed: Changed) -> None:
         self._changed = changed
         self._phases: dict[Key, str] = {}
+        self._waits: dict[Key, tuple[str, ...]] = {}
+        self._trainers = Trainers()
         self._jobs = Followed(
             api, TRAINING_JOBS, namespaces=namespaces, keep=trimmed, changed=self._job_changed
         )
@@ -53,7 +57,7 @@ class Caches:
                 namespaces=namespaces,
                 labels=JOB_LABEL,
                 keep=trimmed,
-                changed=lambda child: changed(_parent(child)),
+                changed=partial(self._child_changed, resource),
             )
             for resource in CHILDREN
         }
@@ -92,50 +96,40 @@ class Caches:
         namespace, name = key
         return self._children[resource.plural].select(namespace, {JOB_LABEL: name})
 
-    def job(self, namespace: str, name: str) -> Object | None:
-        """Return a batch/v1 Job of ours."""
-        return self._children[JOBS.plural].get(namespace, name)
-
     def phases(self) -> Iterable[tuple[str, str]]:
         """Return namespace and phase of each TrainingJob."""
         return tuple((namespace, phase) for (namespace, _), phase in tuple(self._phases.items()))
 
+    def waits(self) -> Iterable[tuple[str, str]]:
+        """Return namespace and reason of each replica that waits."""
+        waiting = tuple(self._waits.items())
+        return tuple((namespace, reason) for (namespace, _), reasons in waiting for reason in reasons)
+
     def trainers(self) -> Collection[Target]:
         """Return the trainers that run now."""
-        pods = [pod for pod in self._children[PODS.plural].select(None, {}) if _trains(pod)]
-        jobs = {job["metadata"]["uid"] for job in self._jobs_of(pods)}
-        return [
-            Target(
-                key=_parent(pod), uid=pod["metadata"]["uid"], host=pod["status"]["podIP"], port=STATUS_PORT
-            )
-            for pod in pods
-            if jobs & owners(pod)
-        ]
-
-    def _jobs_of(self, pods: list[Object]) -> list[Object]:
-        """Return the Jobs of TrainingJobs that have such pods: a pod is no trainer by its labels alone."""
-        return [job for key in {_parent(pod) for pod in pods} for job in self.children(JOBS, key)]
+        return self._trainers.targets()
 
     def _all(self) -> tuple[Followed, ...]:
         return (self._jobs, *self._children.values())
 
     def _job_changed(self, obj: Object) -> None:
         key = (obj["metadata"]["namespace"], obj["metadata"]["name"])
-        if self._jobs.get(*key) is None:
-            self._phases.pop(key, None)
-        else:
+        exists = self._jobs.holds(*key)
+        if exists:
             self._phases[key] = (obj.get("status") or {}).get("phase") or Phase.PENDING.value
+        else:
+            self._phases.pop(key, None)
+        self._waits.pop(key, None)
+        if exists and (waiting := waits(obj)):
+            self._waits[key] = waiting
+        self._trainers.training_job(obj, exists=exists)
         self._changed(key)
 
-
-def _parent(child: Object) -> Key:
-    metadata = child["metadata"]
-    return metadata["namespace"], metadata["labels"][JOB_LABEL]
-
-
-def _trains(pod: Object) -> bool:
-    """Return whether the trainer's container runs and can be reached."""
-    status = pod.get("status") or {}
-    states = {each.get("name"): each.get("state") or {} for each in status.get("containerStatuses") or ()}
-    running = "running" in states.get(TRAINER, {})
-    return running and bool(status.get("podIP")) and "deletionTimestamp" not in pod["metadata"]
+    def _child_changed(self, resource: Resource, child: Object) -> None:
+        namespace, name = child["metadata"]["namespace"], child["metadata"]["name"]
+        exists = self._children[resource.plural].holds(namespace, name)
+        if resource is PODS:
+            self._trainers.pod(child, exists=exists)
+        elif resource is JOBS:
+            self._trainers.job(child, exists=exists)
+        self._changed((namespace, child["metadata"]["labels"][JOB_LABEL]))

@@ -7,12 +7,13 @@ object is made or no longer wanted. One that has just started knows nothing, tri
 import threading
 from collections.abc import Mapping
 
-from palaestra.cluster import ApiError, ServerError
+from palaestra.cluster import ApiError, ServerError, TooManyRequests
 from palaestra.operator.poller import Key
 
 Denied = Mapping[int | None, ApiError]  # by replica; None: of the whole job
 
 _BY_A_WEBHOOK = "webhook"  # that does not answer: the API server calls it an error of its own
+_BY_A_BUDGET = "disruption budget"  # of somebody who wants the pod to stay; the API server calls it busy
 
 
 class Denials:
@@ -49,4 +50,6 @@ class Denials:
 
 def _lasting(error: ApiError) -> bool:
     """Return whether a person has to act."""
-    return not error.retryable or (isinstance(error, ServerError) and _BY_A_WEBHOOK in error.message)
+    by_a_webhook = isinstance(error, ServerError) and _BY_A_WEBHOOK in error.message
+    by_a_budget = isinstance(error, TooManyRequests) and _BY_A_BUDGET in error.message
+    return not error.retryable or by_a_webhook or by_a_budget

@@ -4,7 +4,7 @@ Labels are bounded: no job's name, which would outlive the job. What a training 
 pods.
 """
 
-from palaestra.api.reasons import ROWS, Reason
+from palaestra.api.reasons import ROWS, WAITING, Reason
 from palaestra.api.status import Phase, Restarts
 from palaestra_sim.protocol.metrics import Family, Label, counter, gauge, histogram
 
@@ -22,6 +22,12 @@ JOBS = gauge(
     "TrainingJobs by the namespace that they are in, and phase; told by the operator that leads.",
     Label(name="job_namespace", bound="namespace with jobs"),
     Label(name="phase", values=tuple(Phase)),
+)
+REPLICAS_WAITING = gauge(
+    "palaestra_replicas_waiting",
+    "Replicas that wait before a training or another attempt of it, by the reason in their status.",
+    Label(name="job_namespace", bound="namespace with jobs"),
+    Label(name="reason", values=WAITING),
 )
 TIME_TO_RUNNING = histogram(
     "palaestra_job_time_to_running_seconds",
@@ -62,6 +68,10 @@ REQUEST_DURATION = histogram(
     VERB,
 )
 LEADER = gauge("palaestra_operator_leader", "1 while this operator leads.")
+CRD_OUTDATED = gauge(
+    "palaestra_operator_crd_outdated",
+    "1 while the cluster's CustomResourceDefinition lacks something of this release's; absent: not read yet.",
+)
 BUILD = gauge(
     "palaestra_operator_build_info",
     "Always 1; the label tells the release.",
@@ -70,6 +80,7 @@ BUILD = gauge(
 
 FAMILIES: tuple[Family, ...] = (
     JOBS,
+    REPLICAS_WAITING,
     TIME_TO_RUNNING,
     RESTARTS,
     REPLICA_ENDS,
@@ -79,5 +90,6 @@ FAMILIES: tuple[Family, ...] = (
     REQUESTS,
     REQUEST_DURATION,
     LEADER,
+    CRD_OUTDATED,
     BUILD,
 )

@@ -70,6 +70,10 @@ class Followed:
         found = (each.store.get(namespace, name) for each in self._reflectors)
         return next((obj for obj in found if obj is not None), None)
 
+    def holds(self, namespace: str, name: str) -> bool:
+        """Return whether there is such an object, without reading it."""
+        return any(each.store.holds(namespace, name) for each in self._reflectors)
+
     def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
         """Return the objects that carry these labels; namespace None: wherever they are."""
         return [obj for each in self._reflectors for obj in each.store.select(namespace, labels)]

@@ -11,14 +11,24 @@ from dataclasses import dataclass, replace
 
 from palaestra.api import TrainingJob
 from palaestra.cluster import Api, Forbidden, NotFound
-from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, NETWORK_POLICIES, PODS, SECRETS
-from palaestra.decide import complete
-from palaestra.observe import Objects, Polled, Raw, Source, SourceKind, observe, references
+from palaestra.cluster.resources import (
+    CLAIMS,
+    CONFIG_MAPS,
+    JOBS,
+    NETWORK_POLICIES,
+    PODS,
+    SECRETS,
+    TRAINING_JOBS,
+)
+from palaestra.decide import complete, resuming
+from palaestra.observe import Objects, Observed, Polled, Raw, Source, SourceKind, observe, references, whole
 from palaestra.operator.caches import Caches
+from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denials
 from palaestra.operator.poller import Key
 from palaestra.operator.refusals import Refusals
 from palaestra.operator.strangers import Strangers
+from palaestra.operator.switchers import Switchers
 
 RECHECK_S = 10.0  # while something may be missing
 KUEUE = "kueue.x-k8s.io"
@@ -35,7 +45,7 @@ _READ = {
 class Seen:
     """What there is of a TrainingJob; `again_s`: when to look anew at what no watch tells."""
 
-    objects: Objects
+    observed: Observed
     again_s: float | None
 
 
@@ -64,6 +74,7 @@ class Looking:
         self._denials = denials
         self._polled = polled
         self._refusals = Refusals(api)
+        self._switchers = Switchers(api)
         self._kueue = (-KUEUE_S, False)
 
     def look(self, job: TrainingJob) -> Seen:
@@ -75,33 +86,63 @@ class Looking:
         key: Key = (job.metadata.namespace, job.metadata.name)
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
         strangers = self._strangers.among(key, {each["metadata"]["name"] for each in jobs})
-        events, refused_s = self._refusals.of(jobs, pods)
+        refusals = self._refusals.of(jobs, pods)
         objects = Objects(
             jobs=[*jobs, *strangers],
             pods=pods,
             claims=self._caches.children(CLAIMS, key),
             config_maps=self._caches.children(CONFIG_MAPS, key),
             policies=self._caches.children(NETWORK_POLICIES, key),
-            events=events,
+            events=refusals.events,
+            unasked=refusals.unasked,
             polled=self._polled(),
             denied=self._denials.of(key),
-            kueue=job.spec.scheduling.queue_name is not None and self._has_kueue(),
+            switchers=self._switchers.of(job, jobs),
         )
-        sources = self._sources(job, objects)
-        recheck_s = RECHECK_S if sources or strangers or _lacks_kueue(job, objects) else None
-        return Seen(objects=replace(objects, sources=sources), again_s=earliest(refused_s, recheck_s))
+        observed, asked_s = self._asked(job, observe(job, objects))
+        return Seen(
+            observed=observed, again_s=earliest(refusals.again_s, asked_s, RECHECK_S if strangers else None)
+        )
+
+    def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
+        """Return what was seen of a job's copy, with all that the whole job refers to.
+
+        Raises:
+            ApiError: there was no answer.
+        """
+        observed, asked_s = self._asked(job, seen.observed)
+        return replace(seen, observed=observed, again_s=earliest(seen.again_s, asked_s))
+
+    def whole(self, raw: Raw) -> Raw:
+        """Return a TrainingJob of the caches with all that it holds, as the API server has it.
+
+        Raises:
+            ApiError: there was no answer.
+            Outdated: it is not as it was when this copy was made.
+        """
+        metadata = raw["metadata"]
+        try:
+            found = whole(self._api.get(TRAINING_JOBS, metadata["namespace"], metadata["name"]))
+        except NotFound:
+            found = None
+        if found is None or found["metadata"]["resourceVersion"] != metadata["resourceVersion"]:
+            raise Outdated("the caches are behind the cluster; nothing was planned")
+        return found
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
         self._strangers.forget(key)
         self._denials.forget(key)
 
-    def _sources(self, job: TrainingJob, objects: Objects) -> dict[Source, Raw | None]:
-        """Return what a job refers to, while something of it is still to be planned."""
-        named = references(job)
-        if not named or complete(job, observe(job, objects)):
-            return {}
-        return {each: self._source(job.metadata.namespace, each) for each in named}
+    def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
+        """Return what was observed with what has to be asked for, and seconds until it is asked anew."""
+        if complete(job, observed) and not resuming(job, observed):
+            return observed, None
+        namespace, queued = job.metadata.namespace, job.spec.scheduling.queue_name is not None
+        sources = {each: self._source(namespace, each) for each in references(job)}
+        kueue = queued and self._has_kueue()
+        again_s = RECHECK_S if sources or (queued and not kueue) else None
+        return replace(observed, sources=sources, kueue=kueue), again_s
 
     def _source(self, namespace: str, source: Source) -> Raw | None:
         try:
@@ -119,12 +160,6 @@ class Looking:
             found = self._api.serves(KUEUE)
             self._kueue = (time.monotonic(), found)
         return found
-
-
-def _lacks_kueue(job: TrainingJob, objects: Objects) -> bool:
-    """Return whether a job waits until somebody installs Kueue."""
-    queued = job.spec.scheduling.queue_name is not None
-    return queued and not objects.kueue and not complete(job, observe(job, objects))
 
 
 def earliest(*seconds: float | None) -> float | None:

@@ -72,9 +72,11 @@ class Metrics:
         depth: Callable[[], int],
         leads: Callable[[], bool],
         phases: Callable[[], Iterable[tuple[str, str]]],
+        waits: Callable[[], Iterable[tuple[str, str]]],
+        outdated: Callable[[], bool | None],
     ) -> None:
-        """Tell the queue's depth, leadership, and the jobs' namespaces and phases as they are when asked."""
-        self.registry.register(_Now(depth, leads, phases))
+        """Export queue, leadership, phases, waiting replicas and the definition as they are when asked."""
+        self.registry.register(_Now(depth, leads, phases, waits, outdated))
 
     def text(self) -> bytes:
         """Return all of them as Prometheus reads them."""
@@ -107,17 +109,24 @@ class _Now(Collector):
         depth: Callable[[], int],
         leads: Callable[[], bool],
         phases: Callable[[], Iterable[tuple[str, str]]],
+        waits: Callable[[], Iterable[tuple[str, str]]],
+        outdated: Callable[[], bool | None],
     ) -> None:
         self._depth = depth
         self._leads = leads
         self._phases = phases
+        self._waits = waits
+        self._outdated = outdated
 
     def collect(self) -> Iterator[Metric]:
         """Yield one family after the other; jobs are told by the leader only, so that each counts once."""
         leads = self._leads()
         yield families.JOBS.metric(_by_phase(self._phases()) if leads else {})
+        yield families.REPLICAS_WAITING.metric(dict(Count(self._waits())) if leads else {})
         yield families.QUEUE_DEPTH.metric({(): self._depth()})
         yield families.LEADER.metric({(): leads})
+        outdated = self._outdated()
+        yield families.CRD_OUTDATED.metric({} if outdated is None else {(): outdated})
         yield families.BUILD.metric({(version("palaestra"),): 1})
 
 

@@ -1,6 +1,7 @@
 """How the operator is started."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from palaestra.errors import PalaestraError
 from palaestra.plan import Images
@@ -23,6 +24,9 @@ class Options:
         resync_s: seconds after which every job is looked at again though nothing changed.
         leader_elect: whether to wait for the Lease.
         metrics_address: host and port of /healthz, /readyz and /metrics.
+        node_selector: labels that the nodes of training pods must have.
+        allowed_pod_labels: keys, or domains that end in `/`, of labels that jobs may give their pods.
+        allowed_pod_annotations: the same of annotations.
         kubeconfig: the file to connect with; None: as kubectl finds it, or the pod's own account.
         context: of the kubeconfig; None: its current one.
     """
@@ -35,6 +39,9 @@ class Options:
     resync_s: float = 600.0
     leader_elect: bool = True
     metrics_address: tuple[str, int] = ("0.0.0.0", 8080)  # noqa: S104 - the pod's address, for probes
+    node_selector: Mapping[str, str] = field(default_factory=dict)
+    allowed_pod_labels: tuple[str, ...] = ()
+    allowed_pod_annotations: tuple[str, ...] = ()
     kubeconfig: str | None = None
     context: str | None = None
 

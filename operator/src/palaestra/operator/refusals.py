@@ -1,35 +1,57 @@
 """Why the pods of a Job cannot be made, or cannot start: a quota, a webhook, a volume that does not come.
 
 Nothing but events tells. They are asked for only when a Job that should have a pod has had none for some
-seconds, or a pod has waited as long for its volumes, and then now and then: a watch over the events of a
-whole cluster is dear.
+seconds, or a pod has waited as long for its volumes, and then at growing pauses: a watch over the events of
+a whole cluster is dear. All objects together share a few requests a second and a bounded memory, so that a
+namespace whose pods are all refused takes nothing from the others.
 """
 
 import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from palaestra.cluster import Api
 from palaestra.cluster.resources import EVENTS
+from palaestra.observe import last_refusal
 from palaestra.observe.reading import holds, owners
 
 PATIENCE_S = 5.0  # that a Job may be without a pod, or a pod without its volumes
-RECHECK_S = 15.0
-REMEMBERED = 1000  # objects that lack something; what was deleted meanwhile is among them
+RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the one before
+LONGEST_PAUSE_S = 300.0
+RATE = 4.0  # requests a second, about all objects together; with the one that is saved up, 5 in any second
+REMEMBERED = 4000  # objects that lack something, with a message each
+EXPIRES_S = 1200.0  # after which one that nobody looked at is gone: each is looked at in its longest pause
 
 Object = dict[str, Any]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What is known of objects that lack something.
+
+    Attributes:
+        events: the last event about each.
+        unasked: uids of those about which nobody is asked, as there are too many.
+        again_s: when to look again; None: nothing is lacking.
+    """
+
+    events: tuple[Object, ...] = ()
+    unasked: frozenset[str] = frozenset()
+    again_s: float | None = None
+
+
 @dataclass(slots=True)
 class _Lack:
-    """Since when an object lacks something, and what was said of it when."""
+    """What an object lacks: when it was looked at, when to ask (again), and the last event about it."""
 
-    since: float
-    asked: float | None = None
-    events: list[Object] = field(default_factory=list)
+    seen: float
+    due: float
+    pause_s: float = RECHECK_S
+    queued: bool = False
+    event: Object | None = None
 
 
 class Refusals:
@@ -44,45 +66,84 @@ class Refusals:
         self._api = api
         self._clock = clock
         self._lock = threading.Lock()
-        self._lacks: OrderedDict[str, _Lack] = OrderedDict()  # by uid
+        self._lacks: OrderedDict[str, _Lack] = OrderedDict()  # by uid; the one last looked at is the last
+        self._turns = _Turns(clock())
 
-    def of(self, jobs: Sequence[Object], pods: Sequence[Object]) -> tuple[list[Object], float | None]:
-        """Return the events about those of `jobs` and `pods` that lack something, and when to ask again.
-
-        That is in seconds; None when nothing is lacking.
-        """
-        found: list[Object] = []
-        again_s: float | None = None
+    def of(self, jobs: Sequence[Object], pods: Sequence[Object]) -> Told:
+        """Return what is known about those of `jobs` and `pods` that lack something."""
         lacking = dict(_lacking(jobs, pods))
         self._forget({each["metadata"]["uid"] for each in (*jobs, *pods)} - lacking.keys())
+        events: list[Object] = []
+        unasked: set[str] = set()
+        waits_s: list[float] = []
         for uid, (obj, about) in lacking.items():
-            wait_s = self._wait_s(uid)
-            if wait_s <= 0:
-                found += self._events(uid, obj["metadata"]["namespace"], about)
-            again_s = min(again_s or RECHECK_S, wait_s if wait_s > 0 else RECHECK_S)
-        return found, again_s
+            lack = self._looked_at(uid)
+            if lack is None:
+                unasked.add(uid)
+                waits_s.append(LONGEST_PAUSE_S)
+                continue
+            if self._is_due(lack):
+                self._ask(lack, uid, obj["metadata"]["namespace"], about)
+            events += [lack.event] if lack.event is not None else []
+            waits_s.append(max(lack.due - self._clock(), 0.0))
+        return Told(events=tuple(events), unasked=frozenset(unasked), again_s=min(waits_s, default=None))
 
-    def _wait_s(self, uid: str) -> float:
-        """Return the seconds of patience that are left for an object that lacks something."""
+    def _looked_at(self, uid: str) -> _Lack | None:
+        """Return what is known of an object that lacks something; None: there is no room for it."""
         now = self._clock()
         with self._lock:
-            lack = self._lacks.setdefault(uid, _Lack(since=now))
-            if len(self._lacks) > REMEMBERED:
-                self._lacks.popitem(last=False)
-            return lack.since + PATIENCE_S - now
+            if uid not in self._lacks and len(self._lacks) >= REMEMBERED:
+                oldest, lack = next(iter(self._lacks.items()))
+                if now - lack.seen < EXPIRES_S:
+                    return None
+                del self._lacks[oldest]
+            lack = self._lacks.setdefault(uid, _Lack(seen=now, due=now + PATIENCE_S))
+            lack.seen = now
+            self._lacks.move_to_end(uid)
+            return lack
 
-    def _events(self, uid: str, namespace: str, about: str) -> list[Object]:
+    def _is_due(self, lack: _Lack) -> bool:
+        """Return whether to ask now; if so, the pause after that has begun."""
+        now = self._clock()
         with self._lock:
-            lack = self._lacks.get(uid) or _Lack(since=self._clock())
-        if lack.asked is None or self._clock() - lack.asked >= RECHECK_S:
-            lack.events = self._api.list(EVENTS, namespace, fields=f"involvedObject.uid={uid},{about}")
-            lack.asked = self._clock()
-        return lack.events
+            if now < lack.due:
+                return False
+            wait_s = self._turns.wait_s(now, queued=lack.queued)
+            lack.queued = wait_s > 0
+            lack.due = now + (wait_s or lack.pause_s)
+            return not lack.queued
+
+    def _ask(self, lack: _Lack, uid: str, namespace: str, about: str) -> None:
+        found = self._api.list(EVENTS, namespace, fields=f"involvedObject.uid={uid},{about}")
+        lack.event = last_refusal(found, uid)
+        lack.pause_s = min(lack.pause_s * 2, LONGEST_PAUSE_S)
 
     def _forget(self, uids: set[str]) -> None:
         with self._lock:
             for uid in uids:
                 self._lacks.pop(uid, None)
+
+
+class _Turns:
+    """Who may ask when: a bucket of one token, and a queue of moments for those that find it empty."""
+
+    def __init__(self, now: float) -> None:
+        self._tokens, self._filled = 1.0, now
+        self._end = now  # of the queue
+
+    def wait_s(self, now: float, *, queued: bool) -> float:
+        """Return the seconds after which to come again; 0: this is the turn."""
+        self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
+        self._filled = now
+        if not queued and now < self._end:
+            wait_s = self._end - now
+            self._end += 1 / RATE
+            return wait_s
+        if self._tokens < 1.0:
+            return (1.0 - self._tokens) / RATE
+        self._tokens = 0.0
+        self._end = max(self._end, now + 1 / RATE)
+        return 0.0
 
 
 def _lacking(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[tuple[str, tuple[Object, str]]]:

@@ -16,13 +16,15 @@ from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
 from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
 from palaestra.operator.controller import Controller
+from palaestra.operator.definition import Definition
 from palaestra.operator.denials import Denials
 from palaestra.operator.health import HealthServer
 from palaestra.operator.logs import configure_logs
 from palaestra.operator.looking import Looking
 from palaestra.operator.metrics import Metrics
 from palaestra.operator.options import NAME, Options
-from palaestra.operator.poller import Key, Poller, Target
+from palaestra.operator.poller import Key, Poller
+from palaestra.operator.schedule import Target
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.telling import Telling
 from palaestra.operator.workers import Workers
@@ -52,26 +54,33 @@ class Operator:
         api.on_request = metrics.request
         self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited)
         self._caches = Caches(api, options.namespaces, self._queue.add)
+        self._definition = Definition(api)
         self._poller = Poller(self._trainers, self._queue.add)
         identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
         self._leadership = Leadership(api, options.operator_namespace, NAME, identity)
-        writer = Writer(api, self._leads)
+        self._writer = writer = Writer(api, self._term)
         strangers, denials = Strangers(api), Denials()
-        controller = Controller(
+        self._controller = Controller(
             self._caches,
             Looking(api, self._caches, strangers, denials, self._poller.known),
-            Acting(api, writer, self._caches, strangers, denials),
+            Acting(api, writer, strangers, denials),
             Telling(writer, Recorder(api, instance=identity), metrics.written),
             _layout(options),
         )
         self._workers = Workers(
             self._queue,
-            controller.reconcile,
+            self._reconcile,
             gate=self._gate,
             seconds=metrics.reconciled,
             count=options.workers,
         )
-        metrics.watch(depth=lambda: self._queue.depth, leads=self._leads, phases=self._caches.phases)
+        metrics.watch(
+            depth=lambda: self._queue.depth,
+            leads=self._leads,
+            phases=self._caches.phases,
+            waits=self._caches.waits,
+            outdated=lambda: self._definition.outdated,
+        )
         self._server = HealthServer(
             options.metrics_address, healthy=self._unhealthy, ready=self._not_ready, metrics=metrics.text
         )
@@ -79,6 +88,7 @@ class Operator:
     def run(self, stopping: threading.Event) -> None:
         """Look after the jobs until `stopping` is set."""
         log.info("started", namespaces=self._options.namespaces or "all", address=self._server.shown)
+        self._definition.follow(stopping, self._options.resync_s)
         self._caches.start()
         self._workers.start()
         self._poller.start()
@@ -99,11 +109,21 @@ class Operator:
             self._lead()
 
     def _lead(self) -> None:
+        self._controller.begin_anew()
         self._look_at_all()
         self._gate.set()
 
+    def _reconcile(self, key: Key) -> float | None:
+        self._writer.begin()
+        return self._controller.reconcile(key)
+
     def _leads(self) -> bool:
-        return self._leadership.leads() if self._options.leader_elect else not self._queue.closed
+        return self._term() is not None
+
+    def _term(self) -> int | None:
+        if self._options.leader_elect:
+            return self._leadership.term()
+        return None if self._queue.closed else 0
 
     def _look_at_all(self) -> None:
         for key in self._caches.known():
@@ -158,4 +178,7 @@ def _layout(options: Options) -> ClusterLayout:
         images=options.images,
         operator_namespace=options.operator_namespace,
         monitoring_namespace=options.monitoring_namespace,
+        node_selector=options.node_selector,
+        allowed_pod_labels=options.allowed_pod_labels,
+        allowed_pod_annotations=options.allowed_pod_annotations,
     )

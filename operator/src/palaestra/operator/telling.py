@@ -6,13 +6,11 @@ alone is written seldom; conditions and phases at once.
 
 import threading
 from collections.abc import Callable, Mapping
-from datetime import datetime
 from typing import Any
 
 from palaestra.api.reasons import Reason
 from palaestra.cluster import Recorder
-from palaestra.decide import Decision, Happening, worth_writing
-from palaestra.decide.writing import PROGRESS_EVERY_S, as_data
+from palaestra.decide import Decision, Happening, as_data, fitted, write_in_s
 from palaestra.operator.denials import Denied
 from palaestra.operator.poller import Key
 from palaestra.operator.writing import Writer, difference
@@ -35,10 +33,13 @@ class Telling:
         self._count = written
         self._recorder = recorder
         self._lock = threading.Lock()
-        self._written: dict[Key, datetime] = {}
+        self._written: dict[Key, float] = {}
+        self._futile: dict[Key, tuple[str, Object]] = {}
 
-    def tell(self, raw: Object, decision: Decision, denied: Denied, now: datetime) -> float | None:
+    def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> float | None:
         """Write what changed; return seconds until progress that was held back is to be written.
+
+        `clock_s` is the monotonic clock: nobody sets it.
 
         What was refused was not planned; why is told by the next look, in the status.
 
@@ -48,7 +49,9 @@ class Telling:
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
         held_back_s = (
-            None if decision.status is None else self._write(key, raw, as_data(decision.status), now)
+            None
+            if decision.status is None
+            else self._write(key, raw, fitted(raw, as_data(decision.status)), clock_s)
         )
         for each in decision.events:
             if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
@@ -57,22 +60,33 @@ class Telling:
 
     def _record(self, raw: Object, event: Happening) -> None:
         whose = "" if event.replica is None else f"replica {event.replica}: "
-        self._recorder.record(raw, event.type, event.reason, whose + event.message)
+        self._recorder.record(raw, event.type, event.reason, whose + event.message, once=event.once)
 
-    def _write(self, key: Key, raw: Object, status: dict[str, Any], now: datetime) -> float | None:
+    def _write(self, key: Key, raw: Object, status: dict[str, Any], clock_s: float) -> float | None:
         old = raw.get("status")
-        patch = difference(old, status)
         with self._lock:
-            last = self._written.get(key)
-        if not worth_writing(old, status, last, now):
-            return PROGRESS_EVERY_S if patch else None
-        self._writer.status(raw, patch)
-        self._count(raw, status)
+            last_s = self._written.get(key)
+        in_s = write_in_s(old, status, None if last_s is None else clock_s - last_s)
+        if in_s is None or in_s > 0:
+            return in_s
+        patch, version = difference(old, status), raw["metadata"]["resourceVersion"]
         with self._lock:
-            self._written[key] = now
+            if self._futile.get(key) == (version, patch):
+                return None
+        stored = self._writer.status(raw, patch)
+        changed = stored["metadata"]["resourceVersion"] != version
+        if changed:
+            self._count(raw, status)
+        with self._lock:
+            self._written[key] = clock_s
+            # An older definition prunes fields that are new: the same patch would change nothing again.
+            self._futile.pop(key, None)
+            if not changed:
+                self._futile[key] = (version, patch)
         return None
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
         with self._lock:
             self._written.pop(key, None)
+            self._futile.pop(key, None)

@@ -12,11 +12,12 @@ import structlog
 from prometheus_client import Histogram
 
 from palaestra.cluster import ApiError, Conflict, WorkQueue
-from palaestra.operator.acting import Outdated
+from palaestra.operator.confirming import Outdated
 from palaestra.operator.poller import Key
 from palaestra.operator.writing import NotLeading
 
 IDLE_S = 1.0  # between two looks at whether to go on
+REPEATS = 4  # conflicts in a row; from there on each power of two is logged
 STUCK_S = 300.0  # on one key: every call has a deadline, so nothing takes so long
 
 log = structlog.get_logger(__name__)
@@ -92,8 +93,8 @@ class Workers:
         """Reconcile one key, and return how that ended."""
         try:
             again_s = self._reconcile(key)
-        except (Conflict, Outdated):  # somebody else wrote; what they wrote is on its way
-            self._queue.retry(key)
+        except (Conflict, Outdated) as error:  # somebody else wrote; what they wrote is on its way
+            self._retry_conflict(key, error)
             return "conflict"
         except NotLeading:  # whoever leads looks at all jobs
             return "conflict"
@@ -107,6 +108,13 @@ class Workers:
         if again_s is not None:
             self._queue.add_after(key, again_s)
         return "done"
+
+    def _retry_conflict(self, key: Key, error: Exception) -> None:
+        """Try again later; one conflict is harmless, and one that repeats is logged less and less often."""
+        again_s = self._retry(key)
+        times = self._queue.failures(key)
+        if times >= REPEATS and times & (times - 1) == 0:
+            log.info("conflict repeats", job=key, times=times, error=str(error), again_in_s=again_s)
 
     def _retry(self, key: Key) -> float:
         return round(self._queue.retry(key), 2)

@@ -1,5 +1,10 @@
-"""Every write to the cluster goes through here, and none does while another operator leads."""
+"""Every write to the cluster goes through here, and none does while another operator leads.
 
+Nor does one that was decided in an earlier tenure: a thread that was held up between look and write may find
+that this operator leads again, and that another has led in between.
+"""
+
+import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -21,12 +26,17 @@ class Writer:
 
     Args:
         api: the cluster.
-        leads: whether this operator leads; true without election.
+        term: the number of the tenure in which this operator leads; None: it does not.
     """
 
-    def __init__(self, api: Api, leads: Callable[[], bool]) -> None:
+    def __init__(self, api: Api, term: Callable[[], int | None]) -> None:
         self._api = api
-        self._leads = leads
+        self._term = term
+        self._look = threading.local()
+
+    def begin(self) -> None:
+        """Begin a look: what this thread writes from here on follows from what it reads from here on."""
+        self._look.term = self._term()
 
     def create(self, obj: Object) -> Object:
         """Create an object and return it as stored."""
@@ -38,15 +48,20 @@ class Writer:
         self._check()
         return self._api.apply(obj)
 
-    def merge(self, resource: Resource, namespace: str, name: str, patch: Object) -> Object:
-        """Change the fields in `patch`."""
+    def merge(self, resource: Resource, namespace: str, name: str, patch: Object, version: str) -> Object:
+        """Change the fields in `patch` of an object that still is this version."""
         self._check()
-        return self._api.merge(resource, namespace, name, patch)
+        return self._api.merge(resource, namespace, name, patch, resource_version=version)
 
-    def delete(self, resource: Resource, namespace: str, name: str, uid: str) -> None:
-        """Delete the object that has this uid, and no later one of its name."""
+    def delete(self, resource: Resource, namespace: str, name: str, *, uid: str, version: str) -> None:
+        """Delete the object that has this uid and still is this version, and no later one of its name."""
         self._check()
-        self._api.delete(resource, namespace, name, uid=uid)
+        self._api.delete(resource, namespace, name, uid=uid, resource_version=version)
+
+    def evict(self, namespace: str, name: str, uid: str) -> None:
+        """Ask for the eviction of the pod that has this uid, and of no later one of its name."""
+        self._check()
+        self._api.evict(namespace, name, uid=uid)
 
     def status(self, job: Object, patch: Object) -> Object:
         """Change the status of a TrainingJob, if it still is as `job`, and return it as stored."""
@@ -62,8 +77,9 @@ class Writer:
         )
 
     def _check(self) -> None:
-        if not self._leads():
-            raise NotLeading("the Lease may have passed on; nothing is written any more")
+        term = self._term()
+        if term is None or term != getattr(self._look, "term", term):
+            raise NotLeading("the Lease may have passed on since this was decided; it is not written")
 
 
 def difference(old: Any, new: Mapping[str, Any]) -> dict[str, Any]:

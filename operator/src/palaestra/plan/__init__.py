@@ -6,7 +6,7 @@ has its whole plan recorded in tests/golden/, as a cluster gets it and as a lapt
     plan(job, layout).objects
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ from palaestra.plan.layout import ClusterLayout, Images, Layout, LocalLayout, Pl
 from palaestra.plan.network_policy import network_policy
 from palaestra.plan.pod import pod_template
 from palaestra.plan.replica import Replica
-from palaestra.plan.worlds import ConfigMaps, world_files
+from palaestra.plan.worlds import ConfigMaps, Files, named_files, source_files
 
 __all__ = [
     "ClusterLayout",
@@ -38,6 +38,7 @@ __all__ = [
 ]
 
 Object = Mapping[str, Any]  # a Kubernetes object, as in JSON
+Mounted = Mapping[int, Collection[str]]  # replica -> names of the volumes that its Job mounts; none: no Job
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,32 +58,39 @@ class ReplicaPlan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
-    """The objects of a TrainingJob: one for all of it, then those of each replica.
+    """The objects of a TrainingJob: one for all of it, then those of the planned replicas, by index.
 
     `network_policy` is None in a layout whose pods have no network of their own.
     """
 
     network_policy: Object | None
-    replicas: tuple[ReplicaPlan, ...]
+    replicas: Mapping[int, ReplicaPlan]
 
     @property
     def objects(self) -> tuple[Object, ...]:
         """Return all of them in the order of their creation: no pod is there before its policy."""
         policy = () if self.network_policy is None else (self.network_policy,)
-        return (*policy, *(each for replica in self.replicas for each in replica.objects))
+        return (*policy, *(each for replica in self.replicas.values() for each in replica.objects))
 
 
-def plan(job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None) -> Plan:
+def plan(
+    job: TrainingJob, layout: Layout, config_maps: ConfigMaps | None = None, mounted: Mounted | None = None
+) -> Plan:
     """Return the plan of a job that has a uid.
 
-    `config_maps` holds the worlds of `configMap` sources, by name and key.
+    `config_maps` holds the worlds of `configMap` sources, by name and key. `mounted` names the replicas to
+    plan; by default all of them, as if none had a Job.
 
     Raises:
         PlanError: the job cannot be planned in this layout.
         WorldError: one of its worlds is wrong.
     """
-    replicas = (Replica(job=job, index=i, layout=layout) for i in range(job.spec.replicas))
-    planned = tuple(_replica_plan(each, config_maps or {}) for each in replicas)
+    sources = source_files(job, config_maps or {})
+    chosen = dict.fromkeys(range(job.spec.replicas), ()) if mounted is None else mounted
+    planned = {
+        index: _replica_plan(Replica(job=job, index=index, layout=layout), sources, volumes)
+        for index, volumes in chosen.items()
+    }
     return Plan(network_policy=network_policy(job, layout), replicas=planned)
 
 
@@ -92,8 +100,11 @@ def identified(job: TrainingJob, uid: str) -> TrainingJob:
     return job.model_copy(update={"metadata": metadata})
 
 
-def _replica_plan(replica: Replica, config_maps: ConfigMaps) -> ReplicaPlan:
-    worlds = world_files(replica, config_maps)
+def _replica_plan(replica: Replica, sources: Files, volumes: Collection[str]) -> ReplicaPlan:
+    worlds = sources
     configured = config_map(replica, worlds)
+    if volumes and configured["metadata"]["name"] not in volumes:  # its Job is of an earlier version
+        worlds = named_files(replica, sources)
+        configured = config_map(replica, worlds)
     template = pod_template(replica, configured, worlds)
     return ReplicaPlan(config_map=configured, claim=claim(replica), job=replica_job(replica, template))

@@ -1,4 +1,4 @@
-"""The ConfigMap of a replica: its training.yaml and its generated worlds, for anyone to read."""
+"""The ConfigMap of a replica: its training.yaml and the source worlds of its groups, for anyone to read."""
 
 import hashlib
 import json

@@ -7,18 +7,22 @@ from palaestra.plan.replica import TRAINER, Replica
 from palaestra_sim.protocol.status import ExitCode
 
 QUEUE_LABEL = "kueue.x-k8s.io/queue-name"
+SUSPEND_SET = "palaestra.dev/suspend-set"  # annotation: the spec.suspend that the operator set last
 GIVEN_UP = (ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET, ExitCode.DIVERGED)
 
 
 def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
     """Return the Job; its deadline is the operator's, which does not count suspended time.
 
-    With a queue it is made suspended, and whether it is is Kueue's from then on.
+    With a queue it is made suspended, and Kueue sets `spec.suspend` from then on. Without one an annotation
+    holds what the operator set, so that a change by anybody else is seen as such and left alone.
     """
-    queue = replica.job.spec.scheduling.queue_name
+    queue, suspend = replica.job.spec.scheduling.queue_name, replica.job.spec.suspend
     metadata = replica.metadata(replica.name)
     if queue is not None:
         metadata["labels"] = {**replica.labels, QUEUE_LABEL: queue}
+    else:
+        metadata["annotations"] = suspend_set(suspend=suspend)
     return {
         "apiVersion": "batch/v1",
         "kind": "Job",
@@ -27,10 +31,15 @@ def job(replica: Replica, template: Mapping[str, Any]) -> dict[str, Any]:
             "backoffLimit": replica.job.spec.backoff_limit,
             "podReplacementPolicy": "Failed",  # one writer: the old pod is gone before the next
             "podFailurePolicy": {"rules": _failure_rules()},
-            "suspend": queue is not None or replica.job.spec.suspend,
+            "suspend": queue is not None or suspend,
             "template": template,
         },
     }
+
+
+def suspend_set(*, suspend: bool) -> dict[str, str]:
+    """Return the annotation of a Job whose `spec.suspend` the operator sets to `suspend`."""
+    return {SUSPEND_SET: "true" if suspend else "false"}
 
 
 def _failure_rules() -> list[dict[str, Any]]:

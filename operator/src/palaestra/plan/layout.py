@@ -3,8 +3,8 @@
 A layout is given to `plan` and only read there; nothing is edited after planning.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from palaestra.plan.errors import PlanError
@@ -90,6 +90,11 @@ class Layout(Protocol):
         """Where metrics are gathered; None: no pod has a network."""
         ...
 
+    @property
+    def node_selector(self) -> Mapping[str, str]:
+        """Labels that the node of every pod must have, unless the job gives such a label itself."""
+        ...
+
     def places(self, uid: str, replica: int, container: str) -> Places:
         """Return where things lie for a container of a replica of the job with `uid`."""
         ...
@@ -105,13 +110,20 @@ class Layout(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterLayout:
-    """Every pod has a network and a file system of its own, so places and ports are always the same."""
+    """Every pod has a network and a file system of its own, so places and ports are always the same.
+
+    `allowed_pod_labels` and `allowed_pod_annotations` are what jobs may put on their pods: keys, or domains
+    that end in `/`.
+    """
 
     images: Images
     ports: Ports = Ports()
     health_host: str = "0.0.0.0"  # noqa: S104 - the pod's address, for the kubelet and Prometheus
     operator_namespace: str = "palaestra-system"
     monitoring_namespace: str = "monitoring"
+    node_selector: Mapping[str, str] = field(default_factory=dict)
+    allowed_pod_labels: tuple[str, ...] = ()
+    allowed_pod_annotations: tuple[str, ...] = ()
 
     def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - no container differs
         """Return the same places for every container; runs are kept apart by the job's uid."""
@@ -144,6 +156,7 @@ class LocalLayout:
     health_host: str = "127.0.0.1"
     operator_namespace: None = None
     monitoring_namespace: None = None
+    node_selector: Mapping[str, str] = field(default_factory=dict)
 
     def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - the folder is the job's already
         """Return the places of one container, all below `<job_directory>/<replica>`."""

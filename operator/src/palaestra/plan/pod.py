@@ -64,6 +64,7 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
     """Return the fields of a pod that the job's `scheduling` and pull secrets fill."""
     spec, scheduling = replica.job.spec, replica.job.spec.scheduling
     given = scheduling.model_dump(mode="json", by_alias=True, exclude_none=True)
+    given["nodeSelector"] = {**replica.layout.node_selector, **scheduling.node_selector}
     taken = ("priorityClassName", "nodeSelector", "tolerations", "affinity", "runtimeClassName")
     fields = {name: given[name] for name in taken if given.get(name)}
     if spec.image_pull_secrets:

@@ -1,67 +1,86 @@
-"""The worlds of a replica: each simulator's own, generated from its group's source.
+"""The worlds of a replica's ConfigMap: the source world of each group of simulators, once.
 
-`file` sources are left to the sidecar, which can see the file and what lies beside it. Where the
-copies of all simulators would not fit in a ConfigMap, each source goes in once and the sidecar, which
-runs the same generator on whatever it is given, makes the copies.
+Each source is parsed and checked here, once for all replicas, so that what is wrong with it is known
+before anything is created. Its sidecar alone writes the ROS names of a simulator into it; `file` sources
+lie in the image, and are left to the sidecar altogether.
 """
 
 from collections.abc import Mapping
 
-from palaestra.api import World
+from palaestra.api import SimulatorGroup, TrainingJob, World
 from palaestra.plan.errors import PlanError
 from palaestra.plan.replica import Replica, Simulator
-from palaestra_sim.world import builtin, generate
+from palaestra_sim.world import builtin, check, generate
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
 FOLDER = "worlds"
 
 ConfigMaps = Mapping[tuple[str, str], bytes]  # (name, key) -> content
+Files = Mapping[str, bytes]  # what goes into a ConfigMap, by file name
 
 
-def world_files(replica: Replica, config_maps: ConfigMaps) -> dict[str, bytes]:
-    """Return the worlds that go into the replica's ConfigMap, by file name.
+def source_files(job: TrainingJob, config_maps: ConfigMaps) -> Files:
+    """Return the source worlds that go into the ConfigMap of every replica, each checked.
 
     Raises:
         PlanError: a ConfigMap is not among `config_maps`, or the worlds are too big.
         WorldError: a world is wrong.
     """
-    sources = {
-        simulator.group.name: source
-        for simulator in replica.simulators
-        if (source := _source(replica, simulator, config_maps)) is not None
-    }
-    copies = {
-        f"{simulator.name}.wbt": generate(
-            sources[simulator.group.name],
-            simulator.identity,
-            clock=simulator.keeps_clock,
-            name=_field(replica, simulator),
-        )
-        for simulator in replica.simulators
-        if simulator.group.name in sources
-    }
-    if _size(copies) <= MOST_BYTES:
-        return copies
-    once = {f"{group}.wbt": source for group, source in sources.items()}
-    if _size(once) > MOST_BYTES:
+    files: dict[str, bytes] = {}
+    checked: set[bytes] = set()
+    for place, group in enumerate(job.spec.simulators):
+        field = f"spec.simulators[{place}].world"
+        source = _source(group, field, config_maps)
+        if source is None:
+            continue
+        if source not in checked:
+            check(source, f"{field}.{_kind(group.world)}")
+            checked.add(source)
+        files[_of_group(group)] = source
+    if _size(files) > MOST_BYTES:
         raise PlanError(
-            f"spec.simulators: their worlds take {_size(once)} bytes and {MOST_BYTES} fit in a "
+            f"spec.simulators: their worlds take {_size(files)} bytes and {MOST_BYTES} fit in a "
             "ConfigMap; put the worlds into the images and name them with world.file"
         )
-    return once
+    return files
 
 
-def world_path(replica: Replica, simulator: Simulator, files: Mapping[str, bytes]) -> str:
+def named_files(replica: Replica, sources: Files) -> Files:
+    """Return a replica's worlds as earlier versions put them into its ConfigMap.
+
+    They wrote the names in already, a world for each simulator, unless those were too big together.
+    A Job that mounts such a ConfigMap gets the same one again.
+    """
+    copies = {
+        _of_simulator(simulator): generate(
+            sources[_of_group(simulator.group)], simulator.identity, clock=simulator.keeps_clock
+        )
+        for simulator in replica.simulators
+        if _of_group(simulator.group) in sources
+    }
+    return copies if _size(copies) <= MOST_BYTES else sources
+
+
+def world_path(replica: Replica, simulator: Simulator, files: Files) -> str:
     """Return the path of the world that a simulator's sidecar is given."""
     if simulator.group.world.file is not None:
         return simulator.group.world.file
-    own = f"{simulator.name}.wbt"
-    name = own if own in files else f"{simulator.group.name}.wbt"
+    own = _of_simulator(simulator)
+    name = own if own in files else _of_group(simulator.group)
     return f"{replica.places(simulator.container).config}/{FOLDER}/{name}"
 
 
-def _source(replica: Replica, simulator: Simulator, config_maps: ConfigMaps) -> bytes | None:
-    match simulator.group.world:
+def _of_group(group: SimulatorGroup) -> str:
+    return f"{group.name}.wbt"
+
+
+def _of_simulator(simulator: Simulator) -> str:
+    return f"{simulator.name}.wbt"
+
+
+def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes | None:
+    """Return the text of a group's world; None: it lies in the image."""
+    match group.world:
         case World(inline=str(text)):
             return text.encode()
         case World(builtin=str(name)):
@@ -70,7 +89,7 @@ def _source(replica: Replica, simulator: Simulator, config_maps: ConfigMaps) -> 
             content = config_maps.get((reference.name, reference.key))
             if content is None:
                 raise PlanError(
-                    f"{_field(replica, simulator)}: ConfigMap {reference.name} has no key "
+                    f"{field}.configMap: ConfigMap {reference.name} has no key "
                     f"{reference.key} here; use inline, builtin or file"
                 )
             return content
@@ -78,14 +97,11 @@ def _source(replica: Replica, simulator: Simulator, config_maps: ConfigMaps) -> 
             return None
 
 
-def _field(replica: Replica, simulator: Simulator) -> str:
-    """Return the field of the job that a simulator's world comes from."""
-    position = replica.job.spec.simulators.index(simulator.group)
-    world = simulator.group.world
+def _kind(world: World) -> str:
+    """Return the field that a world is given by."""
     given = {"inline": world.inline, "configMap": world.config_map, "builtin": world.builtin}
-    kind = next((name for name, value in given.items() if value is not None), "file")
-    return f"spec.simulators[{position}].world.{kind}"
+    return next((name for name, value in given.items() if value is not None), "file")
 
 
-def _size(files: Mapping[str, bytes]) -> int:
+def _size(files: Files) -> int:
     return sum(len(name) + len(content) for name, content in files.items())

@@ -144,6 +144,8 @@ class TrainerStatus:
         simulators: each of them.
         last_checkpoint: the newest; None: none yet.
         last_progress: when an environment last stepped (RFC 3339); None: never yet.
+        last_progress_age_s: seconds since then by the trainer's monotonic clock, which no change of the
+            time of day moves; None: never yet, or a trainer of an older release. Absent, not null.
         phase: what the trainer does now, in one word.
         attempt: number of this attempt by the run directory's record, from 1; None: not recorded yet.
         faults: how many of each `FaultKind`, over all attempts.
@@ -162,6 +164,7 @@ class TrainerStatus:
     simulators: tuple[SimulatorStatus, ...] = ()
     last_checkpoint: CheckpointStatus | None = None
     last_progress: str | None = None
+    last_progress_age_s: float | None = None
     attempt: int | None = None
     faults: Mapping[str, int] = field(default_factory=dict)
     goodput: Mapping[str, float] = field(default_factory=dict)
@@ -169,8 +172,8 @@ class TrainerStatus:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data; a number that is not finite is not known."""
-        checkpoint = self.last_checkpoint
-        return {
+        checkpoint, age_s = self.last_checkpoint, known(self.last_progress_age_s)
+        content = {
             "step": self.step,
             "target": self.target,
             "episodes": self.episodes,
@@ -186,6 +189,7 @@ class TrainerStatus:
             "goodput": {cause: known(seconds) for cause, seconds in self.goodput.items()},
             "steps_lost": self.steps_lost,
         }
+        return content if age_s is None else content | {"last_progress_age_s": age_s}
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
@@ -206,6 +210,7 @@ class TrainerStatus:
             simulators=fields.parts("simulators", SimulatorStatus.from_json, MOST_SIMULATORS),
             last_checkpoint=_checkpoint(fields),
             last_progress=fields.time("last_progress") if fields.has("last_progress") else None,
+            last_progress_age_s=_age(fields),
             attempt=_attempt(fields),
             faults=_table(fields, "faults", FaultKind, Fields.whole),
             goodput=_table(fields, "goodput", Cause, _seconds),
@@ -377,6 +382,11 @@ def _share(fields: Fields) -> float | None:
 
 def _speed(fields: Fields) -> float | None:
     return fields.number("steps_per_second", 0.0) if fields.has("steps_per_second") else None
+
+
+def _age(fields: Fields) -> float | None:
+    name = "last_progress_age_s"
+    return fields.number(name, 0.0, MOST_COUNT) if fields.has(name) else None
 
 
 def _checkpoint(fields: Fields) -> CheckpointStatus | None:

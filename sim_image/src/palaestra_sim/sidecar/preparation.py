@@ -1,7 +1,8 @@
 """Put the world that the simulator will run where it can run it.
 
-The generator makes the same world of what it has made before, so the sidecar runs it on whatever it
-is given: on a source world from the image, or on a world from the ConfigMap that has its names.
+The sidecar alone writes names into a world: it is given a source world, of the image or of the
+replica's ConfigMap. ConfigMaps of older releases hold a world for each simulator with its names in it;
+the generator makes the same world of what it has made before.
 """
 
 import os

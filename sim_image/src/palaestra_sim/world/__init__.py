@@ -3,6 +3,7 @@
 Pure: bytes in, bytes out. No clock, no network, no file but the worlds that ship.
 
     parse(source)                              the tree of a world
+    check(source)                              raises unless every simulator can have a world of it
     generate(source, identity, clock=False)    the world of one simulator
     robots(source)                             the robots in it that speak ROS
     ros_name(identity, "robotino")             the name that such a robot gets
@@ -11,6 +12,7 @@ Pure: bytes in, bytes out. No clock, no network, no file but the worlds that shi
 
 from palaestra_sim.errors import UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path
+from palaestra_sim.world.checks import check
 from palaestra_sim.world.generate import generate
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.reader import parse
@@ -28,6 +30,7 @@ __all__ = [
     "WorldRobot",
     "builtin",
     "builtin_path",
+    "check",
     "generate",
     "name_prefix",
     "parse",

@@ -1,7 +1,7 @@
 """The worlds that can be read, but of which no simulator's world can be made.
 
 Each check looks for one thing and points at it. The order is the order in which a person would
-want to hear of them.
+want to hear of them. No check depends on the simulator: a world that passes once passes for all.
 """
 
 import re
@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.world.robots import robot_name
+from palaestra_sim.world.reader import parse
+from palaestra_sim.world.robots import robot_name, ros_robots
 from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token, unquoted
 from palaestra_sim.world.tree import Node, Value, World
@@ -130,3 +131,30 @@ CHECKS: tuple[Check, ...] = (
 
 CHECKS_WITHOUT_FILE: tuple[Check, ...] = (*CHECKS, relative_address)
 """What a world must pass that doesn't come from a file with others beside it."""
+
+
+def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidate:
+    """Return a world that passes every check.
+
+    Raises:
+        WorldError: as `check` does.
+    """
+    world = parse(source, name)
+    found = Candidate(source=Source(data=source, name=name), world=world, robots=ros_robots(world))
+    for each in CHECKS if relative_addresses else CHECKS_WITHOUT_FILE:
+        if error := each(found):
+            raise error
+    return found
+
+
+def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
+    """Return if a world can be made of the world `source` for every simulator.
+
+    `name` is what errors call the world. `relative_addresses`: the world stays beside the files
+    that it names, so they need no full address.
+
+    Raises:
+        WorldError: the world can't be read, repeats a robot or a robot's name, has arguments that
+            are no strings or overrule its name, or has a relative address where none may be.
+    """
+    candidate(source, name, relative_addresses=relative_addresses)

@@ -12,12 +12,10 @@ All else stays as it is, byte for byte. A world made this way is made of itself 
 """
 
 from palaestra_sim.world.arguments import argument_edits, asks_for_clock
-from palaestra_sim.world.checks import CHECKS, CHECKS_WITHOUT_FILE, Candidate
+from palaestra_sim.world.checks import candidate
 from palaestra_sim.world.edits import edited
 from palaestra_sim.world.names import RunIdentity, ros_name
-from palaestra_sim.world.reader import parse
-from palaestra_sim.world.robots import robot_name, ros_robots
-from palaestra_sim.world.source import Source
+from palaestra_sim.world.robots import robot_name
 
 
 def generate(
@@ -31,26 +29,18 @@ def generate(
     """Return the world of one simulator, made of the world `source`.
 
     `clock`: this simulator may publish `/clock`, if its world asks for it; true for at most one
-    simulator of a ROS master. `name` is what errors call the world. `relative_addresses`: the
-    world stays beside the files that it names, so they need no full address.
+    simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
-        WorldError: the world can't be read, repeats a robot or a robot's name, has arguments that
-            are no strings or overrule its name, or has a relative address where none may be.
+        WorldError: as `check` does.
     """
-    text = Source(data=source, name=name)
-    world = parse(source, name)
-    robots = ros_robots(world)
-    candidate = Candidate(source=text, world=world, robots=robots)
-    for check in CHECKS if relative_addresses else CHECKS_WITHOUT_FILE:
-        if error := check(candidate):
-            raise error
-    timekeeper = next(filter(asks_for_clock, robots), None) if clock else None
+    found = candidate(source, name, relative_addresses=relative_addresses)
+    timekeeper = next(filter(asks_for_clock, found.robots), None) if clock else None
     edits = [
         edit
-        for robot in robots
+        for robot in found.robots
         for edit in argument_edits(
-            world, robot, ros_name(identity, robot_name(robot)), clock=robot is timekeeper
+            found.world, robot, ros_name(identity, robot_name(robot)), clock=robot is timekeeper
         )
     ]
-    return edited(text, world.tokens, sorted(edits, key=lambda edit: edit.start))
+    return edited(found.source, found.world.tokens, sorted(edits, key=lambda edit: edit.start))

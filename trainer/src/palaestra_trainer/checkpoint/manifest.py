@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.errors import ConfigurationError
 
@@ -103,13 +105,25 @@ def refuse_another_run(checkpoint: Checkpoint, configuration: Configuration) -> 
     """
     wanted_run = describe(configuration, 0, {})
     for part in ("algorithm", "environment"):
-        saved, wanted = getattr(checkpoint.manifest, part), getattr(wanted_run, part)
+        wanted = getattr(wanted_run, part)
+        saved = _completed(getattr(checkpoint.manifest, part), type(getattr(configuration, part)))
         for key in wanted:
             if saved.get(key) != wanted[key]:
                 raise ConfigurationError(
                     f"{part}.{key}: the run in {checkpoint.path.parent.parent} has "
                     f"{saved.get(key)!r}, not {wanted[key]!r}; use another run directory"
                 )
+
+
+def _completed(saved: dict[str, Any], section: type[BaseModel]) -> dict[str, Any]:
+    """Return what an older release saved, with the fields that are new since at their defaults.
+
+    What a newer release saved is compared as it stands.
+    """
+    try:
+        return section.model_validate(saved).model_dump(mode="json")
+    except ValidationError:
+        return saved
 
 
 def _read_manifest(folder: Path) -> Manifest:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
 from contextlib import contextmanager
+
+import structlog
 
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
@@ -15,6 +18,10 @@ from palaestra_trainer.simulators.budget import Care, Group
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member, Watcher
 from palaestra_trainer.simulators.meter import Meter
+
+LONG_S = 5.0  # for simulators to come up; a line reports those that do not, then at twice the time each
+
+log = structlog.get_logger(__name__)
 
 
 class Fleet:
@@ -63,9 +70,13 @@ class Fleet:
         check()
         for keeper in self._all:
             keeper.begin_start()
+        began, report_at_s = time.monotonic(), LONG_S
         try:
             while not self._enough():
                 check()
+                if (waited_s := time.monotonic() - began) >= report_at_s:
+                    report_at_s = 2 * waited_s
+                    log.info("waiting for simulators", names=self._down(), waited_s=round(waited_s))
                 # Not until one is mended: that one of them has been tried may be enough as well.
                 wait(
                     [work for keeper in self._all if (work := keeper.under_way)],
@@ -83,6 +94,9 @@ class Fleet:
         wait(stops)
         for stop in stops:
             stop.result()
+
+    def _down(self) -> list[str]:
+        return [keeper.name for keeper in self._all if not keeper.up()]
 
     def _enough(self) -> bool:
         up = Counter(keeper.group for keeper in self._all if keeper.up())

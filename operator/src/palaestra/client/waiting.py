@@ -1,0 +1,47 @@
+"""The progress of a job in lines, for a person who waits for it: its phases, and why replicas wait."""
+
+import re
+from collections.abc import Iterator
+
+from palaestra.api.reasons import ROWS, Reason
+from palaestra.api.status import TERMINAL, ReplicaStatus, Status
+
+_NUMBERS = re.compile(r"\d+")
+
+
+class News:
+    """Reports each phase that a job comes to, and each reason why a replica waits, once.
+
+    The kubelet alternates between two phrases and counts its tries: a phrase that was reported, and one
+    with another number, is reported again only after the reason has changed.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Begin with nothing reported; `name` stands in front of each line."""
+        self._name = name
+        self._phase = ""
+        self._reported: set[tuple[object, ...]] = set()
+
+    def of(self, phase: str, status: Status) -> Iterator[str]:
+        """Yield a line for a new phase, then one for each replica with a new reason to wait."""
+        if phase != self._phase:
+            self._phase = phase
+            yield f"{self._name}: {phase}"
+        for replica in filter(_waits, status.replicas):
+            change = (replica.index, replica.reason, replica.since, _NUMBERS.sub("0", replica.message or ""))
+            if change not in self._reported:
+                self._reported.add(change)
+                yield f"{self._name}: {_line(replica)}"
+
+
+def _waits(replica: ReplicaStatus) -> bool:
+    """Return whether a replica reports trouble, or a queue, and not a step on its way."""
+    if replica.reason is None or replica.phase in TERMINAL:
+        return False
+    reason = Reason.known(replica.reason)
+    return ROWS[reason].warning or reason is Reason.QUEUED
+
+
+def _line(replica: ReplicaStatus) -> str:
+    since = f" since {replica.since:%Y-%m-%dT%H:%M:%SZ}" if replica.since else ""
+    return f"replica {replica.index}: {replica.reason}{since}: {replica.message or ''}".rstrip(": ")

@@ -1,0 +1,153 @@
+"""The order in which a replica is judged that has not ended: one list, and what each row does.
+
+docs/judging.md shows the same list. Every check is asked at each look, so that it may say how long it still
+waits; what holds is taken in order:
+
+    ended    the first one that holds is how the replica ended; nothing else is asked
+    final    the first one that holds stops the replica for good, by a mark on its Job
+    counted  the pod is replaced by a new one, at most backoffLimit times
+    waiting  its reason is shown; nothing is ended, nothing is counted
+    shown    where the replica stands
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from palaestra.api.lines import one_line
+from palaestra.api.reasons import LONGEST_MESSAGE, Reason
+from palaestra.api.status import Phase
+from palaestra.decide import final, outcomes, replacing, standing, troubles
+from palaestra.decide.conditions import Told
+from palaestra.decide.situation import STARTING, Check, Finding, Situation, Verdict, after
+from palaestra.decide.times import Wait
+
+
+class Kind(StrEnum):
+    """What follows from a check that holds."""
+
+    ENDED = "ended"
+    FINAL = "final"
+    COUNTED = "counted"
+    WAITING = "waiting"
+    SHOWN = "shown"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """What follows for a replica.
+
+    Attributes:
+        verdict: where it stands, and why.
+        stop: why to stop it for good; None: it goes on.
+        replace: why its pod is replaced; None: it is not.
+        left_s: seconds after which time alone may change something.
+        waits: what is waited for.
+    """
+
+    verdict: Verdict
+    stop: Told | None = None
+    replace: Told | None = None
+    left_s: tuple[float, ...] = ()
+    waits: tuple[Wait, ...] = ()
+
+
+def judge(it: Situation) -> Judged:
+    """Return what follows for a replica, by the first checks of the list that hold."""
+    asked = [(kind, finding) for kind, check in JUDGED if (finding := check(it)) is not None]
+    left_s = tuple(finding.left_s for _, finding in asked if finding.left_s > 0)
+    waits = tuple(finding.wait for _, finding in asked if finding.wait is not None)
+    holding = [(kind, finding) for kind, finding in asked if finding.left_s <= 0]
+    if (end := _first(holding, Kind.ENDED)) is not None:
+        return Judged(verdict=_verdict(it, end), waits=waits)
+    stop = _first(holding, Kind.FINAL)
+    if stop is not None and it.seen.job is None:  # there is nothing to stop, and nothing will be made
+        return Judged(verdict=Verdict(phase=Phase.FAILED, told=stop.told))
+    kind, shown = next((kind, each) for kind, each in holding if kind not in {Kind.ENDED, Kind.FINAL})
+    replaced = kind is Kind.COUNTED and stop is None
+    return Judged(
+        verdict=_verdict(it, _refused(it, shown) if replaced else shown),
+        stop=None if stop is None else stop.told,
+        replace=shown.told if replaced else None,
+        left_s=left_s,
+        waits=waits,
+    )
+
+
+def start_timeout(it: Situation) -> Finding | None:
+    """It waits for its first step longer than `startTimeoutSeconds`; what it waits for is the reason."""
+    if it.suspended or it.hold is not None or it.counted.furthest_step or _is_past_its_start(it):
+        return None
+    seconds = it.job.spec.start_timeout_s
+    asked = (finding for kind, check in JUDGED if kind in SHOWN and (finding := check(it)) is not None)
+    why = next(finding.told for finding in asked if finding.left_s <= 0)
+    reason = Reason.START_TIMEOUT if why.reason in _NO_TROUBLE else why.reason
+    words = f"no step within {seconds} s, as long as startTimeoutSeconds allows; {why.message}"
+    why = Told(reason=reason, message=one_line(words, LONGEST_MESSAGE))
+    return after(it, Wait(key=("first step",), seconds=seconds), why)
+
+
+def _is_past_its_start(it: Situation) -> bool:
+    """Return whether the trainer runs and does not say that its simulators are still on their way."""
+    polled = it.seen.polled
+    return standing.runs(it) and (polled is None or polled.status.phase != STARTING)
+
+
+def _first(holding: Sequence[tuple[Kind, Finding]], kind: Kind) -> Finding | None:
+    return next((finding for each, finding in holding if each is kind), None)
+
+
+def _refused(it: Situation, shown: Finding) -> Finding:
+    """Return why a pod is replaced, and why the API server does not yet do so."""
+    if not it.seen.denied:
+        return shown
+    words = one_line(f"{shown.told.message}; it is not replaced yet: {it.seen.denied}", LONGEST_MESSAGE)
+    return replace(shown, told=Told(reason=shown.told.reason, message=words))
+
+
+def _verdict(it: Situation, finding: Finding) -> Verdict:
+    phase = Phase.RUNNING if standing.runs(it) else Phase.PENDING
+    return Verdict(phase=finding.phase or phase, told=finding.told)
+
+
+_NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
+SHOWN = frozenset({Kind.COUNTED, Kind.WAITING, Kind.SHOWN})  # what the status shows of one that goes on
+
+JUDGED: tuple[tuple[Kind, Check], ...] = (
+    (Kind.ENDED, outcomes.job_is_complete),
+    (Kind.ENDED, outcomes.stopped),
+    (Kind.ENDED, outcomes.would_end_the_same),
+    (Kind.ENDED, outcomes.backoff_limit_spent),
+    (Kind.ENDED, outcomes.job_failed),
+    (Kind.FINAL, final.active_deadline),
+    (Kind.FINAL, final.cannot_be_planned),
+    (Kind.FINAL, final.image_name_is_invalid),
+    (Kind.FINAL, replacing.replaced_too_often),
+    (Kind.FINAL, final.no_progress),
+    (Kind.FINAL, start_timeout),
+    (Kind.WAITING, standing.held),
+    (Kind.WAITING, troubles.objects_refused),
+    (Kind.SHOWN, standing.suspended),
+    (Kind.WAITING, troubles.name_taken),
+    (Kind.WAITING, troubles.old_pod_holds_claim),
+    (Kind.WAITING, troubles.pods_refused),
+    (Kind.WAITING, troubles.node_lost),
+    (Kind.COUNTED, replacing.marked),
+    (Kind.COUNTED, replacing.restart_policy_dropped),
+    (Kind.WAITING, troubles.unschedulable),
+    (Kind.WAITING, troubles.volume_not_mounted),
+    (Kind.WAITING, troubles.image_does_not_come),
+    (Kind.WAITING, troubles.container_refused),
+    (Kind.COUNTED, replacing.trainer_never_started),
+    (Kind.COUNTED, replacing.stalled),
+    (Kind.WAITING, troubles.sidecar_out_of_memory),
+    (Kind.WAITING, troubles.sidecar_crash_loops),
+    (Kind.WAITING, troubles.simulator_not_up),
+    (Kind.WAITING, troubles.pod_filled_its_storage),
+    (Kind.WAITING, troubles.pod_was_taken),
+    (Kind.WAITING, troubles.volume_is_full),
+    (Kind.WAITING, troubles.pod_failed),
+    (Kind.SHOWN, standing.trainer_has_ended),
+    (Kind.SHOWN, standing.trains),
+    (Kind.SHOWN, standing.starts),
+)

@@ -1,0 +1,70 @@
+"""What no kubelet heals: the pod is replaced by a new one, through an eviction, and counted.
+
+An eviction gives the pod the condition DisruptionTarget, so that its Job counts no failure. The operator
+counts it instead, by an annotation of the Job that is written first: killed between the two writes, it
+finds the mark at a pod that lives, and evicts again.
+"""
+
+from dataclasses import replace
+
+from palaestra.api.reasons import Reason
+from palaestra.decide.progress import standstill
+from palaestra.decide.situation import Check, Finding, Situation, after, found, told
+from palaestra.decide.times import Wait
+from palaestra.decide.troubles import mark_of
+from palaestra.observe.pods import dropped
+
+STALL_GRACE_S = 120  # in which the trainer's own watchdog has ended it
+FORGOTTEN_S = 300  # a node needs seconds to start the trainer; its image is the ROS master's
+
+
+def marked(it: Situation) -> Finding | None:
+    """The pod is marked to be replaced, and still lives."""
+    if it.pod is None or it.pod.gone_by is not None:
+        return None
+    mark = mark_of(it, it.pod)
+    return None if mark is None else Finding(told=mark)
+
+
+def restart_policy_dropped(it: Situation) -> Finding | None:
+    """Sidecars became ordinary init containers: such a pod never starts its trainer."""
+    pod = it.pod
+    names = dropped(pod) if pod is not None else ()
+    if pod is None or not names or pod.gone_by is not None:
+        return None
+    return found(Reason.RESTART_POLICY_DROPPED, pod=pod.name, containers=", ".join(names))
+
+
+def trainer_never_started(it: Situation) -> Finding | None:
+    """All sidecars run, and the node forgot the trainer."""
+    pod = it.pod
+    if pod is None or pod.trainer is None or not pod.sidecars or pod.gone_by is not None:
+        return None
+    up = all(each.running_since and each.started for each in pod.sidecars)
+    if not up or pod.trainer.waiting != "PodInitializing":
+        return None
+    reason = told(Reason.TRAINER_NOT_STARTED, pod=pod.name, seconds=FORGOTTEN_S)
+    return after(it, Wait(key=("trainer", pod.uid), seconds=FORGOTTEN_S), reason)
+
+
+def stalled(it: Situation) -> Finding | None:
+    """The trainer answers, its step count does not move, and its watchdog has not ended it."""
+    wait = standstill(it)
+    if wait is None or it.pod is None or it.pod.gone_by is not None or not it.fresh:
+        return None
+    seconds = it.job.spec.stall_deadline_seconds
+    what = f"no step was learned from for more than {seconds} s"
+    return after(it, replace(wait, seconds=seconds + STALL_GRACE_S), told(Reason.STALLED, what=what))
+
+
+def replaced_too_often(it: Situation) -> Finding | None:
+    """A pod is to be replaced, and as many were as `backoffLimit` allows."""
+    job = it.seen.job
+    times = job.replaced.times if job is not None and job.replaced is not None else 0
+    if it.suspended or marked(it) is not None or times < it.job.spec.backoff_limit:
+        return None
+    causes = (cause for check in REPLACED if (cause := check(it)) is not None)
+    return min(causes, key=lambda each: each.left_s, default=None)
+
+
+REPLACED: tuple[Check, ...] = (restart_policy_dropped, trainer_never_started, stalled)

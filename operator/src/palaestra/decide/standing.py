@@ -1,0 +1,58 @@
+"""Where a replica stands that goes on, and of which nothing is wrong."""
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import Phase
+from palaestra.decide.attempts import paused
+from palaestra.decide.situation import Finding, Situation, found, told
+from palaestra.decide.suspending import unheeded
+
+UNASKED = "; why that takes long was not asked, as too many others wait; `kubectl describe` tells"
+
+
+def held(it: Situation) -> Finding | None:
+    """Something that the job names is not there, or not for jobs, so that nothing is made or resumed."""
+    if it.hold is None:
+        return None
+    return Finding(told=it.hold.told, phase=Phase.PENDING if it.seen.job is None else Phase.SUSPENDED)
+
+
+def suspended(it: Situation) -> Finding | None:
+    """`spec.suspend` or a queue keeps it from running."""
+    return Finding(told=paused(it), phase=Phase.SUSPENDED) if it.suspended else None
+
+
+def trainer_has_ended(it: Situation) -> Finding | None:
+    """The trainer has ended, and its pod not yet."""
+    pod = it.seen.pod if it.seen.job is not None else None
+    if pod is None or pod.trainer is None or pod.trainer.exit is None:
+        return None
+    what = f"attempt {it.counted.attempt} has ended, its simulators are stopped"
+    return Finding(told=told(Reason.TRAINING, what=what), phase=Phase.RUNNING)
+
+
+def trains(it: Situation) -> Finding | None:
+    """The trainer runs."""
+    if not runs(it):
+        return None
+    if it.seen.polled is not None and not it.trains:
+        return found(Reason.STARTING, what="its simulators are on their way")
+    return found(Reason.TRAINING, what=f"attempt {it.counted.attempt} trains{unheeded(it.job, it.seen)}")
+
+
+def starts(it: Situation) -> Finding | None:
+    """Its objects are about to be made, or its containers start."""
+    there = [*it.seen.in_the_way, *([it.pod.name] if it.pod is not None else [])]
+    if it.seen.job is None:
+        waits = f"waits for pod {there[0]} to end" if there else "is about to be created"
+        return found(Reason.STARTING, what=waits)
+    if it.seen.pod is None:
+        what = "its pod is about to be created"
+    else:
+        what = "its last pod has ended" if it.seen.pod.ended else "its containers start"
+    return found(Reason.STARTING, what=what + (UNASKED if it.seen.unasked else ""))
+
+
+def runs(it: Situation) -> bool:
+    """Return whether the trainer's container runs, in a pod of the replica's Job."""
+    trainer = it.pod.trainer if it.pod is not None and it.seen.job is not None else None
+    return trainer is not None and trainer.running_since is not None

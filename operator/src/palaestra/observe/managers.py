@@ -1,0 +1,16 @@
+"""Who wrote a field of an object, by the API server's own record: `metadata.managedFields`."""
+
+from palaestra.observe.reading import part, parts, text
+from palaestra.observe.views import Raw
+
+MOST_NAME = 128  # of a field manager, as the API server bounds it
+
+
+def suspends(raw: Raw) -> str:
+    """Return the field manager that set a Job's `spec.suspend` last; "": the object does not tell."""
+    entries = [
+        (text(entry, "time"), text(entry, "manager", MOST_NAME))
+        for entry in parts(raw, "metadata", "managedFields")
+        if "f:suspend" in part(entry, "fieldsV1", "f:spec")
+    ]
+    return max(entries, default=("", ""))[1]

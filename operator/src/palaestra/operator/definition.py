@@ -1,0 +1,78 @@
+"""Whether the cluster's definition of TrainingJobs has all that this release writes.
+
+With `crds.install: false` an administrator applies the definition, and may forget to. Then the API
+server drops new fields of a status without an error. No decision depends on them, but people miss them.
+
+The definition is compared through the OpenAPI document, which every account may read: the operator has
+no right to read CustomResourceDefinitions. It does its work also where the document cannot be read.
+"""
+
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+import structlog
+
+from palaestra.api.crd import schema
+from palaestra.api.job import API_VERSION, KIND
+from palaestra.api.outdated import lacks
+from palaestra.cluster import Api, ApiError
+
+READ_S = 5.0
+FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it was applied
+MOST_SHOWN = 20
+
+log = structlog.get_logger(__name__)
+
+
+class Definition:
+    """The definition of TrainingJobs in a cluster, compared with this release's.
+
+    Attributes:
+        outdated: whether it lacks something; None: it could not be read yet.
+    """
+
+    def __init__(self, api: Api) -> None:
+        self._api = api.within(READ_S)
+        self._found: tuple[str, ...] = ()
+        self.outdated: bool | None = None
+
+    def follow(self, stopping: threading.Event, every_s: float) -> None:
+        """Compare in a thread of its own until nothing is lacking: then nothing more is asked for."""
+        threading.Thread(
+            target=self._follow, args=(stopping, every_s), name="definition", daemon=True
+        ).start()
+
+    def look(self) -> None:
+        """Compare once, and log what is lacking if it is not the same as before."""
+        try:
+            served = self._api.schema(API_VERSION, KIND)
+        except ApiError as error:
+            log.info("definition not read", error=str(error))
+            return
+        before, self._found = self._found, tuple(_lacking(served.get("properties", {})))
+        self.outdated = bool(self._found)
+        if self._found and self._found != before:
+            log.warning(
+                "definition outdated",
+                lacks=self._found[:MOST_SHOWN],
+                count=len(self._found),
+                remedy="kubectl apply --server-side --filename manifests/crd.yaml of this release",
+            )
+
+    def _follow(self, stopping: threading.Event, every_s: float) -> None:
+        pause_s = FIRST_PAUSE_S
+        while not stopping.is_set():
+            try:
+                self.look()
+            except Exception:  # what nobody foresaw in the document must not end the operator
+                log.exception("definition not compared")
+            if self.outdated is False:
+                return
+            stopping.wait(pause_s)
+            pause_s = min(2 * pause_s, every_s)
+
+
+def _lacking(served: Mapping[str, Any]) -> list[str]:
+    ours = schema()["properties"]
+    return [fact for part in ("spec", "status") for fact in lacks(served.get(part, {}), ours[part], part)]

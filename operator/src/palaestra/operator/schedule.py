@@ -1,0 +1,135 @@
+"""Which trainer is asked next, and when: no clock, no sockets.
+
+Each trainer has its own next time, so nobody waits for the slowest of all. What a pod can take from others
+is a place among the questions under way, and that is bounded twice: trainers that answer at once, trainers
+that were not asked before, and trainers that held their last question up have places of their own; and among
+those that wait for a place, each namespace has its turn.
+"""
+
+import heapq
+from collections import OrderedDict, deque
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from enum import Enum
+
+FIRST_S = 1.0  # within which trainers that were just found are asked, so that they are soon known
+
+Key = tuple[str, str]  # namespace and name of a TrainingJob
+
+
+class Standing(Enum):
+    """How the last question to a trainer went."""
+
+    PROMPT = "prompt"  # it was over soon, with whatever result: a refused connection holds nobody up
+    NEW = "new"  # there was none
+    SLOW = "slow"
+
+
+PLACES = {Standing.PROMPT: 40, Standing.NEW: 16, Standing.SLOW: 8}  # 64 answers of 64 KiB: 4 MiB at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """A trainer to ask: the pod's uid and address, and the job that it belongs to."""
+
+    key: Key
+    uid: str
+    host: str
+    port: int
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Entry:
+    """What is known of a target: how and when it was asked last, and whether an answer was ever refused."""
+
+    target: Target
+    standing: Standing = Standing.NEW
+    asked_s: float = 0.0
+    refused: bool = False
+
+
+@dataclass(slots=True)
+class _Turns:
+    """Entries that wait for a place: one of each namespace in turn, the longest waiting first."""
+
+    waiting: OrderedDict[str, deque[Entry]] = field(default_factory=OrderedDict)
+
+    def put(self, entry: Entry) -> None:
+        self.waiting.setdefault(entry.target.key[0], deque()).append(entry)
+
+    def take(self) -> Entry | None:
+        if not self.waiting:
+            return None
+        namespace, entries = self.waiting.popitem(last=False)
+        entry = entries.popleft()
+        if entries:
+            self.waiting[namespace] = entries  # behind all others
+        return entry
+
+
+class Schedule:
+    """Decides which targets are asked now. Times are seconds of a monotonic clock.
+
+    Args:
+        period_s: seconds between two questions to a trainer, at most, while there are places.
+        prompt_s: seconds after which a question has held its place up.
+        spread: returns a random number from 0 to 1, so that a thousand trainers are not asked in one moment.
+    """
+
+    def __init__(self, period_s: float, prompt_s: float, spread: Callable[[], float]) -> None:
+        self._period_s = period_s
+        self._prompt_s = prompt_s
+        self._spread = spread
+        self._entries: dict[str, Entry] = {}
+        self._times: list[tuple[float, int, Entry]] = []
+        self._numbered = 0  # entries of one time are compared by number
+        self._waiting = {standing: _Turns() for standing in Standing}
+        self._free = dict(PLACES)
+
+    def follow(self, targets: Collection[Target], now_s: float) -> list[Target]:
+        """Ask these from now on, and return those that are not asked any more."""
+        wanted = {each.uid: each for each in targets}
+        gone = [each.target for uid, each in self._entries.items() if wanted.get(uid) != each.target]
+        for target in gone:
+            del self._entries[target.uid]
+        for uid in wanted.keys() - self._entries.keys():
+            first_s = now_s + self._spread() * min(FIRST_S, self._period_s)
+            self._entries[uid] = entry = Entry(target=wanted[uid])
+            self._at(entry, first_s)
+        return gone
+
+    def due(self, now_s: float) -> Iterator[Entry]:
+        """Yield the targets to ask now; each takes a place until `done`."""
+        while self._times and self._times[0][0] <= now_s:
+            entry = heapq.heappop(self._times)[-1]
+            if self.follows(entry):
+                self._waiting[entry.standing].put(entry)
+        for standing, turns in self._waiting.items():
+            while self._free[standing] and (found := turns.take()) is not None:
+                if self.follows(found):
+                    self._free[standing] -= 1
+                    found.asked_s = now_s
+                    yield found
+
+    def done(self, entry: Entry, now_s: float) -> bool:
+        """Give the place of a question back; return whether its pod is still there: else forget it."""
+        self._free[entry.standing] += 1
+        if not self.follows(entry):
+            return False
+        first = entry.standing is Standing.NEW
+        entry.standing = Standing.PROMPT if now_s - entry.asked_s < self._prompt_s else Standing.SLOW
+        least = 0.2 if first else 0.8  # those that were found together come apart at once
+        self._at(entry, now_s + self._period_s * (least + (1.0 - least) * self._spread()))
+        return True
+
+    def follows(self, entry: Entry) -> bool:
+        """Return whether a target is still to be asked."""
+        return self._entries.get(entry.target.uid) is entry
+
+    def next_s(self) -> float | None:
+        """Return when the next target is due; None: there is none. A place may become free before."""
+        return self._times[0][0] if self._times else None
+
+    def _at(self, entry: Entry, due_s: float) -> None:
+        self._numbered += 1
+        heapq.heappush(self._times, (due_s, self._numbered, entry))

@@ -1,0 +1,91 @@
+"""Which pods are trainers to ask, kept from event to event, so that nobody reads all pods at once.
+
+A pod is no trainer by its labels: its Job has to be known, of the same TrainingJob, and owned by it. All
+that is kept of a pod are its address and its owners.
+"""
+
+import ipaddress
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from palaestra.observe.reading import owners, part, parts, text
+from palaestra.operator.schedule import Key, Target
+from palaestra.plan.layout import STATUS_PORT
+from palaestra.plan.replica import JOB_LABEL, TRAINER
+
+Object = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Job:
+    key: Key
+    uid: str
+    owners: frozenset[str]
+
+
+class Trainers:
+    """The trainers that run, as far as the caches reported it; safe to read from any thread."""
+
+    def __init__(self) -> None:
+        self._training_jobs: dict[Key, str] = {}
+        self._jobs: dict[Key, _Job] = {}
+        self._pods: dict[Key, tuple[Target, frozenset[str]]] = {}
+
+    def training_job(self, obj: Object, *, exists: bool) -> None:
+        """Take the newest state of a TrainingJob, or the last one of a deleted one."""
+        name = _name(obj)
+        if exists:
+            self._training_jobs[name] = text(part(obj, "metadata"), "uid")
+        else:
+            self._training_jobs.pop(name, None)
+
+    def job(self, obj: Object, *, exists: bool) -> None:
+        """Take the newest state of a batch/v1 Job, or the last one of a deleted one."""
+        name, uid = _name(obj), text(part(obj, "metadata"), "uid")
+        if exists:
+            self._jobs[name] = _Job(key=_key(obj), uid=uid, owners=owners(obj))
+        else:
+            self._jobs.pop(name, None)
+
+    def pod(self, obj: Object, *, exists: bool) -> None:
+        """Take the newest state of a pod, or the last one of a deleted one."""
+        name, host = _name(obj), _address(obj)
+        if exists and host is not None and _trains(obj):
+            uid = text(part(obj, "metadata"), "uid")
+            self._pods[name] = Target(key=_key(obj), uid=uid, host=host, port=STATUS_PORT), owners(obj)
+        else:
+            self._pods.pop(name, None)
+
+    def targets(self) -> list[Target]:
+        """Return the trainers to ask."""
+        keys = {
+            job.uid: job.key
+            for job in tuple(self._jobs.values())
+            if self._training_jobs.get(job.key) in job.owners
+        }
+        pods = tuple(self._pods.values())
+        return [target for target, uids in pods if any(keys.get(uid) == target.key for uid in uids)]
+
+
+def _name(obj: Object) -> Key:
+    return obj["metadata"]["namespace"], obj["metadata"]["name"]
+
+
+def _key(obj: Object) -> Key:
+    """Return the TrainingJob whose label a child carries."""
+    return obj["metadata"]["namespace"], obj["metadata"]["labels"][JOB_LABEL]
+
+
+def _trains(pod: Object) -> bool:
+    """Return whether the trainer's container runs."""
+    states = {text(each, "name"): part(each, "state") for each in parts(pod, "status", "containerStatuses")}
+    return "running" in states.get(TRAINER, {}) and "deletionTimestamp" not in pod["metadata"]
+
+
+def _address(pod: Object) -> str | None:
+    """Return a pod's address; None: it has none, or a name, which nobody resolves for it."""
+    try:
+        return str(ipaddress.ip_address(text(part(pod, "status"), "podIP")))
+    except ValueError:
+        return None

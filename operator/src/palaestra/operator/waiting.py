@@ -1,0 +1,24 @@
+"""What the replicas of a TrainingJob wait for, as its status says, so that no typo waits in silence."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from palaestra.api.reasons import WAITING
+from palaestra.api.status import Phase
+from palaestra.observe.reading import count, parts, text
+
+_WORDS = frozenset(reason.value for reason in WAITING)
+
+
+def waits(job: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a reason for each replica that waits and does not run, or runs and has not made a step yet."""
+    return tuple(
+        text(each, "reason")
+        for each in parts(job, "status", "replicas")
+        if text(each, "reason") in _WORDS and _before_training(each)
+    )
+
+
+def _before_training(replica: Mapping[str, Any]) -> bool:
+    phase = text(replica, "phase")
+    return phase == Phase.PENDING or (phase == Phase.RUNNING and count(replica, "step") == 0)

@@ -1,0 +1,28 @@
+"""Install Palaestra on a control plane without nodes: everything of install.yaml but the Deployment."""
+
+from palaestra.cluster import Api, Resource, connect
+from tests.chart.installation import installed
+from tests.control_plane.plane import ControlPlane
+from tests.integration.operator.cluster import served
+from tests.waiting import eventually
+
+UNNAMESPACED = {"Namespace", "ClusterRole", "ClusterRoleBinding"}
+PLURALS = {"NetworkPolicy": "networkpolicies"}
+ELSEWHERE = {"Deployment", "CustomResourceDefinition"}  # operators are processes; kinds come with the plane
+
+
+def install(plane: ControlPlane) -> Api:
+    """Create all objects of the installation, and return an administrator's client."""
+    api = connect(str(plane.kubeconfig))
+    for obj in installed():
+        kind = obj["kind"]
+        if kind not in ELSEWHERE:
+            resource = Resource(
+                api_version=obj["apiVersion"],
+                kind=kind,
+                plural=PLURALS.get(kind, f"{kind.lower()}s"),
+                namespaced=kind not in UNNAMESPACED,
+            )
+            api.create(resource, obj)
+    eventually(lambda: served(api))
+    return api

@@ -1,0 +1,15 @@
+"""The command line as in a pod: `in_a_pod.py FOLDER operator …`; the folder has the files of its account."""
+
+import io
+import sys
+from contextlib import redirect_stdout, suppress
+from pathlib import Path
+
+from palaestra.cli import main
+
+if __name__ == "__main__":
+    folder, *arguments = sys.argv[1:]
+    with suppress(SystemExit), redirect_stdout(io.StringIO()):
+        main(["operator", "--help"])  # imports what an operator imports, and nothing more
+    sys.modules["palaestra.cluster.account"].FILES = Path(folder)
+    sys.exit(main(arguments))

@@ -1,0 +1,62 @@
+"""What the operator keeps of large jobs, and that it plans from what the API server has."""
+
+import re
+from pathlib import Path
+
+from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
+from palaestra_sim.world import builtin
+from tests.integration.operator.cluster import training_job
+from tests.waiting import eventually
+
+LARGE, MOST_MIB = 40, 100
+NO_EVALUATION = {"evaluation": {"everySteps": 0}}
+
+
+def with_worlds(*texts):
+    """Return the fields of a job with these inline worlds."""
+    groups = [
+        {"name": f"g{place}", "role": "Collect", "world": {"inline": text}}
+        for place, text in enumerate(texts)
+    ]
+    return {"simulators": groups, "trainer": NO_EVALUATION}
+
+
+def test_a_job_is_planned_from_its_worlds_and_not_from_their_digests(place, start):
+    """The cache holds digests; pods get what the author wrote."""
+    world = builtin("arena").decode() + "# " + "x" * 1000 + "\n"
+    start()
+
+    place.train(**with_worlds(world))
+
+    place.pods()
+    [made] = place.all(CONFIG_MAPS, "job")
+    assert made["data"]["g0.wbt"].endswith("x" * 1000 + "\n")
+
+
+def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(place, start):
+    """Free fields are judged by the operator alone, and are not cached when they are large."""
+    start()
+
+    place.train(trainer={"algorithm": {"hyperparameters": {"x": [0] * 30_000}}})
+
+    status = place.until("Failed")
+    assert "holds more than 1000 values" in status["conditions"][0]["message"]
+
+
+def all_have_failed(place):
+    """Return whether every TrainingJob here is refused; as a table, which holds no worlds."""
+    rows = place.api.table(TRAINING_JOBS, place.name)["rows"]
+    return [row["cells"][1] for row in rows] == ["Failed"] * LARGE
+
+
+def test_large_jobs_that_are_refused_leave_the_operator_small(place, start):
+    """They are there before it starts, so it reads them all at once."""
+    worlds = with_worlds(*(["x" * 180_000] * 5))
+    for number in range(LARGE):
+        place.create(TRAINING_JOBS, training_job(f"job-{number}", **worlds))
+    operator = start()
+
+    eventually(lambda: all_have_failed(place), 90)
+
+    told = Path(f"/proc/{operator.process.pid}/status").read_text()
+    assert int(re.search(r"VmHWM:\s+(\d+) kB", told)[1]) / 1024 < MOST_MIB

@@ -1,0 +1,220 @@
+"""What others do to objects of ours: it is reported and left alone, as no two programs may fight."""
+
+import pytest
+
+from palaestra.api.reasons import Reason
+from palaestra.cluster import connect
+from palaestra.cluster.resources import CLAIMS, JOBS, NETWORK_POLICIES, PODS, TRAINING_JOBS
+from palaestra.decide import Delete, Discard, SetSuspend, Stop
+from palaestra.decide.decision import Basis
+from palaestra.operator.acting import Acting
+from palaestra.operator.confirming import Outdated
+from palaestra.operator.denials import Denials
+from palaestra.operator.strangers import Strangers
+from palaestra.operator.writing import Writer
+from tests.integration.operator.cluster import stranger
+from tests.integration.operator.installed import USER
+from tests.waiting import eventually
+
+SUSPEND_SET = "palaestra.dev/suspend-set"
+QUEUE = "kueue"  # the field manager, as an API server takes it from the User-Agent
+
+
+def as_kueue(place, control_plane, *, suspend, name="job-0"):
+    """Suspend or resume a Job as Kueue does, and return it."""
+    api = connect(str(control_plane.kubeconfig))
+    obj = {"apiVersion": "batch/v1", "kind": "Job", "spec": {"suspend": suspend}}
+    metadata = {"name": name, "namespace": place.name}
+    return api.apply({**obj, "metadata": metadata}, manager=QUEUE)
+
+
+def patches(control_plane, place):
+    """Return how many patches of Jobs the operator has made in a namespace; a refused one changes nothing."""
+    wanted = {"resource": "jobs", "namespace": place.name}
+    return sum(
+        each["verb"] == "patch" and each["user"].get("username") == USER
+        and each["responseStatus"]["code"] == 200 and wanted.items() <= each.get("objectRef", {}).items()
+        for each in control_plane.audit()
+    )  # fmt: skip
+
+
+def message(place, name="job"):
+    """Return what the status says of the first replica."""
+    replicas = place.status(name).get("replicas") or [{}]
+    return replicas[0].get("message", "")
+
+
+def test_a_job_that_somebody_else_suspends_is_not_fought_over(place, start, control_plane):
+    """Kueue with manageJobsWithoutQueueName suspends it whenever it is resumed."""
+    start()
+    place.train()
+    place.pods()
+
+    as_kueue(place, control_plane, suspend=True)
+    eventually(lambda: message(place).startswith(f"suspended by {QUEUE}, not by spec.suspend"))
+    place.train("later")  # the operator has looked at all there is, and gone on
+    place.pods("later")
+
+    assert patches(control_plane, place) == 0
+    assert place.get(JOBS, "job-0")["spec"]["suspend"] is True
+    assert eventually(lambda: "Suspended" in place.events())
+
+
+def test_what_the_operator_set_stands_on_the_job_and_its_author_is_heeded(place, start, control_plane):
+    """Created with it, and patched together with `spec.suspend`."""
+    start()
+    place.train()
+    place.pods()
+    as_kueue(place, control_plane, suspend=True)
+    place.until("Suspended")
+    assert place.get(JOBS, "job-0")["metadata"]["annotations"][SUSPEND_SET] == "false"
+
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": True}})
+    eventually(lambda: place.get(JOBS, "job-0")["metadata"]["annotations"][SUSPEND_SET] == "true")
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": False}})
+
+    assert place.pods()
+    assert place.get(JOBS, "job-0")["metadata"]["annotations"][SUSPEND_SET] == "false"
+    assert patches(control_plane, place) == 2
+
+
+def test_a_job_of_an_earlier_release_that_is_suspended_is_taken_as_it_stands(place, start, control_plane):
+    """It has no annotation; the operator that follows neither resumes it nor adds one."""
+    first = start()
+    place.train()
+    place.pods()
+    first.stop()
+    place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": None}})
+    as_kueue(place, control_plane, suspend=True)
+
+    start()
+    eventually(lambda: message(place).startswith(f"suspended by {QUEUE}, "))
+
+    assert patches(control_plane, place) == 0
+    assert SUSPEND_SET not in place.get(JOBS, "job-0")["metadata"].get("annotations", {})
+
+
+def test_a_job_is_made_again_beside_a_pod_on_a_lost_node(place, start):
+    """Its claim is another, so that nothing has to wait for a kubelet that does not answer."""
+    start()
+    place.train(replicas=2)
+    for pod in place.pods(count=2):
+        place.bind(pod)
+    place.api.delete(TRAINING_JOBS, place.name, "job")
+    eventually(lambda: all("deletionTimestamp" in each["metadata"] for each in place.all(PODS, "job")))
+
+    place.train(replicas=2)
+
+    assert place.pods(count=2)
+    assert len(place.all(PODS, "job")) == 4
+
+
+def test_a_replica_that_waits_for_an_old_pod_on_the_same_claim_says_so(place, start):
+    """Which pod, on which node; it starts when that is gone."""
+    start()
+    place.create(CLAIMS, shared_claim())
+    place.train(storage={"existingClaim": "shared"})
+    [old] = place.pods()
+    place.bind(old)
+    place.api.delete(TRAINING_JOBS, place.name, "job")
+    eventually(lambda: all("deletionTimestamp" in each["metadata"] for each in place.all(PODS, "job")))
+
+    place.train(storage={"existingClaim": "shared"})
+    eventually(lambda: "OldPodTerminating" in place.events())
+    assert old["metadata"]["name"] in message(place)
+    assert "node-1" in message(place)
+    assert place.get(JOBS, "job-0") is None
+    place.end(old, code=75)  # the machine is back, and its kubelet tells
+
+    assert place.pods()
+
+
+def shared_claim():
+    """Return a claim that is open to jobs."""
+    return {
+        "apiVersion": "v1",
+        "kind": "PersistentVolumeClaim",
+        "metadata": {"name": "shared", "labels": {"palaestra.dev/for-jobs": "true"}},
+        "spec": {"accessModes": ["ReadWriteMany"], "resources": {"requests": {"storage": "1Gi"}}},
+    }
+
+
+def test_what_was_decided_on_a_cache_that_lags_is_not_done(place, installed):
+    """Preconditions hold at the API server: the time to live is removed, the Job resumed, in between."""
+    writer = Writer(installed, lambda: True)
+    acting = Acting(installed, writer, Strangers(installed), Denials())
+    place.train()
+    job = place.create(JOBS, stranger("job-0"))
+    basis = Basis(uid=job["metadata"]["uid"], version=job["metadata"]["resourceVersion"])
+    stale = place.get(TRAINING_JOBS, "job")
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"ttlSecondsAfterFinished": 1000}})
+    place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {"seen": "true"}}})
+    raw = place.get(TRAINING_JOBS, "job")
+    decisions = [
+        (stale, Delete(name="job", uid=stale["metadata"]["uid"])),
+        (raw, Discard(job="job-0", replica=0, basis=basis)),
+        (raw, Stop(job="job-0", replica=0, reason=Reason.STALLED, message="it", basis=basis)),
+        (raw, SetSuspend(job="job-0", replica=0, suspend=False, basis=basis)),
+    ]
+
+    for seen, action in decisions:
+        with pytest.raises(Outdated):
+            acting.carry_out(seen, (action,))
+
+    assert (
+        place.get(TRAINING_JOBS, "job")["metadata"]["resourceVersion"] == raw["metadata"]["resourceVersion"]
+    )
+    assert place.get(JOBS, "job-0")["spec"]["suspend"] is True
+    assert "palaestra.dev/stopped" not in place.get(JOBS, "job-0")["metadata"]["annotations"]
+
+
+@pytest.mark.parametrize("write", [0, 1, 3])
+def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, place, start, control_plane):
+    """A queue would admit it later and preempt others; an operator that is killed at any write is followed.
+
+    The writes are its mark, the other's stop, the status and the deletion; 0: it lives.
+    """
+    first = start()
+    place.train(replicas=2, activeDeadlineSeconds=6)
+    pods = place.pods(count=2)
+    as_kueue(place, control_plane, suspend=True)
+    place.run(next(pod for pod in pods if pod["metadata"]["labels"]["palaestra.dev/replica"] == "1"))
+    eventually(lambda: [each["phase"] for each in place.status()["replicas"]] == ["Suspended", "Running"])
+    first.stop()
+
+    mortal = start(dies_after=write or None)
+    if write:
+        mortal.wait(60)
+        start()
+
+    status = place.until("Failed", deadline_s=60)
+    eventually(lambda: place.get(JOBS, "job-0") is None)
+    assert [each["reason"] for each in status["replicas"]] == ["DeadlineExceeded"] * 2
+    assert place.get(JOBS, "job-1")["spec"]["activeDeadlineSeconds"] == 1
+    made = {"resource": "jobs", "namespace": place.name, "name": "job-0"}
+    audited = [each for each in control_plane.audit() if made.items() <= each.get("objectRef", {}).items()]
+    assert [each["verb"] for each in audited if each["user"].get("username") == USER].count("delete") == 1
+
+
+def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_plane):
+    """Whoever edited them may have had a reason; the author of the job has to know."""
+    start()
+    place.train()
+    place.pods()
+    [policy] = place.all(NETWORK_POLICIES, "job")
+
+    place.api.merge(NETWORK_POLICIES, place.name, policy["metadata"]["name"], {"spec": {"ingress": None}})
+    place.api.merge(JOBS, place.name, "job-0", {"spec": {"parallelism": 0}})
+    eventually(lambda: len(edits(place)) == 2)
+    start()  # another operator sees the same
+    place.train("later")
+    place.pods("later")
+
+    assert [each["count"] for each in edits(place)] == [1, 1]
+    assert place.get(JOBS, "job-0")["spec"]["parallelism"] == 0
+    assert patches(control_plane, place) == 0
+
+
+def edits(place):
+    """Return the events about edits."""
+    return [each for each in place.about() if each["reason"] == "Edited"]

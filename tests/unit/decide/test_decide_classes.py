@@ -1,0 +1,274 @@
+"""What heals by itself is waited for, what no kubelet heals gets a new pod, and little is final."""
+
+import pytest
+
+from palaestra.api.status import Phase
+from palaestra.decide import Replace, Stop
+
+NIGHT_S = 21_600  # the default of startTimeoutSeconds
+
+
+def stops(decision):
+    """Return the reasons of the replicas that a decision stops."""
+    return [each.reason.value for each in decision.actions if isinstance(each, Stop)]
+
+
+def replacements(decision):
+    """Return the replacements of pods that a decision asks for."""
+    return [each for each in decision.actions if isinstance(each, Replace)]
+
+
+def forget(scene):
+    """Make the next pod, whose trainer its node forgets, and let it be found out."""
+    pod = scene.running_pod()
+    scene.container(pod, "trainer", waiting="PodInitializing")
+    scene.settle()
+    return pod, scene.step(300)
+
+
+def end(scene, pod):
+    """Let an evicted pod end and be gone."""
+    pod["status"]["phase"] = "Failed"
+    scene.settle(5)
+    scene.objects["pods"].remove(pod)
+    scene.pass_(5)
+
+
+@pytest.mark.parametrize(
+    ("container", "state", "reason"),
+    [
+        ("sim-collect-0", {"waiting": "ImagePullBackOff: no such image"}, "ImagePull"),
+        ("sim-collect-0", {"waiting": "CreateContainerError: no such file"}, "ContainerRefused"),
+        ("sim-collect-0", {"waiting": "CrashLoopBackOff", "code": 3, "restarts": 9}, "SidecarCrashLoop"),
+        (
+            "sim-collect-0",
+            {"waiting": "CrashLoopBackOff", "code": 137, "reason": "OOMKilled", "restarts": 9},
+            "SimulatorOutOfMemory",
+        ),
+    ],
+)
+def test_what_a_kubelet_tries_again_ends_nothing_and_is_told(training, last_word, container, state, reason):
+    """On the second pod of a run at step 3,000,000 a registry is away for a day."""
+    scene, pod = training()
+    scene.end(pod, 75, last_word(step=3_000_000))
+    scene.settle(5)
+    second = scene.new_pod()
+    scene.container(second, container, **state)
+    found = [*stops(scene.settle(5)), *replacements(scene.step(60)), *stops(scene.settle(86_400))]
+
+    assert found == []
+    assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, reason)
+    assert scene.replica().message.startswith("container sim-collect-0")
+    assert (scene.replica().restarts.trainer, scene.replica().restarts.operator) == (0, None)
+
+
+def test_a_name_that_no_image_can_have_is_final(accepted):
+    """No registry will ever have it."""
+    scene = accepted()
+    scene.container(scene.new_pod(), "sim-collect-0", waiting="InvalidImageName: bad")
+
+    assert stops(scene.step()) == ["ImagePull"]
+
+
+def test_a_simulator_that_does_not_start_is_told_and_is_the_trainers_to_judge(training, simulator):
+    """It has a budget of faults; the operator ends nothing by its own clock."""
+    scene, pod = training()
+    told = {"phase": "starting", "simulators": (simulator(state="failed", last_fault="did not come up"),)}
+    scene.poll(pod, **told)
+    scene.settle()
+    assert scene.replica().reason == "Starting"
+    scene.pass_(60)
+    scene.poll(pod, **told)
+
+    assert stops(scene.settle()) == []
+    assert (scene.replica().phase, scene.replica().reason) == (Phase.RUNNING, "SimulatorStartDeadline")
+    assert scene.replica().message.startswith(
+        "sim-collect-0 is not up within 60 s of its container's start: did not come up; "
+    )
+
+
+@pytest.mark.parametrize("seconds", [None, 100])
+def test_the_wait_for_a_first_step_is_bounded_and_names_what_it_waits_for(accepted, seconds):
+    """A typo in an image must not hold a quota for ever."""
+    spec = {} if seconds is None else {"startTimeoutSeconds": seconds}
+    scene = accepted(**spec)
+    scene.container(scene.new_pod(), "trainer", waiting="ErrImagePull: not found")
+    scene.settle()
+    bound = seconds or NIGHT_S
+
+    assert stops(scene.step(bound - 1)) == []
+    assert stops(scene.step(1)) == ["ImagePull"]
+    scene.settle()
+    assert (scene.replica().phase, scene.replica().reason) == (Phase.FAILED, "ImagePull")
+    assert scene.replica().message.startswith(f"no step within {bound} s, as long as startTimeoutSeconds")
+
+
+def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
+    """As when nobody makes a pod for the Job."""
+    scene = accepted(startTimeoutSeconds=100)
+
+    assert stops(scene.step(100)) == ["StartTimeout"]
+
+
+def test_time_in_a_queue_or_suspended_is_no_wait_for_a_first_step(make_scene):
+    """A queue may take the week."""
+    scene = make_scene(scheduling={"queueName": "robots"}, startTimeoutSeconds=100)
+    scene.kueue = True
+    scene.settle()
+
+    assert stops(scene.settle(3600)) == []
+    scene.job()["spec"]["suspend"] = False
+    scene.settle()
+    assert stops(scene.settle(99)) == []
+    assert stops(scene.step(1)) == ["StartTimeout"]
+
+
+def test_a_trainer_that_runs_and_reports_nothing_waits_for_no_step(training):
+    """A program of one's own may answer nobody; nothing is known, so nothing is ended."""
+    scene, _ = training(startTimeoutSeconds=100)
+
+    assert stops(scene.settle(100)) == []
+    assert stops(scene.settle(86_400)) == []
+
+
+def test_what_no_kubelet_heals_gets_a_new_pod_and_is_counted(accepted):
+    """Mark first, eviction then; the attempt's number adds up, and nothing counts against the Job."""
+    scene = accepted()
+    pod, decision = forget(scene)
+
+    (replacement,) = replacements(decision)
+    assert (replacement.pod, replacement.uid, replacement.times) == ("job-0-0", "pod-0", 1)
+    mark = f"1 pod-0 TrainerNotStarted: {replacement.message}"
+    assert replacement.patch == {"metadata": {"annotations": {"palaestra.dev/replaced": mark}}}
+    end(scene, pod)
+    scene.running_pod()
+    scene.settle()
+    restarts = scene.replica().restarts
+    assert (restarts.operator, restarts.disruption, restarts.trainer) == (1, 0, 0)
+    assert scene.replica().attempt == 2
+    assert scene.replica().last_attempt.reason == "TrainerNotStarted"
+
+
+def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
+    """The operator may have been killed between the mark and the eviction; it is counted once."""
+    scene = accepted()
+    scene.budget = True
+    forget(scene)
+    scene.restart()
+
+    (again,) = replacements(scene.step())
+
+    assert (again.times, again.marked) == (1, True)
+    assert scene.replica().reason == "TrainerNotStarted"
+
+
+def test_a_disruption_budget_that_allows_no_eviction_is_told(accepted):
+    """It is tried again; nothing is deleted past a budget."""
+    scene = accepted()
+    scene.budget = True
+    forget(scene)
+    scene.denied = {0: "Cannot evict pod as it would violate the pod's disruption budget."}
+
+    scene.step()
+
+    assert scene.replica().message.endswith(
+        "; it is not replaced yet: Cannot evict pod as it would violate the pod's disruption budget."
+    )
+
+
+def test_a_pod_that_is_being_deleted_is_not_replaced_again(accepted):
+    """One eviction is enough."""
+    scene = accepted()
+    forget(scene)
+
+    assert replacements(scene.settle(30)) == []
+
+
+@pytest.mark.parametrize("limit", [0, 2])
+def test_pods_are_replaced_as_often_as_the_limit_allows(accepted, limit):
+    """Then the replica fails with the reason."""
+    scene = accepted(backoffLimit=limit)
+    for _ in range(limit):
+        pod, decision = forget(scene)
+        assert len(replacements(decision)) == 1
+        end(scene, pod)
+    _, last = forget(scene)
+
+    assert (stops(last), replacements(last)) == (["TrainerNotStarted"], [])
+
+
+def test_dropped_restart_policies_are_found_out_at_once(accepted):
+    """Such a pod hangs in Init for ever; a webhook may be mended before the last try."""
+    scene = accepted()
+    pod = scene.new_pod()
+    del pod["spec"]["initContainers"][1]["restartPolicy"]
+
+    (replacement,) = replacements(scene.step())
+
+    assert replacement.reason == "RestartPolicyDropped"
+
+
+@pytest.mark.parametrize(
+    "mark",
+    ["", "x", "1", "1 pod-0", "-1 pod-0 Stalled: it", "1 pod-0 Stalled", "9999999999 pod-0 Stalled: it", 3],
+)
+def test_a_mark_that_is_not_ours_is_none(accepted, mark):
+    """An annotation may be written by others."""
+    scene = accepted()
+    scene.running_pod()
+    scene.job()["metadata"]["annotations"] = {"palaestra.dev/replaced": mark}
+
+    assert replacements(scene.settle()) == []
+    assert scene.replica().reason == "Training"
+
+
+def take(scene, pod, seconds=5):
+    """Let the cluster take a pod, which is gone soon."""
+    scene.take(pod)
+    scene.settle(seconds)
+
+
+@pytest.mark.parametrize(("limit", "pods"), [(None, 6), (2, 2), (0, None)])
+def test_pods_that_are_taken_without_a_step_are_bounded_by_the_limit(training, limit, pods):
+    """Counted from the first step that was reported; 0: any number."""
+    spec = {} if limit is None else {"noProgressLimit": limit}
+    scene, pod = training(**spec)
+    scene.poll(pod, step=7)
+    scene.settle()
+    made = 0
+    while scene.status.phase is not Phase.FAILED and made < 12:
+        take(scene, pod)
+        made += 1
+        if scene.status.phase is not Phase.FAILED:
+            pod = scene.running_pod()
+            scene.settle(5)
+
+    assert made == (pods or 12)
+
+
+def test_a_program_that_reports_nothing_is_never_without_progress(training):
+    """Nobody knows what it has done."""
+    scene, pod = training()
+    for _ in range(20):
+        take(scene, pod)
+        pod = scene.running_pod()
+        scene.settle(5)
+
+    assert scene.replica().phase is Phase.RUNNING
+    assert (scene.replica().fruitless, scene.replica().restarts.disruption) == (0, 20)
+
+
+def test_pods_whose_trainer_did_not_start_are_not_without_progress(training):
+    """A cluster that is full preempts them while they pull."""
+    scene, pod = training()
+    scene.poll(pod, step=7)
+    scene.settle()
+    take(scene, pod)
+    for _ in range(20):
+        pod = scene.new_pod()
+        scene.settle(5)
+        pod["status"] |= {"phase": "Failed", "conditions": [{"type": "DisruptionTarget", "status": "True"}]}
+        scene.settle(5)
+
+    assert scene.replica().phase is Phase.PENDING
+    assert scene.replica().fruitless == 1

@@ -1,0 +1,208 @@
+"""No two clocks agree, so nothing is ended by a difference of two of them.
+
+`scene.behind_s` puts a node's clock behind that of the API server, `scene.set_clock` sets the operator's.
+"""
+
+import pytest
+
+from palaestra.api.status import Phase
+from palaestra.decide import Replace, Stop
+
+HOUR_S = 3600
+
+
+def stops(decision):
+    """Return the reasons of the replicas that a decision stops, or gives a new pod."""
+    return [each.reason.value for each in decision.actions if isinstance(each, Stop | Replace)]
+
+
+@pytest.mark.parametrize("tells_ages", [True, False])
+@pytest.mark.parametrize("behind_s", [721, -721, 86_400])
+def test_a_node_whose_clock_is_off_does_not_end_a_trainer_that_steps(accepted, behind_s, tells_ages):
+    """Its answers would be twelve minutes old by a clock of ours; a trainer's age of a step is not."""
+    scene = accepted(stallDeadlineSeconds=600)
+    scene.behind_s = behind_s
+    pod = scene.running_pod()
+    found = []
+    for step in range(100):
+        scene.pass_(10)
+        ages = {"last_progress_age_s": 0.2} if tells_ages else {}
+        scene.poll(pod, step=step, last_progress=scene.node_stamp(), **ages)
+        found += stops(scene.step())
+
+    assert found == []
+    assert scene.replica().reason == "Training"
+
+
+@pytest.mark.parametrize("behind_s", [115, 721])
+def test_a_node_whose_clock_is_behind_does_not_end_a_trainer_that_starts(accepted, simulator, behind_s):
+    """A container that was started a moment ago would have started minutes ago."""
+    scene = accepted()
+    scene.behind_s = behind_s
+    pod = scene.running_pod()
+    scene.poll(pod, phase="starting", simulators=(simulator(state="starting"),))
+
+    assert stops(scene.step()) == []
+    assert stops(scene.step(30)) == []
+
+
+def test_a_node_whose_clock_is_behind_has_its_time_to_start_the_trainer(accepted):
+    """All its sidecars seem to run for ten minutes."""
+    scene = accepted()
+    scene.behind_s = 600
+    scene.container(scene.running_pod(), "trainer", waiting="PodInitializing")
+
+    assert stops(scene.step()) == []
+    assert stops(scene.step(299)) == []
+    assert stops(scene.step(1)) == ["TrainerNotStarted"]
+
+
+@pytest.mark.parametrize("seconds", [900, -HOUR_S, 30 * 86_400])
+def test_setting_the_operators_clock_ends_nothing(training, seconds):
+    """Somebody mends its time, or a virtual machine wakes up."""
+    scene, pod = training(stallDeadlineSeconds=600, activeDeadlineSeconds=HOUR_S)
+    scene.poll(pod, step=1, last_progress_age_s=1.0)
+    scene.settle(10)
+
+    scene.set_clock(seconds)
+    scene.poll(pod, step=2, last_progress_age_s=1.0)
+
+    assert stops(scene.step(10)) == []
+    assert scene.replica().reason == "Training"
+    assert scene.status.active_seconds == 20
+
+
+def test_setting_the_operators_clock_back_ends_what_is_over_all_the_same(training):
+    """A deadline would be an hour longer."""
+    scene, _ = training(activeDeadlineSeconds=60)
+    scene.set_clock(-HOUR_S)
+
+    assert stops(scene.step(60)) == ["DeadlineExceeded"]
+
+
+def test_a_new_process_begins_every_wait_anew(training):
+    """It may get longer by that, never shorter; nothing of the old one's clock is left."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    scene.poll(pod, step=50)
+    scene.settle()
+    scene.pass_(170)
+    scene.restart()
+    scene.poll(pod, step=50)
+    scene.settle()
+    scene.pass_(179)
+    scene.poll(pod, step=50)
+
+    assert stops(scene.step()) == []
+    assert stops(scene.step(1)) == ["Stalled"]
+
+
+def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training):
+    """That was counted by the trainer's own monotonic clock, which no restart of ours sets back."""
+    scene, pod = training(stallDeadlineSeconds=60)
+    scene.restart()
+    scene.poll(pod, step=50, last_progress_age_s=180.0)
+
+    assert stops(scene.step()) == ["Stalled"]
+
+
+def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training):
+    """What was not written yet is lost, so that the deadline gets longer by it."""
+    scene, pod = training(activeDeadlineSeconds=100)
+    scene.poll(pod, step=1)
+    scene.settle(60)
+    assert scene.status.active_seconds == 60
+    scene.restart()
+    scene.set_clock(-HOUR_S)
+    scene.settle()
+
+    assert stops(scene.step(39)) == []
+    assert stops(scene.step(1)) == ["DeadlineExceeded"]
+
+
+@pytest.mark.parametrize("ago_s", [0, HOUR_S])
+def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, ago_s):
+    """The API server's clock may be an hour behind ours; the pod's grace is told as seconds."""
+    scene, pod = training()
+    scene.server_s -= ago_s
+    scene.delete(pod, 60)
+    scene.settle()
+
+    scene.settle(89)
+    assert scene.replica().reason == "Training"
+    scene.settle(1)
+
+    assert scene.replica().reason == "NodeLost"
+
+
+def test_the_last_word_is_waited_for_whenever_its_job_says_that_it_ended(training, last_word):
+    """The time of a Job's end is the control plane's."""
+    scene, pod = training()
+    scene.server_s -= HOUR_S
+    scene.end_job("Complete")
+    scene.step()
+    assert scene.status.phase is Phase.RUNNING
+    scene.end(pod, 0, last_word(step=7))
+
+    scene.step(1)
+
+    assert (scene.status.phase, scene.replica().step) == (Phase.SUCCEEDED, 7)
+
+
+@pytest.mark.parametrize("server_s", [-HOUR_S, HOUR_S])
+def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
+    """The time to live is counted from it, by the clock that has stamped it."""
+    scene, pod = training(ttlSecondsAfterFinished=60)
+    scene.server_s += server_s
+    scene.end(pod, 0, last_word(step=100))
+    scene.end_job("Complete")
+
+    decision = scene.step()
+
+    assert scene.status.completion_time == scene.now
+    assert decision.wake_after_s == 60
+
+
+def kill(scene, pod, run):
+    """Let the kernel kill the trainer's neighbour in a run of its container; it runs again."""
+    scene.container(pod, "sim-collect-0", running=True, restarts=run + 1)
+    ended = {"exitCode": 137, "reason": "OOMKilled", "finishedAt": scene.node_stamp()}
+    for each in pod["status"]["initContainerStatuses"]:
+        if each["name"] == "sim-collect-0":
+            each["lastState"] = {"terminated": ended}
+
+
+def kills(scene):
+    """Return how often a container was killed for its memory."""
+    return [each.times for each in scene.replica().memory_kills]
+
+
+def test_kills_are_told_apart_by_pod_and_run_whatever_their_nodes_say(training):
+    """The second node's clock is behind: its kill would be older than the last one."""
+    scene, pod = training()
+    kill(scene, pod, 0)
+    scene.settle(5)
+    scene.take(pod)
+    scene.settle(5)
+    scene.behind_s = HOUR_S
+    second = scene.running_pod()
+    kill(scene, second, 0)
+    scene.settle(5)
+    assert kills(scene) == [2]
+    scene.behind_s = 2 * HOUR_S
+    kill(scene, second, 1)
+
+    scene.settle(5)
+
+    assert kills(scene) == [3]
+
+
+def test_a_kill_is_counted_once_though_the_definition_of_before_drops_its_run(training):
+    """An older definition keeps neither pod nor run; the count must not grow with each look."""
+    scene, pod = training()
+    kill(scene, pod, 0)
+    for _ in range(3):
+        scene.step(5)
+        for each in scene.raw["status"]["replicas"][0]["memoryKills"]:
+            each.pop("pod", None), each.pop("run", None)
+
+    assert kills(scene) == [1]

@@ -1,0 +1,38 @@
+"""What is only compared for people must not end the operator."""
+
+import threading
+
+from palaestra.operator.definition import Definition
+
+
+class Server:
+    """An API server whose document on TrainingJobs is none that anybody foresaw."""
+
+    def __init__(self):
+        self.asked = threading.Event()
+
+    def within(self, _):
+        """Return the same server."""
+        return self
+
+    def schema(self, *_):
+        """Return a schema without a type."""
+        self.asked.set()
+        return {"properties": {"spec": None}}
+
+
+def test_a_document_that_nobody_foresaw_does_not_end_the_operator(monkeypatch):
+    """A thread that ends by mistake ends the whole operator, and it would do so again at every start."""
+    broken = []
+    monkeypatch.setattr(threading, "excepthook", broken.append)
+    server, stopping = Server(), threading.Event()
+    definition = Definition(server)
+
+    definition.follow(stopping, 60.0)
+    assert server.asked.wait(5)
+    stopping.set()
+    for thread in [each for each in threading.enumerate() if each.name == "definition"]:
+        thread.join(5)
+
+    assert broken == []
+    assert definition.outdated is None
