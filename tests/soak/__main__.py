@@ -2,7 +2,8 @@
 
 Every part runs whole trainings, breaks something in them, and says what came of it: figures, and
 claims that hold or do not. Names as arguments choose parts, e.g. `python -m tests.soak recovery kills`;
-`--scale 0.1` does a tenth of what a part does, to see that the part itself works.
+`--scale 0.1` does a tenth of what a part does, to see that the part itself works. `faults --seed N` repeats
+the one plan of that part which N names.
 """
 
 import argparse
@@ -11,7 +12,7 @@ import sys
 import time
 import traceback
 
-from tests.soak import chaos, damage, kills, kinds, leaks, recovery, recycling, resume
+from tests.soak import chaos, damage, faults, kills, kinds, leaks, recovery, recycling, resume
 
 PARTS = {
     "recovery": recovery.measure,
@@ -22,6 +23,7 @@ PARTS = {
     "leaks": leaks.measure,
     "recycling": recycling.measure,
     "chaos": chaos.measure,
+    "faults": faults.measure,
 }
 
 
@@ -30,19 +32,22 @@ def main():
     parser = argparse.ArgumentParser(prog="tests.soak", description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
     parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")
+    parser.add_argument("--seed", type=int, help="of the part `faults`: the one plan to run")
     asked = parser.parse_args()
+    if asked.seed is not None:
+        return 0 if prove(f"faults --seed {asked.seed}", 1.0, lambda _: faults.repeat(asked.seed)) else 1
     chosen = asked.parts or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:
         parser.error(f"{unknown[0]} is no part; choose from {', '.join(PARTS)}")
-    held = [prove(name, asked.scale) for name in chosen]
+    held = [prove(name, asked.scale, PARTS[name]) for name in chosen]
     return 0 if all(held) else 1
 
 
-def prove(name, scale):
+def prove(name, scale, measure):
     """Run a part and print what it found; return whether all its claims hold."""
     started = time.monotonic()
     try:
-        found = PARTS[name](scale)
+        found = measure(scale)
     except Exception as error:  # noqa: BLE001 - the parts after it are to be run all the same
         traceback.print_exc()
         found = {"error": type(error).__name__, "claims": {"the part came to its end": False}}

@@ -1,0 +1,165 @@
+"""Plans: which fault comes at which request of which workload. Pure: a number always names the same plan.
+
+The plans of a workload are counted through: first each row of `ROWS` at the first request of its kind, then
+at the second, and so on. A plan whose workload asks less often than that has nothing to disturb.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from tests.faults.requests import ANSWER, CHANGE, EVENT, GET, LIST, WATCH, WRITE
+
+
+class Kind(StrEnum):
+    """What goes wrong."""
+
+    KILL_BEFORE = "kill before"
+    """The operator is killed; the API server never gets the request."""
+
+    KILL_AFTER = "kill after"
+    """The API server carries the request out, and the operator is killed before it has the answer."""
+
+    DROP = "drop the answer"
+    """The API server carries the request out; the connection closes without an answer."""
+
+    CONFLICT = "409"
+    """Somebody else wrote first."""
+
+    GONE = "410"
+    """The version, or the rest of a list, is forgotten."""
+
+    BUSY = "429"
+    """Too many requests; try again after 0 seconds."""
+
+    ERROR = "500"
+    """The API server is in trouble."""
+
+    UNAVAILABLE = "503"
+    """The API server, or what stands before it, serves nobody."""
+
+    CUT = "cut the watch"
+    """The watch ends in the middle of an event."""
+
+    FREEZE = "freeze the watch"
+    """The watch is silent for some seconds, and its cache is stale; then it goes on."""
+
+    DELAY = "delay"
+    """The request reaches the API server some seconds later."""
+
+    AWAY = "away"
+    """For some seconds every connection is closed, those of watches too."""
+
+    SLOW = "trainer answers slowly"
+    """Byte by byte, for a minute."""
+
+    HALF = "trainer answers half"
+    """The connection closes in the middle of the answer."""
+
+    LIES = "trainer lies"
+    """Numbers that cannot be, and times that never were."""
+
+    MUCH = "trainer answers too much"
+    """An answer without an end."""
+
+
+CODES = {Kind.CONFLICT: 409, Kind.GONE: 410, Kind.BUSY: 429, Kind.ERROR: 500, Kind.UNAVAILABLE: 503}
+TRAINERS = frozenset({Kind.SLOW, Kind.HALF, Kind.LIES, Kind.MUCH})
+KILLS = frozenset({Kind.KILL_BEFORE, Kind.KILL_AFTER})
+LATE_S = 11.0  # longer than the operator waits for an answer: carried out when it has given up
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """One fault.
+
+    Attributes:
+        kind: what goes wrong.
+        request: the kind of request that it goes wrong at.
+        number: which of these requests, from 1.
+        seconds: how long it lasts; 0 for what is over at once.
+    """
+
+    kind: Kind
+    request: str
+    number: int
+    seconds: float = 0.0
+
+    @property
+    def words(self) -> str:
+        """The fault for people: `kill after write 3`."""
+        lasting = f" for {self.seconds:g} s" if self.seconds else ""
+        return f"{self.kind} at {self.request} {self.number}{lasting}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A workload and the fault that disturbs it; `seed` names both."""
+
+    seed: int
+    workload: str
+    fault: Fault
+
+    @property
+    def words(self) -> str:
+        """The plan for people."""
+        return f"{self.seed}: {self.workload}, {self.fault.words}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """A kind of fault at a kind of request; it comes at every `stride`-th of them."""
+
+    kind: Kind
+    request: str
+    seconds: float = 0.0
+    stride: int = 1
+
+
+# Every write meets everything that can happen to a write. What is read meets less often what repeats itself.
+ROWS = (
+    Row(kind=Kind.KILL_BEFORE, request=WRITE),
+    Row(kind=Kind.KILL_AFTER, request=WRITE),
+    Row(kind=Kind.DROP, request=WRITE),
+    Row(kind=Kind.CONFLICT, request=WRITE),
+    Row(kind=Kind.BUSY, request=WRITE),
+    Row(kind=Kind.ERROR, request=WRITE),
+    Row(kind=Kind.UNAVAILABLE, request=WRITE),
+    Row(kind=Kind.DELAY, request=WRITE, seconds=2.0),
+    Row(kind=Kind.DELAY, request=WRITE, seconds=LATE_S),
+    Row(kind=Kind.AWAY, request=WRITE, seconds=3.0),
+    Row(kind=Kind.FREEZE, request=CHANGE, seconds=3.0),
+    Row(kind=Kind.CUT, request=CHANGE, stride=2),
+    Row(kind=Kind.GONE, request=CHANGE, stride=3),
+    Row(kind=Kind.GONE, request=WATCH),
+    Row(kind=Kind.UNAVAILABLE, request=WATCH),
+    Row(kind=Kind.GONE, request=LIST),
+    Row(kind=Kind.DROP, request=LIST),
+    Row(kind=Kind.ERROR, request=GET),
+    Row(kind=Kind.AWAY, request=GET, seconds=12.0, stride=3),
+    Row(kind=Kind.KILL_BEFORE, request=EVENT, stride=2),
+    Row(kind=Kind.DROP, request=EVENT, stride=2),
+    Row(kind=Kind.SLOW, request=ANSWER),
+    Row(kind=Kind.HALF, request=ANSWER),
+    Row(kind=Kind.LIES, request=ANSWER),
+    Row(kind=Kind.MUCH, request=ANSWER),
+)
+
+
+def plan(seed: int, workloads: Sequence[str]) -> Plan:
+    """Return the plan that a number from 0 names."""
+    rest, workload = divmod(seed, len(workloads))
+    turn, row_number = divmod(rest, len(ROWS))
+    row = ROWS[row_number]
+    fault = Fault(kind=row.kind, request=row.request, number=1 + turn * row.stride, seconds=row.seconds)
+    return Plan(seed=seed, workload=workloads[workload], fault=fault)
+
+
+def plans(counts: Mapping[str, Mapping[str, int]]) -> Iterator[Plan]:
+    """Yield every plan that meets a request, where a workload asks so often by kind of request."""
+    workloads = tuple(counts)
+    most = max((number for each in counts.values() for number in each.values()), default=0)
+    for seed in range(most * len(ROWS) * len(workloads)):
+        found = plan(seed, workloads)
+        if found.fault.number <= counts[found.workload].get(found.fault.request, 0):
+            yield found

@@ -1,0 +1,157 @@
+"""Run plans on a control plane, and compare each with the undisturbed runs of its workload."""
+
+import tempfile
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from palaestra.cluster import Api
+from tests.control_plane.plane import ControlPlane
+from tests.faults.attended import AttendedOperator
+from tests.faults.course import Course
+from tests.faults.masks import Leaves, differences, leaves, mask
+from tests.faults.oracle import PodWatch, doubles, end_state, orphans
+from tests.faults.plans import Fault, Plan
+from tests.faults.proxy import Proxy
+from tests.faults.workloads import WORKLOADS, Stage
+from tests.integration.operator.installed import USER
+from tests.waiting import TooLate
+
+CALL_S = 60.0  # of the rig's own requests, on a machine with other work
+QUIET_S = 3.0
+SETTLES_S = 90.0  # what failed is tried again after a minute at most
+PACE_S = 0.3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """How one run of a workload ended.
+
+    Attributes:
+        state: its end state, as leaves.
+        counts: how many requests of each kind the operator sent.
+        met: the request that the fault came at; "": it never came.
+        lives: how many operators it took.
+        wrong: what must never be, in sentences.
+        seconds: that it took.
+    """
+
+    state: Leaves = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
+    met: str = ""
+    lives: int = 1
+    wrong: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Undisturbed:
+    """What a workload comes to when nothing is wrong.
+
+    Attributes:
+        state: the end state of its first run.
+        masked: where the second one differs.
+        counts: how many requests of each kind the operator sends, at least.
+    """
+
+    state: Leaves
+    masked: frozenset[str]
+    counts: Mapping[str, int]
+
+
+class Rig:
+    """Runs workloads on a control plane where Palaestra is installed; each run has its namespace.
+
+    Args:
+        plane: the control plane.
+        api: an administrator's.
+    """
+
+    def __init__(self, plane: ControlPlane, api: Api) -> None:
+        self._operators = plane.kubeconfig_of(USER, "system:serviceaccounts")
+        self._api = api.within(CALL_S)
+        self._undisturbed: dict[str, Undisturbed] = {}
+        self._locks = {workload: threading.Lock() for workload in WORKLOADS}
+
+    def undisturbed(self, workload: str) -> Undisturbed:
+        """Return what a workload comes to; run twice the first time that somebody asks.
+
+        Raises:
+            AssertionError: something is wrong although nothing disturbs.
+        """
+        with self._locks[workload]:
+            if workload not in self._undisturbed:
+                first, second = self._run(workload, None, None), self._run(workload, None, None)
+                assert not first.wrong + second.wrong, f"{workload}: {first.wrong + second.wrong}"
+                self._undisturbed[workload] = Undisturbed(
+                    state=first.state,
+                    masked=mask(first.state, second.state),
+                    counts=Counter(first.counts) & Counter(second.counts),
+                )
+            return self._undisturbed[workload]
+
+    def run(self, plan: Plan) -> Run:
+        """Run a plan and return what came of it; `wrong` is empty where it came to the same."""
+        return self._run(plan.workload, plan.fault, self.undisturbed(plan.workload))
+
+    def _run(self, workload: str, fault: Fault | None, wanted: Undisturbed | None) -> Run:
+        began = time.monotonic()
+        course = Course(fault)
+        with tempfile.TemporaryDirectory(prefix="faults-") as folder, ExitStack() as stack:
+            place = stack.enter_context(Stage(self._api, course))
+            operator = stack.enter_context(self._operator(place, course, Path(folder)))
+            pods = stack.enter_context(PodWatch(self._api, place.name))
+            wrong = _played(place, workload)
+            state, unsettled = _settled(place, course, wanted)
+            wrong += unsettled + doubles(pods.changes())
+            wrong += [f"unforeseen: {line}" for line in operator.unforeseen()]
+        return Run(
+            state=state,
+            counts=course.counts,
+            met=course.met,
+            lives=operator.lives,
+            wrong=tuple(wrong),
+            seconds=round(time.monotonic() - began, 1),
+        )
+
+    @contextmanager
+    def _operator(self, place: Stage, course: Course, folder: Path) -> Iterator[AttendedOperator]:
+        """Run an operator behind a proxy until the block ends."""
+        proxy = Proxy(self._operators, course)
+        options = (f"--namespace={place.name}", "--no-leader-elect")
+        attended = AttendedOperator(proxy.kubeconfig(folder / "kubeconfig"), folder, *options)
+        proxy.kill = attended.kill
+        try:
+            with attended:
+                yield attended
+        finally:
+            proxy.close()
+
+
+def _played(place: Stage, workload: str) -> list[str]:
+    """Play a workload, and return what did not come to pass in it."""
+    try:
+        WORKLOADS[workload](place)
+    except TooLate as late:
+        return [f"the script waits in vain: {late}"]
+    return []
+
+
+def _settled(place: Stage, course: Course, wanted: Undisturbed | None) -> tuple[Leaves, list[str]]:
+    """Return the end state once it is as wanted and nothing is asked for; and what is wrong with it."""
+    ends = time.monotonic() + SETTLES_S
+    while True:
+        found = end_state(place)
+        state = leaves(found)
+        wrong = orphans(found)
+        if wanted is not None:
+            wrong += differences(wanted.state, state, wanted.masked)
+        if course.quiet_s() < QUIET_S:
+            wrong.append(f"still asks: {course.last(5)}")
+        if not wrong or time.monotonic() > ends:
+            return state, wrong
+        time.sleep(PACE_S)  # an API server that is polled must have time for its work

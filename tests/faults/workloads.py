@@ -1,0 +1,221 @@
+"""What people, kubelets and queues do while an operator is disturbed: scripts over several jobs.
+
+A script waits for what it sees in the cluster, and leaves nothing that still trains.
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import UTC, datetime
+from typing import Any, Self
+
+from palaestra.cluster import Api, ApiError
+from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NAMESPACES, TRAINING_JOBS
+from palaestra_sim.protocol.status import Termination
+from tests.faults.course import Course
+from tests.faults.trainers import Trainer
+from tests.integration.operator.cluster import Place, world_map, world_of
+from tests.waiting import eventually
+
+PATIENCE_S = 90.0  # an operator that was disturbed may come back to a job half a minute later
+DONE = Termination(step=20, reason="Completed", success_rate=0.9)
+SAVED = Termination(step=20, reason="Interrupted: SIGTERM received")
+BUDGET_SPENT, INTERRUPTED = 80, 75
+# Times of Kubernetes are whole seconds: of what is closer together nobody can tell which was first.
+DISTINCT_S = 3.0
+NOBODY = "127.0.0.1"  # where no trainer answers
+
+Object = dict[str, Any]
+
+
+class Stage(Place):
+    """A namespace with people, a kubelet, and trainers that answer; ends with its block.
+
+    Args:
+        api: an administrator's.
+        course: whose plan says how trainers answer.
+    """
+
+    def __init__(self, api: Api, course: Course) -> None:
+        super().__init__(api)
+        self._course = course
+        self._trainers: list[Trainer] = []
+
+    def trainer(self, *, honest: bool = True) -> Trainer:
+        """Return a new trainer; one that is not honest answers as the plan says."""
+        self._trainers.append(Trainer(None if honest else self._course))
+        return self._trainers[-1]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for each in self._trainers:
+            each.close()
+        with suppress(ApiError):  # left behind it costs the next runs some memory, and nothing else
+            self.api.delete(NAMESPACES, None, self.name)
+
+
+Script = Callable[[Stage], None]
+
+
+def ends(place: Stage) -> None:
+    """One job succeeds, one fails for good, one is refused, and one gets its world late."""
+    place.train("good", replicas=2)
+    place.train("bad")
+    place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
+    place.train("late", **world_of("world"))
+    good, bad = _running(place, "good", 2), _running(place, "bad")
+    eventually(lambda: place.condition("Accepted", "late").get("reason") == "WorldMissing", PATIENCE_S)
+    place.create(CONFIG_MAPS, world_map())
+    late = _running(place, "late")
+    for pod in [*good, *late]:
+        place.end(pod, word=DONE)
+    place.end(*bad, code=BUDGET_SPENT)
+    for name in ("good", "late"):
+        place.until("Succeeded", name, PATIENCE_S)
+    for name in ("bad", "wrong"):
+        place.until("Failed", name, PATIENCE_S)
+
+
+def pauses(place: Stage) -> None:
+    """A job is suspended before its pod runs, resumed, suspended as it runs, resumed, and succeeds."""
+    place.train("paused", suspend=True)
+    place.train("beside")
+    place.until("Suspended", "paused", PATIENCE_S)
+    eventually(lambda: place.get(JOBS, "paused-0"), PATIENCE_S)
+    _suspend(place, "paused", flag=False)
+    [pod] = _running(place, "paused")
+    eventually(lambda: _age_s(pod) > DISTINCT_S, PATIENCE_S)
+    _suspend(place, "paused", flag=True)
+    place.until("Suspended", "paused", PATIENCE_S)
+    eventually(lambda: _age_s(pod) > 2 * DISTINCT_S, PATIENCE_S)
+    _suspend(place, "paused", flag=False)
+    for name in ("paused", "beside"):
+        _succeed(place, name)
+
+
+def again(place: Stage) -> None:
+    """A job on a node that is lost is deleted and made again; of another one somebody deletes the Job."""
+    place.train("again")
+    place.train("robbed")
+    [lost] = place.pods("again", 1, PATIENCE_S)
+    place.bind(lost)
+    _running(place, "again")
+    place.api.delete(TRAINING_JOBS, place.name, "again")
+    eventually(lambda: all(each.startswith("PersistentV") for each in place.children("again")), PATIENCE_S)
+    place.train("again")
+    [robbed] = _running(place, "robbed")
+    place.api.delete(JOBS, place.name, "robbed-0")
+    eventually(lambda: _others(place, "robbed", robbed), PATIENCE_S)
+    for name in ("again", "robbed"):
+        _succeed(place, name)
+    place.end(lost, INTERRUPTED)
+
+
+def deadlines(place: Stage) -> None:
+    """One job gets a deadline as it runs, and passes it; one is deleted a second after its end."""
+    place.train("slow")
+    place.train("brief", ttlSecondsAfterFinished=1)
+    _running(place, "slow")
+    place.api.merge(TRAINING_JOBS, place.name, "slow", {"spec": {"activeDeadlineSeconds": 1}})
+    _succeed_at_once(place, "brief")
+    place.until("Failed", "slow", PATIENCE_S)
+    eventually(lambda: place.get(TRAINING_JOBS, "brief") is None, PATIENCE_S)
+    eventually(lambda: all(each.startswith("PersistentV") for each in place.children("brief")), PATIENCE_S)
+
+
+def evictions(place: Stage) -> None:
+    """A pod is evicted and the next one trains on; the Job controller pauses in between, for 10 s."""
+    place.train("taken", backoffLimit=0)
+    [pod] = _running(place, "taken")
+    place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting")
+    place.end(pod, INTERRUPTED, SAVED)
+    eventually(lambda: _others(place, "taken", pod), PATIENCE_S)
+    _succeed(place, "taken")
+
+
+def queues(place: Stage) -> None:
+    """A queue admits a job, takes it off its node and admits it again; another job it takes unasked."""
+    place.train("queued", scheduling={"queueName": "robots"})
+    place.train("seized")
+    place.until("Suspended", "queued", PATIENCE_S)
+    eventually(lambda: place.get(JOBS, "queued-0"), PATIENCE_S)
+    _admit(place, "queued-0", flag=True)
+    pods = {name: _running(place, name)[0] for name in ("queued", "seized")}
+    for name, pod in pods.items():
+        eventually(lambda pod=pod: _age_s(pod) > DISTINCT_S, PATIENCE_S)
+        _admit(place, f"{name}-0", flag=False)
+    for name, pod in pods.items():
+        place.until("Suspended", name, PATIENCE_S)
+        eventually(lambda pod=pod: _age_s(pod) > 2 * DISTINCT_S, PATIENCE_S)
+        _admit(place, f"{name}-0", flag=True)
+    for name in pods:
+        _succeed(place, name)
+
+
+def trainers(place: Stage) -> None:
+    """Two jobs train, one beside the other; each is asked how far it is."""
+    honest, other = place.trainer(), place.trainer(honest=False)
+    place.train("honest")
+    place.train("other")
+    pods = [*_running(place, "honest", at=honest.host), *_running(place, "other", at=other.host)]
+    eventually(lambda: len(other.asked) > 1, PATIENCE_S)
+    asked = len(honest.asked)
+    eventually(lambda: len(honest.asked) > asked, PATIENCE_S)
+    for pod in pods:
+        place.end(pod, word=DONE)
+    for name in ("honest", "other"):
+        place.until("Succeeded", name, PATIENCE_S)
+
+
+WORKLOADS: dict[str, Script] = {
+    "ends": ends,
+    "pauses": pauses,
+    "again": again,
+    "deadlines": deadlines,
+    "evictions": evictions,
+    "queues": queues,
+    "trainers": trainers,
+}
+
+
+def _running(place: Stage, name: str, count: int = 1, at: str = NOBODY) -> list[Object]:
+    """Let the pods of a job run, and return them once its status says that it runs."""
+    pods = place.pods(name, count, PATIENCE_S)
+    for pod in pods:
+        place.run(pod, at)
+    place.until("Running", name, PATIENCE_S)
+    return pods
+
+
+def _succeed(place: Stage, name: str) -> None:
+    for pod in _running(place, name):
+        place.end(pod, word=DONE)
+    place.until("Succeeded", name, PATIENCE_S)
+
+
+def _succeed_at_once(place: Stage, name: str) -> None:
+    """Let a job succeed that may be deleted before anybody sees so."""
+    for pod in place.pods(name, 1, PATIENCE_S):
+        place.run(pod)
+        place.end(pod, word=DONE)
+
+
+def _suspend(place: Stage, name: str, *, flag: bool) -> None:
+    place.api.merge(TRAINING_JOBS, place.name, name, {"spec": {"suspend": flag}})
+
+
+def _admit(place: Stage, name: str, *, flag: bool) -> None:
+    place.api.merge(JOBS, place.name, name, {"spec": {"suspend": not flag}})
+
+
+def _age_s(pod: Object) -> float:
+    created = datetime.fromisoformat(pod["metadata"]["creationTimestamp"])
+    return (datetime.now(UTC) - created).total_seconds()
+
+
+def _others(place: Stage, name: str, pod: Object) -> list[Object]:
+    """Return the pods of a job that have not ended, but for one."""
+    return [
+        each for each in place.pods(name, 1, PATIENCE_S) if each["metadata"]["uid"] != pod["metadata"]["uid"]
+    ]

@@ -1,0 +1,89 @@
+"""Disturb each write, and much of what is read, between operator and API server once: the end is the same."""
+
+import json
+import os
+import random
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+from palaestra.cluster.resources import DEFINITIONS
+from tests.control_plane.installing import install
+from tests.control_plane.plane import running
+from tests.faults.plans import plan, plans
+from tests.faults.rig import Rig
+from tests.faults.workloads import WORKLOADS
+from tests.integration.operator.cluster import local_queues
+from tests.local_run import ROOT
+from tests.waiting import eventually
+
+KINDS = ROOT / "manifests" / "crd.yaml"
+AT_ONCE = 2 * (os.cpu_count() or 1) + 1  # a run waits most of its time
+FEWEST = 200
+SEED = 1  # of the sample that is taken below full scale
+
+
+def measure(scale):
+    """Return how many plans came to the same end as undisturbed runs, and those that did not."""
+    with rig() as at, ThreadPoolExecutor(AT_ONCE) as pool:
+        undisturbed = dict(zip(WORKLOADS, pool.map(at.undisturbed, WORKLOADS), strict=True))
+        every = list(plans({name: each.counts for name, each in undisturbed.items()}))
+        chosen = random.Random(SEED).sample(every, max(round(len(every) * scale), 1))
+        runs = list(pool.map(lambda each: told(each, at.run(each)), chosen))
+    met = [(each, run) for each, run in zip(chosen, runs, strict=True) if run.met]
+    wrong = [
+        f"{each.words}: {'; '.join(run.wrong)}" for each, run in zip(chosen, runs, strict=True) if run.wrong
+    ]
+    return {
+        "plans": len(chosen),
+        "of": len(every),
+        "met": len(met),
+        "by_fault": dict(Counter(str(each.fault.kind) for each, _ in met)),
+        "by_workload": dict(Counter(each.workload for each, _ in met)),
+        "longest_s": max(run.seconds for run in runs),
+        "masked": {name: len(each.masked) for name, each in undisturbed.items()},
+        "wrong": wrong,
+        "claims": {
+            "every disturbed run comes to the same as an undisturbed one": not wrong,
+            f"at least {FEWEST} plans met what they disturb": scale < 1 or len(met) >= FEWEST,
+        },
+    }
+
+
+def repeat(seed):
+    """Run the plan of a seed alone and return what came of it."""
+    chosen = plan(seed, tuple(WORKLOADS))
+    with rig() as at:
+        run = at.run(chosen)
+    return {
+        "plan": chosen.words,
+        "met": run.met,
+        "lives": run.lives,
+        "wrong": run.wrong,
+        "claims": {"the run comes to the same as an undisturbed one": not run.wrong},
+    }
+
+
+@contextmanager
+def rig() -> Iterator[Rig]:
+    """Run a control plane with Palaestra until the block ends."""
+    with (
+        tempfile.TemporaryDirectory(prefix="control-plane-") as folder,
+        running(Path(folder), kinds=KINDS) as plane,
+    ):
+        api = install(plane)
+        api.create(DEFINITIONS, local_queues())
+        eventually(lambda: api.serves("kueue.x-k8s.io"))
+        yield Rig(plane, api)
+        api.close()
+
+
+def told(chosen, run):
+    """Write a line about a run to standard error, where somebody may wait for it; return the run."""
+    line = {"plan": chosen.words, "met": run.met, "seconds": run.seconds, "wrong": run.wrong}
+    sys.stderr.write(json.dumps(line) + "\n")
+    return run
