@@ -9,7 +9,7 @@ import json
 import sys
 import time
 
-from tests.bench import learning, newcomer, parallel, runs, stepping
+from tests.bench import learning, newcomer, operator, operator_planning, parallel, runs, stepping
 
 PARTS = {
     "stepping": stepping.measure,
@@ -17,6 +17,8 @@ PARTS = {
     "recovery": runs.measure_recovery,
     "shutdown": runs.measure_shutdown,
     "memory": runs.measure_memory,
+    "operator": operator.measure,
+    "planning": operator_planning.measure,
     "newcomer": newcomer.measure,
     "learning": learning.measure,
 }

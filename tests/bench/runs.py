@@ -29,7 +29,7 @@ def measure_shutdown():
     """Return the seconds from a SIGTERM of the collecting sidecar to its end and that of its stub."""
     with running(example("move-to-target")) as run:
         run.wait_for_step(WARM_STEPS, PATIENCE_S)
-        sidecar, stub = (run.pid_of(it, "collect-0.wbt") for it in ("palaestra-sidecar", "palaestra-stub"))
+        sidecar, stub = (run.pid_of(it, "sim-collect-0/") for it in ("palaestra-sidecar", "palaestra-stub"))
         asked = time.monotonic()
         os.kill(sidecar, signal.SIGTERM)
         run.until(lambda: not any(map(is_running, (sidecar, stub))), PATIENCE_S, look_every_s=0.01)

@@ -1,0 +1,118 @@
+"""What the operator costs: time and processor for a crowd of jobs, requests for one job, memory, silence.
+
+The control plane has no nodes, so nothing but the API server, the Job controller and the operator runs.
+A client that creates the same objects is measured beside the operator, on the same control plane.
+"""
+
+import os
+import tempfile
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+from palaestra.cluster import connect
+from palaestra.cluster.resources import NAMESPACES, PODS
+from tests.bench import crowd, finished, single
+from tests.control_plane.plane import running
+from tests.integration.operator.installed import asked, operator
+
+ROOT = Path(__file__).parents[2]
+JOBS = 1000
+FINISHED_JOBS = 10_000
+FAST = 500  # requests a second of each controller; Kubernetes' own default is 20
+QUIET_S = 30
+TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
+
+
+def measure():
+    """Return the figures of a crowd at both speeds of the Job controller, of one job, and of memory."""
+    return {
+        "jobs": JOBS,
+        "default_rate": measure_crowd(None),
+        "fast": measure_crowd(FAST),
+        "one_job": measure_one_job(),
+        "finished": measure_finished(),
+    }
+
+
+def measure_crowd(requests_per_s):
+    """Return seconds until `JOBS` pods exist: of bare Jobs, of a client, of the operator; and its cost."""
+    with cluster(requests_per_s) as (plane, api, folder):
+        bare_s = seconds_to_pods(api, "bare", crowd.create_bare_jobs)
+        client_s = seconds_to_pods(api, "client", crowd.create_all_objects)
+        with operator(plane, folder / "operator.log") as running_operator:
+            spent = cpu_seconds(running_operator)
+            operator_s = seconds_to_pods(api, "operator", crowd.create_training_jobs)
+            crowd.wait_for_silence(plane)
+            spent = cpu_seconds(running_operator) - spent
+            before = requests(plane)
+            time.sleep(QUIET_S)  # what is measured is that nothing happens
+            return {
+                "bare_jobs_s": round(bare_s, 1),
+                "client_s": round(client_s, 1),
+                "operator_s": round(operator_s, 1),
+                "times_client": round(operator_s / client_s, 2),
+                "times_bare_jobs": round(operator_s / bare_s, 2),
+                "cpu_ms_a_job": round(1000 * spent / JOBS, 1),
+                "rss_mib": mib(running_operator.rss_bytes()),
+                "requests_in_silence": requests(plane) - before,
+            }
+
+
+def measure_one_job():
+    """Return what one job that trains ten seconds asks of the API server, from creation to its end."""
+    with cluster(None) as (plane, api, folder), operator(plane, folder / "operator.log"):
+        crowd.wait_for_silence(plane)
+        return single.requests_of_one_job(plane, api)
+
+
+def measure_finished():
+    """Return the memory of an operator that starts where many jobs have ended already."""
+    with cluster(FAST) as (plane, api, folder):
+        finished.create(api, FINISHED_JOBS)
+        with operator(plane, folder / "operator.log") as running_operator:
+            crowd.wait_for_silence(plane)
+            rss_bytes = running_operator.rss_bytes()
+    return {"jobs": FINISHED_JOBS, "rss_mib": mib(rss_bytes)}
+
+
+@contextmanager
+def cluster(requests_per_s):
+    """Run a control plane with Palaestra installed; yields it, an administrator's client and a folder."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "plane").mkdir()
+        with running(folder / "plane", requests_per_s=requests_per_s) as plane:
+            done = plane.kubectl("apply", "-f", str(ROOT / "manifests" / "install.yaml"))
+            if done.returncode:
+                raise RuntimeError(done.stderr)
+            plane.await_kinds("crd/trainingjobs.palaestra.dev")
+            api = connect(str(plane.kubeconfig))
+            yield plane, api.within(60), folder
+            api.close()
+
+
+def seconds_to_pods(api, namespace, create):
+    """Return the seconds from the first object that `create` makes in a new namespace to the last pod."""
+    api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": namespace}})
+    crowd.wait_for_account(api, namespace)
+    began = time.monotonic()
+    create(api, namespace, JOBS)
+    crowd.wait_for_count(api, PODS, namespace, JOBS)
+    return time.monotonic() - began
+
+
+def cpu_seconds(installed):
+    """Return the processor time that an operator has spent so far."""
+    fields = Path(f"/proc/{installed.process.pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS_A_SECOND
+
+
+def requests(plane):
+    """Return how many requests operators have sent, but for watches and the Lease."""
+    return sum(each.counts for each in asked(plane))
+
+
+def mib(count):
+    """Return bytes in MiB."""
+    return round(count / 1024**2, 1)

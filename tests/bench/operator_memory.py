@@ -1,0 +1,194 @@
+"""The operator's memory: at rest, beside large jobs, beside many.
+
+The operator is a process of its own as in a pod, with an installation's rights and its image's environment;
+the control plane is real and has no nodes, so that its pods stay pending and nothing else happens.
+"""
+
+import json
+import re
+import sys
+import tempfile
+import time
+import urllib.request
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import yaml
+
+from palaestra.cluster import connect
+from palaestra.cluster.resources import JOBS, NAMESPACES, TRAINING_JOBS
+from tests.control_plane.plane import running
+from tests.integration.operator.installed import asked, operator, wait_for
+
+ROOT = Path(__file__).parents[2]
+NAMESPACE = "crowd"
+LARGE, PLANNED, FINISHED = 400, 1_000, 10_000
+GROUPS, CHARACTERS = 5, 180_000  # of inline worlds: 900,000, as many as an API server takes
+SETTLED_S, SETTLES_S = 5, 1200
+MIB = 1 << 20
+THEN = "2026-01-01T00:00:00Z"
+
+
+def measure():
+    """Return resident memory in MiB: now where it says `rss`, the most of the process' life where `peak`."""
+    with crowd("large") as (plane, api):
+        idle = started(plane)
+        create(api, (large_job(number) for number in range(LARGE)))
+        large = {"first": started(plane), "again": started(plane)}
+    with crowd("planned") as (plane, api):
+        planned = beside_planned(plane, api, PLANNED)
+    with crowd("finished") as (plane, api):
+        create_finished(api, FINISHED)
+        finished = started(plane)
+    return {
+        "idle": idle,
+        f"beside_{LARGE}_refused_jobs_of_{GROUPS * CHARACTERS}_characters": large,
+        f"beside_{PLANNED}_jobs": planned,
+        f"beside_{FINISHED}_finished_jobs": finished,
+    }
+
+
+@contextmanager
+def crowd(name):
+    """Run a control plane with Palaestra installed, and a namespace for many jobs."""
+    with tempfile.TemporaryDirectory(prefix=f"palaestra-{name}-") as folder, running(Path(folder)) as plane:
+        done = plane.kubectl("apply", "--server-side", "-f", str(ROOT / "manifests" / "install.yaml"))
+        assert done.returncode == 0, done.stderr
+        plane.await_kinds("crd/trainingjobs.palaestra.dev")
+        api = connect(str(plane.kubeconfig)).within(60)
+        wait_for(lambda: api.serves("palaestra.dev/v1alpha1"), 30, api.version)
+        api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": NAMESPACE}})
+        yield plane, api
+        api.close()
+
+
+def started(plane):
+    """Start an operator beside what there is, and return its memory once it has come to rest."""
+    began = time.monotonic()
+    with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
+        settle(plane, running_operator)
+        found = memory(running_operator.process.pid) | {"seconds": round(time.monotonic() - began)}
+        running_operator.end()  # gives the Lease back, so that the next one leads at once
+    return found
+
+
+def beside_planned(plane, api, count):
+    """Return the memory of an operator that saw jobs come and planned them, and of one that came later."""
+    with operator(plane, plane.folder / "operator.log", in_a_pod=True) as running_operator:
+        create(api, (small_job(number) for number in range(count)))
+        wait_for(lambda: jobs(api) == count, SETTLES_S, lambda: jobs(api))
+        settle(plane, running_operator)
+        first = memory(running_operator.process.pid)
+        running_operator.end()
+    return {"saw_them_come": first, "started_later": started(plane)}
+
+
+def jobs(api):
+    """Return how many batch/v1 Jobs there are."""
+    return len(api.list(JOBS.only_metadata(), NAMESPACE))
+
+
+def settle(plane, running_operator):
+    """Return once an operator leads, and asked for nothing but watches and the Lease for some seconds."""
+
+    def leads():
+        with urllib.request.urlopen(
+            f"http://127.0.0.1:{running_operator.port}/metrics", timeout=10
+        ) as answer:
+            return b"palaestra_operator_leader 1.0" in answer.read()
+
+    def quiet():
+        before = sum(each.counts for each in asked(plane))
+        time.sleep(SETTLED_S)  # what is measured is that nothing happens
+        return sum(each.counts for each in asked(plane)) == before
+
+    wait_for(leads, SETTLES_S, lambda: asked(plane)[-5:])
+    wait_for(quiet, SETTLES_S, lambda: asked(plane)[-5:])
+
+
+def memory(pid):
+    """Return the resident memory of a process in MiB, now and at most."""
+    text = Path(f"/proc/{pid}/status").read_text()
+    found = {name: int(kib) / 1024 for name, kib in re.findall(r"(VmRSS|VmHWM):\s+(\d+) kB", text)}
+    return {"rss_mib": round(found["VmRSS"], 1), "peak_mib": round(found["VmHWM"], 1)}
+
+
+def create(api, made):
+    """Create TrainingJobs, several at a time."""
+    with ThreadPoolExecutor(4) as pool:
+        return list(pool.map(lambda job: api.create(TRAINING_JOBS, job), made))
+
+
+def create_finished(api, count):
+    """Create TrainingJobs that have succeeded before any operator saw them."""
+    status = {"status": finished_status()}
+
+    def end(job):
+        api.merge(TRAINING_JOBS, NAMESPACE, job["metadata"]["name"], status, subresource="status")
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(end, create(api, (small_job(number) for number in range(count)))))
+
+
+def small_job(number):
+    """Return the smallest TrainingJob."""
+    job = yaml.safe_load((ROOT / "manifests" / "examples" / "minimal.yaml").read_text())
+    return job | {"metadata": {"name": f"job-{number:05d}", "namespace": NAMESPACE}}
+
+
+def large_job(number):
+    """Return a TrainingJob whose worlds are as large as an API server takes, and none of them a world."""
+    groups = [
+        {
+            "name": f"g{place}",
+            "role": "Collect",
+            "world": {"inline": f"{number} {place}".ljust(CHARACTERS, "x")},
+        }
+        for place in range(GROUPS)
+    ]
+    return small_job(number) | {"spec": {"simulators": groups, "trainer": {"evaluation": {"everySteps": 0}}}}
+
+
+def finished_status():
+    """Return the status of a job whose one replica has succeeded."""
+    told = {"reason": "Succeeded", "message": "the trainer has finished"}
+    conditions = [
+        {"type": kind, "status": "True", "lastTransitionTime": THEN, "observedGeneration": 1, **told}
+        for kind in ("Accepted", "Succeeded")
+    ]
+    images = {
+        name: f"registry.example.com/robots/palaestra-{name}:0.1.0" for name in ("trainer", "stub", "webots")
+    }
+    log = [f"2026-01-01T00:00:{line:02d}Z line {line} of what the trainer wrote last" for line in range(10)]
+    replica = {
+        "index": 0,
+        "phase": "Succeeded",
+        **told,
+        "since": THEN,
+        "attempt": 1,
+        "pod": {"name": "job-0-abcde", "uid": "01234567-89ab-cdef-0123-456789abcdef", "created": THEN},
+        "step": 50_000,
+        "target": 50_000,
+        "successRate": 0.95,
+        "meanReturn": 12.5,
+        "restarts": {"trainer": 0, "simulator": 1, "disruption": 0, "suspension": 0},
+        "lastAttempt": {"attempt": 1, "pod": "job-0-abcde", "ended": THEN, **told, "log": log},
+    }
+    return {
+        "observedGeneration": 1,
+        "phase": "Succeeded",
+        "release": images,
+        "conditions": conditions,
+        "startTime": THEN,
+        "completionTime": THEN,
+        "activeSeconds": 600,
+        "running": "1/1",
+        "step": 50_000,
+        "successRate": 0.95,
+        "replicas": [replica],
+    }
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(measure()) + "\n")
