@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
+PATIENCE_S = 2400  # four minutes on two idle processors; the other tests leave it a fifth of them
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 @pytest.mark.minutes(5)
-@pytest.mark.timeout(1500)
+@pytest.mark.timeout(2700)
 def test_move_to_target_in_full_learns_to_reach_its_target(run):
     """The promise of the README, on episodes that nothing was chosen on.
 
@@ -19,7 +20,7 @@ def test_move_to_target_in_full_learns_to_reach_its_target(run):
     thousands: five seeds measured 97 to 99.
     """
     whole = run().start()
-    code, output = whole.end(1400)
+    code, output = whole.end(PATIENCE_S)
 
     result = subprocess.run([EVAL, whole.directory], capture_output=True, text=True, timeout=200, check=True)
 
