@@ -43,7 +43,7 @@ def tell(notes, monkeypatch):
     def tell(step, clock_s):
         new = {"phase": "Running", "replicas": [{"index": 0, "phase": "Running", "step": step}]}
         monkeypatch.setattr("palaestra.operator.telling.as_data", lambda _: new)
-        return telling.tell(raw, Decision(status=object()), {}, clock_s)
+        return telling.tell(raw, Decision(status=object()), {}, clock_s).again_s
 
     return tell
 

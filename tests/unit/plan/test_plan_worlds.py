@@ -95,9 +95,15 @@ def test_a_world_is_shipped_once_a_group_as_it_was_written(in_cluster):
 
 def test_a_world_is_parsed_once_for_all_simulators_of_all_replicas(make_job):
     """Thirty replicas of seventeen simulators took the operator fifteen seconds, a look."""
-    job = make_job(replicas=3, simulators=[group(count=4), EVALUATE])
+    world = {"inline": ARENA}
+    job = make_job(replicas=3, simulators=[group(count=4, world=world), EVALUATE | {"world": world}])
 
     assert calls_of(parse, lambda: plan(job, LAYOUT)) == 1
+
+
+def test_a_world_that_ships_is_not_parsed(make_job):
+    """It passes every check in this project's own tests, and parsing it is most of planning a small job."""
+    assert calls_of(parse, lambda: plan(make_job(simulators=[group(), EVALUATE]), LAYOUT)) == 0
 
 
 def test_only_the_replicas_that_are_asked_for_are_planned(make_job):

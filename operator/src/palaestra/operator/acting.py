@@ -41,8 +41,10 @@ class Acting:
         self._strangers = strangers
         self._denials = denials
 
-    def carry_out(self, raw: Object, actions: tuple[Action, ...]) -> Denied:
+    def carry_out(self, raw: Object, actions: tuple[Action, ...], *, confirmed: bool = False) -> Denied:
         """Do `actions` for a TrainingJob, in order, and return what was refused; empty if all was done.
+
+        `confirmed`: they follow from what was just written, so no read has to confirm them.
 
         After a refusal nothing more is done for that replica, and nothing more is created at all if it
         was about the whole job: no pod runs without its network policy.
@@ -51,7 +53,8 @@ class Acting:
             Outdated: the cluster is not as it was when this was decided; some of it may be done.
             NotLeading: another operator may lead.
         """
-        confirm(self._api, raw, actions)
+        if not confirmed:
+            confirm(self._api, raw, actions)
         refused: dict[int | None, ApiError] = {}
         denied: dict[int | None, ApiError] = {}
         changed: Conflict | NotFound | None = None

@@ -7,12 +7,14 @@ wanted and what is to be said is decided in `palaestra.decide`, which is pure; n
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
 from palaestra.api import TrainingJob
 from palaestra.decide import (
     Decision,
+    Prepared,
     Record,
     Refused,
     Times,
@@ -23,13 +25,14 @@ from palaestra.decide import (
     reject,
     wants_whole,
 )
-from palaestra.observe import lacking
+from palaestra.observe import lacking, trimmed
+from palaestra.observe.reading import part
 from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
 from palaestra.operator.looking import Looking, Seen, earliest
 from palaestra.operator.poller import Key
 from palaestra.operator.records import Records
-from palaestra.operator.telling import Telling
+from palaestra.operator.telling import Telling, Told
 from palaestra.plan import ClusterLayout
 
 Object = Mapping[str, Any]
@@ -87,26 +90,42 @@ class Controller:
             self._telling.forget(key)
             self._records.forget(key)
             return None
-        uid = raw["metadata"]["uid"]
-        times = self._times(self._records.of(key, uid))
-        decision, again_s = self._decide(raw, times)
-        self._records.keep(key, uid, decision.record)
-        denied = self._acting.carry_out(raw, decision.actions)
-        held_back_s = self._telling.tell(raw, decision, denied, times.clock_s)
+        times = self._times(self._records.of(key, raw["metadata"]["uid"]))
+        look = self._look(raw, times)
+        told = self._carry_out(raw, look, times)
+        if told.stored is not None and _just_accepted(raw, told.stored):
+            look = self._decide_anew(told.stored, look, times)
+            told = self._carry_out(trimmed(told.stored), look, times)
+        return earliest(look.decision.wake_after_s, look.again_s, told.again_s)
+
+    def _look(self, raw: Object, times: Times) -> "_Look":
+        """Return what there is of a job, and what follows."""
+        try:
+            job, seen = self._observe(raw)
+        except Refused as refused:
+            return _Look(decision=reject(raw, refused, times.now))
+        prepared = prepare(job, seen.observed, self._layout)
+        decision = decide(job, seen.observed, prepared, times)
+        return _Look(decision=decision, seen=seen, prepared=prepared)
+
+    def _decide_anew(self, stored: Object, look: "_Look", times: Times) -> "_Look":
+        """Return what follows now that the status accepts the job; there is nothing of it yet to look at."""
+        if look.seen is None or look.prepared is None:
+            raise AssertionError("unreachable: a refused job is not accepted")
+        decision = decide(accept(stored), look.seen.observed, look.prepared, times)
+        return replace(look, decision=decision, just_accepted=True)
+
+    def _carry_out(self, raw: Object, look: "_Look", times: Times) -> Told:
+        """Do what was decided, then write it."""
+        key, decision = (raw["metadata"]["namespace"], raw["metadata"]["name"]), look.decision
+        self._records.keep(key, raw["metadata"]["uid"], decision.record)
+        denied = self._acting.carry_out(raw, decision.actions, confirmed=look.just_accepted)
+        told = self._telling.tell(raw, decision, denied, times.clock_s)
         if denied:
             raise next(iter(denied.values()))
-        return earliest(decision.wake_after_s, again_s, held_back_s)
+        return told
 
-    def _decide(self, raw: Object, times: Times) -> tuple[Decision, float | None]:
-        """Return what follows from what there is, and seconds until it has to be asked for anew."""
-        try:
-            job, seen = self._look(raw)
-        except Refused as refused:
-            return reject(raw, refused, times.now), None
-        prepared = prepare(job, seen.observed, self._layout)
-        return decide(job, seen.observed, prepared, times), seen.again_s
-
-    def _look(self, raw: Object) -> tuple[TrainingJob, Seen]:
+    def _observe(self, raw: Object) -> tuple[TrainingJob, Seen]:
         """Return a job with what there is of it, read whole if it is to be planned.
 
         Raises:
@@ -118,3 +137,31 @@ class Controller:
             return job, seen
         job = accept(self._looking.whole(raw))
         return job, self._looking.ask_for(job, seen)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Look:
+    """What there is of a job and what follows; of a refused one there is only the latter.
+
+    `just_accepted`: this look has written the status that accepts the job.
+    """
+
+    decision: Decision
+    seen: Seen | None = None
+    prepared: Prepared | None = None
+    just_accepted: bool = False
+
+    @property
+    def again_s(self) -> float | None:
+        """Seconds until something has to be asked for anew."""
+        return None if self.seen is None else self.seen.again_s
+
+
+def _just_accepted(before: Object, stored: Object) -> bool:
+    """Return whether a status that was written accepts its job, so that all of it can be created at once.
+
+    A job that was not accepted has never had a pod, so no read has to confirm it. On a claim of somebody else
+    a pod of an earlier job may still write: that needs the reads of the next look.
+    """
+    accepted = part(stored, "status").get("release") and not part(before, "status").get("release")
+    return bool(accepted) and part(stored, "spec", "storage").get("existingClaim") is None

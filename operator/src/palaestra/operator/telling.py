@@ -6,6 +6,7 @@ alone is written seldom; conditions and phases at once.
 
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from palaestra.api.reasons import Reason
@@ -17,6 +18,19 @@ from palaestra.operator.writing import Writer, difference
 
 Object = Mapping[str, Any]
 Written = Callable[[Object, Object], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """What became of a status.
+
+    Attributes:
+        stored: the TrainingJob as the API server returned it; None: no status was written.
+        again_s: seconds until progress that was held back is to be written; None: none was.
+    """
+
+    stored: Object | None = None
+    again_s: float | None = None
 
 
 class Telling:
@@ -36,43 +50,39 @@ class Telling:
         self._written: dict[Key, float] = {}
         self._futile: dict[Key, tuple[str, Object]] = {}
 
-    def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> float | None:
-        """Write what changed; return seconds until progress that was held back is to be written.
+    def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> Told:
+        """Write what changed; `clock_s` is the monotonic clock: nobody sets it.
 
-        `clock_s` is the monotonic clock: nobody sets it.
-
-        What was refused was not planned; why is told by the next look, in the status.
+        What was refused was not planned; the next look writes why into the status.
 
         Raises:
             Conflict: the job is not as it was when this was decided.
             NotLeading: another operator may lead.
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
-        held_back_s = (
-            None
-            if decision.status is None
-            else self._write(key, raw, fitted(raw, as_data(decision.status)), clock_s)
-        )
+        told = Told()
+        if decision.status is not None:
+            told = self._write(key, raw, fitted(raw, as_data(decision.status)), clock_s)
         for each in decision.events:
             if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
                 self._record(raw, each)
-        return held_back_s
+        return told
 
     def _record(self, raw: Object, event: Happening) -> None:
         whose = "" if event.replica is None else f"replica {event.replica}: "
         self._recorder.record(raw, event.type, event.reason, whose + event.message, once=event.once)
 
-    def _write(self, key: Key, raw: Object, status: dict[str, Any], clock_s: float) -> float | None:
+    def _write(self, key: Key, raw: Object, status: dict[str, Any], clock_s: float) -> Told:
         old = raw.get("status")
         with self._lock:
             last_s = self._written.get(key)
         in_s = write_in_s(old, status, None if last_s is None else clock_s - last_s)
         if in_s is None or in_s > 0:
-            return in_s
+            return Told(again_s=in_s)
         patch, version = difference(old, status), raw["metadata"]["resourceVersion"]
         with self._lock:
             if self._futile.get(key) == (version, patch):
-                return None
+                return Told()
         stored = self._writer.status(raw, patch)
         changed = stored["metadata"]["resourceVersion"] != version
         if changed:
@@ -83,7 +93,7 @@ class Telling:
             self._futile.pop(key, None)
             if not changed:
                 self._futile[key] = (version, patch)
-        return None
+        return Told(stored=stored)
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""

@@ -15,7 +15,7 @@ _BREAKS = frozenset("\x85\u2028\u2029")
 _NUMBER = re.compile(r"[-+]?[0-9.][0-9._]*([eE][-+]?[0-9]+)?")
 
 
-class _Dumper(yaml.SafeDumper):
+class _Dumper(yaml.CSafeDumper):
     """PyYAML's safe dumper for people."""
 
     def ignore_aliases(self, data: Any) -> bool:  # noqa: ARG002 - equal parts are written out
@@ -23,7 +23,7 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+def _text(dumper: yaml.CSafeDumper, text: str) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=_style(text))
 
 
