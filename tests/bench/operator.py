@@ -12,13 +12,12 @@ from pathlib import Path
 
 from palaestra.cluster import connect
 from palaestra.cluster.resources import NAMESPACES, PODS
-from tests.bench import crowd, finished, single
+from tests.bench import crowd, operator_memory, single
 from tests.control_plane.plane import running
 from tests.integration.operator.installed import asked, operator
 
 ROOT = Path(__file__).parents[2]
 JOBS = 1000
-FINISHED_JOBS = 10_000
 FAST = 500  # requests a second of each controller; Kubernetes' own default is 20
 QUIET_S = 30
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
@@ -31,7 +30,7 @@ def measure():
         "default_rate": measure_crowd(None),
         "fast": measure_crowd(FAST),
         "one_job": measure_one_job(),
-        "finished": measure_finished(),
+        "memory": operator_memory.measure(),
     }
 
 
@@ -64,16 +63,6 @@ def measure_one_job():
     with cluster(None) as (plane, api, folder), operator(plane, folder / "operator.log"):
         crowd.wait_for_silence(plane)
         return single.requests_of_one_job(plane, api)
-
-
-def measure_finished():
-    """Return the memory of an operator that starts where many jobs have ended already."""
-    with cluster(FAST) as (plane, api, folder):
-        finished.create(api, FINISHED_JOBS)
-        with operator(plane, folder / "operator.log") as running_operator:
-            crowd.wait_for_silence(plane)
-            rss_bytes = running_operator.rss_bytes()
-    return {"jobs": FINISHED_JOBS, "rss_mib": mib(rss_bytes)}
 
 
 @contextmanager

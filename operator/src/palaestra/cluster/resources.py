@@ -52,7 +52,7 @@ TRAINING_JOBS = Resource(
     api_version="palaestra.dev/v1alpha1",
     kind="TrainingJob",
     plural="trainingjobs",
-    page=2,  # of up to 1.5 MB each: as much as an API server stores
+    page=10,  # of up to 1.5 MB each: as much as an API server stores
 )
 JOBS = Resource(api_version="batch/v1", kind="Job", plural="jobs")
 PODS = Resource(api_version="v1", kind="Pod", plural="pods")

@@ -36,6 +36,7 @@ log = structlog.get_logger(__name__)
 # Of the two seconds in which the operator ends: for what is under way, for the Lease, for the rest.
 FINISH_S, RELEASE_S, STOP_S = 0.6, 0.6, 0.1
 SYNC_S = 1.0
+SETTLES_S = 0.1  # in which what belongs together, as the objects of one job, is all in the caches
 FAILED = 1
 
 
@@ -53,7 +54,7 @@ class Operator:
         self._gate = threading.Event()
         api.on_request = metrics.request
         self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited)
-        self._caches = Caches(api, options.namespaces, self._queue.add)
+        self._caches = Caches(api, options.namespaces, self._changed)
         self._definition = Definition(api)
         self._poller = Poller(self._trainers, self._queue.add)
         identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
@@ -100,6 +101,9 @@ class Operator:
                 self._look_at_all()
         finally:
             self._end()
+
+    def _changed(self, key: Key) -> None:
+        self._queue.add_after(key, SETTLES_S)
 
     def _stand(self) -> None:
         """Lead, or stand for election: not before the caches are whole, so that a leader can work."""
