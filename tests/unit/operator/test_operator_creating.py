@@ -11,7 +11,7 @@ from palaestra.operator.strangers import Strangers
 from palaestra.operator.writing import Writer
 
 KEY = ("robots", "job")
-RAW = {"metadata": {"namespace": "robots", "name": "job", "resourceVersion": "1"}}
+RAW = {"metadata": {"namespace": "robots", "name": "job", "uid": "u", "resourceVersion": "1"}}
 WANTED = {
     "apiVersion": "v1",
     "kind": "ConfigMap",
@@ -70,7 +70,7 @@ def test_a_config_map_that_is_there_already_is_used_only_if_it_is_ours_for_good(
     refused = acting.carry_out(RAW, (Create(object=WANTED, replica=0),))
 
     told = {} if wrong is None else {0: f"ConfigMap job-0-abc is there already, {wrong}; delete it"}
-    assert (denials.of(KEY), bool(refused)) == (told, bool(told))
+    assert (denials.known(KEY, "u"), bool(refused)) == (told, bool(told))
 
 
 @pytest.mark.parametrize(

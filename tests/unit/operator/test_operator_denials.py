@@ -3,9 +3,10 @@
 import pytest
 
 from palaestra.cluster import Forbidden, Invalid, ServerError, TooManyRequests, Unreachable
+from palaestra.observe.reading import MOST_TEXT
 from palaestra.operator.denials import Denials
 
-KEY = ("robots", "job")
+KEY, UID = ("robots", "job"), "u"
 QUOTA = Forbidden(403, "Forbidden", "exceeded quota")
 BUDGET = "Cannot evict pod as it would violate the pod's disruption budget."
 WEBHOOK = "Internal error occurred: failed calling webhook x"
@@ -24,11 +25,11 @@ def test_what_a_person_has_to_mend_is_told_until_it_was_made(error):
     """By replica, in the words of whoever refused."""
     denials = Denials()
 
-    denials.learn(KEY, {1: error})
-    assert denials.of(KEY) == {1: error.message}
-    denials.learn(KEY, {})
+    denials.learn(KEY, UID, {1: error})
+    assert denials.known(KEY, UID) == {1: error.message}
+    denials.learn(KEY, UID, {})
 
-    assert denials.of(KEY) == {}
+    assert denials.known(KEY, UID) == {}
 
 
 @pytest.mark.parametrize(
@@ -43,19 +44,18 @@ def test_what_passes_by_itself_changes_nothing(error):
     """Neither is it told, nor is what was told before forgotten."""
     denials = Denials()
 
-    denials.learn(KEY, {1: error})
-    assert denials.of(KEY) == {}
-    denials.learn(KEY, {1: QUOTA})
-    denials.learn(KEY, {1: error})
+    denials.learn(KEY, UID, {1: error})
+    assert denials.known(KEY, UID) == {}
+    denials.learn(KEY, UID, {1: QUOTA})
+    denials.learn(KEY, UID, {1: error})
 
-    assert denials.of(KEY) == {1: "exceeded quota"}
+    assert denials.known(KEY, UID) == {1: "exceeded quota"}
 
 
-def test_a_job_that_is_gone_is_forgotten():
-    """Memory does not grow with what was."""
+def test_words_are_kept_as_long_as_the_status_shows_them():
+    """A webhook may answer with a page; four thousand of them would be memory that nobody reads."""
     denials = Denials()
-    denials.learn(KEY, {None: QUOTA})
 
-    denials.forget(KEY)
+    denials.learn(KEY, UID, {0: Forbidden(403, "Forbidden", "no " * 100_000)})
 
-    assert denials.of(KEY) == {}
+    assert len(denials.known(KEY, UID)[0]) == MOST_TEXT

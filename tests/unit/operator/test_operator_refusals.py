@@ -3,18 +3,11 @@
 import pytest
 
 from palaestra.cluster import NotFound
-from palaestra.operator.refusals import (
-    EXPIRES_S,
-    LONGEST_PAUSE_S,
-    PATIENCE_S,
-    RECHECK_S,
-    REMEMBERED,
-    Refusals,
-    Told,
-)
+from palaestra.operator.memory import REMEMBERED
+from palaestra.operator.refusals import LONGEST_PAUSE_S, PATIENCE_S, RECHECK_S, Refusals, Told
 from palaestra.operator.strangers import Strangers
 
-KEY = ("robots", "job")
+KEY, UID = ("robots", "job"), "job-uid"
 FAILED = {"reason": "FailedCreate", "message": "exceeded quota", "lastTimestamp": "2026-01-31T12:00:00+00:00"}
 BEFORE = {**FAILED, "message": "no such class", "lastTimestamp": "2026-01-31T11:00:00Z"}
 LAST = {"involvedObject": {"uid": "u"}, **FAILED}
@@ -73,7 +66,7 @@ def test_a_new_job_is_given_some_seconds(server):
     """Nearly all have a pod at once; nobody is asked."""
     refusals = Refusals(server, lambda: server.now)
 
-    found = refusals.of([job()], [])
+    found = refusals.of(KEY, UID, [job()], [])
 
     assert (found.events, server.asked) == ((), 0)
     assert found.again_s == PATIENCE_S
@@ -82,10 +75,10 @@ def test_a_new_job_is_given_some_seconds(server):
 def test_after_that_its_events_are_read_now_and_then(server):
     """Not at every look: a job is looked at many times a second while its pods change."""
     refusals = Refusals(server, lambda: server.now)
-    refusals.of([job()], [])
+    refusals.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
 
-    first, second = refusals.of([job()], []), refusals.of([job()], [])
+    first, second = refusals.of(KEY, UID, [job()], []), refusals.of(KEY, UID, [job()], [])
     assert first == second
     assert (first.events, first.again_s, server.asked) == ((LAST,), RECHECK_S, 1)
 
@@ -93,27 +86,29 @@ def test_after_that_its_events_are_read_now_and_then(server):
 def test_the_pauses_grow_to_five_minutes(server):
     """A quota that is spent for a night is no news."""
     refusals = Refusals(server, lambda: server.now)
-    refusals.of([job()], [])
+    refusals.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
 
     pauses = []
     for _ in range(7):
-        pauses.append(refusals.of([job()], []).again_s)
+        pauses.append(refusals.of(KEY, UID, [job()], []).again_s)
         server.now += pauses[-1]
 
     assert pauses == [15, 30, 60, 120, 240, 300, 300]
     assert server.asked == 7
 
 
-def numbered(number):
-    """Return one of many Jobs that should have a pod."""
-    return job(metadata={"name": f"job-{number}", "namespace": "robots", "uid": f"u{number}"})
+def look_at(refusals, number):
+    """Return what is known about the Job, which should have a pod, of one of many TrainingJobs."""
+    name, uid = f"job-{number}", f"u{number}"
+    raw = job(metadata={"name": name, "namespace": "robots", "uid": uid})
+    return refusals.of(("robots", name), f"job-{uid}", [raw], [])
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
     """Whatever a namespace does; a look before the turn asks nobody."""
     refusals = Refusals(server, lambda: server.now)
-    due = {number: refusals.of([numbered(number)], []).again_s for number in range(1500)}
+    due = {number: look_at(refusals, number).again_s for number in range(1500)}
     looks = 0
 
     begun = server.now
@@ -121,12 +116,12 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
     while server.asked < 1500:
         number = min(due, key=due.__getitem__)
         server.now = due[number]
-        due[number] = server.now + refusals.of([numbered(number)], []).again_s
+        due[number] = server.now + look_at(refusals, number).again_s
         looks += 1
 
     busiest = max(sum(at <= each < at + 1 for each in server.times) for at in server.times)
     assert busiest <= 5
-    assert {bool(refusals.of([numbered(number)], []).events) for number in range(1500)} == {True}
+    assert {bool(look_at(refusals, number).events) for number in range(1500)} == {True}
     assert server.now - begun < 900
     assert looks < 5 * 1500
 
@@ -135,11 +130,11 @@ def test_beyond_the_bound_nobody_is_asked_and_that_is_told(server):
     """Those that are remembered keep their place, so that each gets its answer."""
     refusals = Refusals(server, lambda: server.now)
     for number in range(REMEMBERED):
-        refusals.of([numbered(number)], [])
+        look_at(refusals, number)
     server.now += PATIENCE_S
 
-    beyond = refusals.of([numbered(REMEMBERED)], [])
-    within = refusals.of([numbered(0)], [])
+    beyond = look_at(refusals, REMEMBERED)
+    within = look_at(refusals, 0)
 
     assert (beyond.events, beyond.unasked) == ((), {f"u{REMEMBERED}"})
     assert beyond.again_s == LONGEST_PAUSE_S
@@ -149,10 +144,10 @@ def test_beyond_the_bound_nobody_is_asked_and_that_is_told(server):
 def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     """The second pod may be refused though the first was not."""
     refusals = Refusals(server, lambda: server.now)
-    refusals.of([job()], [pod("Failed")])
+    refusals.of(KEY, UID, [job()], [pod("Failed")])
     server.now += PATIENCE_S
 
-    assert refusals.of([job()], [pod("Failed")]).events == (LAST,)
+    assert refusals.of(KEY, UID, [job()], [pod("Failed")]).events == (LAST,)
 
 
 @pytest.mark.parametrize(
@@ -168,10 +163,10 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
 def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
     """While nothing changes, nothing is asked for."""
     refusals = Refusals(server, lambda: server.now)
-    refusals.of(jobs, pods)
+    refusals.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
 
-    assert refusals.of(jobs, pods) == Told()
+    assert refusals.of(KEY, UID, jobs, pods) == Told()
     assert server.asked == 0
 
 
@@ -188,11 +183,11 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     """After some seconds, as a Job: most volumes come at once."""
     server.about = "type=Warning"
     refusals = Refusals(server, lambda: server.now)
-    refusals.of([], [waiting_pod()])
+    refusals.of(KEY, UID, [], [waiting_pod()])
     assert server.asked == 0
     server.now += PATIENCE_S
 
-    found = refusals.of([], [waiting_pod()])
+    found = refusals.of(KEY, UID, [], [waiting_pod()])
     assert (found.events, found.again_s) == ((LAST,), RECHECK_S)
 
 
@@ -209,43 +204,41 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
 def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
     """Its own status tells of that."""
     refusals = Refusals(server, lambda: server.now)
-    refusals.of([], [pod])
+    refusals.of(KEY, UID, [], [pod])
     server.now += PATIENCE_S
 
-    assert refusals.of([], [pod]) == Told()
+    assert refusals.of(KEY, UID, [], [pod]) == Told()
     assert server.asked == 0
 
 
-def test_what_was_deleted_while_it_lacked_something_is_forgotten_in_the_end(server):
-    """Nobody tells of it; an operator runs for months."""
+def test_a_job_that_is_made_again_is_asked_about_anew(server):
+    """What the events of the one before said is not about it, even if a test or a backup gives it its uid."""
     refusals = Refusals(server, lambda: server.now)
-    for number in range(REMEMBERED):
-        refusals.of([numbered(number)], [])
-    assert refusals.of([job()], []).unasked == {"u"}
+    refusals.of(KEY, UID, [job()], [])
+    server.now += PATIENCE_S
+    assert refusals.of(KEY, UID, [job()], []).events == (LAST,)
 
-    server.now += EXPIRES_S
-
-    assert refusals.of([job()], []).unasked == set()
+    assert refusals.of(KEY, "another", [job()], []) == Told(again_s=PATIENCE_S)
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
     """A name becomes free without any event that reaches us."""
     server.jobs["job-0"] = job()
     strangers = Strangers(server, lambda: server.now)
-    strangers.meet(KEY, "job-0")
-    assert strangers.among(KEY, ()) == [job()]
+    strangers.meet(KEY, UID, "job-0")
+    assert strangers.among(KEY, UID, ()) == [job()]
     del server.jobs["job-0"]
 
-    assert strangers.among(KEY, ()) == [job()], "not asked at every look"
+    assert strangers.among(KEY, UID, ()) == [job()], "not asked at every look"
     server.now += RECHECK_S
-    assert strangers.among(KEY, ()) == []
+    assert strangers.among(KEY, UID, ()) == []
 
 
 def test_who_is_in_the_cache_is_no_stranger(server):
     """The name was taken by our own Job, which the cache had not heard of yet."""
     server.jobs["job-0"] = job()
     strangers = Strangers(server, lambda: server.now)
-    strangers.meet(KEY, "job-0")
+    strangers.meet(KEY, UID, "job-0")
 
-    assert strangers.among(KEY, {"job-0"}) == []
-    assert strangers.among(KEY, ()) == []
+    assert strangers.among(KEY, UID, {"job-0"}) == []
+    assert strangers.among(KEY, UID, ()) == []

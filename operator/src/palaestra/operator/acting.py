@@ -31,8 +31,8 @@ class Acting:
     Args:
         api: to read what no cache may be believed about.
         writer: to write.
-        strangers: told of Jobs whose names are taken.
-        denials: told what could not be created.
+        strangers: remembers Jobs whose names are taken.
+        denials: remembers what could not be created.
     """
 
     def __init__(self, api: Api, writer: Writer, strangers: Strangers, denials: Denials) -> None:
@@ -70,7 +70,8 @@ class Acting:
                     changed = error
                 elif isinstance(action, Create | Replace):
                     denied[replica] = error
-        self._denials.learn((raw["metadata"]["namespace"], raw["metadata"]["name"]), denied)
+        metadata = raw["metadata"]
+        self._denials.learn((metadata["namespace"], metadata["name"]), metadata["uid"], denied)
         if changed is not None:
             raise Outdated(str(changed)) from changed
         return refused
@@ -79,7 +80,7 @@ class Acting:
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
         match action:
             case Create():
-                self._create(key, action.object)
+                self._create(key, raw["metadata"]["uid"], action.object)
             case Stop():
                 self._patch(key, action)
                 log.info("stopped", job=key, name=action.job, reason=action.reason)
@@ -96,7 +97,7 @@ class Acting:
                 self._writer.delete(TRAINING_JOBS, *key, uid=action.uid, version=version)
                 log.info("deleted", job=key, kind=TRAINING_JOBS.kind, name=key[1])
 
-    def _create(self, key: Key, obj: Object) -> None:
+    def _create(self, key: Key, uid: str, obj: Object) -> None:
         kind, name = obj["kind"], obj["metadata"]["name"]
         try:
             if of(obj) == NETWORK_POLICIES:
@@ -106,20 +107,20 @@ class Acting:
         except AlreadyExists:
             log.info("exists", job=key, kind=kind, name=name)
             if of(obj) == JOBS:
-                self._see_owner(key, obj)
+                self._see_owner(key, uid, obj)
             if of(obj) == CONFIG_MAPS:
                 self._see_config_map(key[0], obj)
             return
         log.info("applied", job=key, kind=kind, name=name)
 
-    def _see_owner(self, key: Key, obj: Object) -> None:
+    def _see_owner(self, key: Key, uid: str, obj: Object) -> None:
         """See that a Job that is there is the TrainingJob's own, of which the cache has not heard yet.
 
         Raises:
             AlreadyExists: it is not, or is gone by now.
         """
         name = obj["metadata"]["name"]
-        found = self._strangers.meet(key, name)
+        found = self._strangers.meet(key, uid, name)
         if found is None or not owners(found) & owners(obj):
             words = f"Job {name} is there already, and is not this job's; delete it"
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)

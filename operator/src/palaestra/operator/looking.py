@@ -83,10 +83,10 @@ class Looking:
         Raises:
             ApiError: something had to be asked for, and there was no answer.
         """
-        key: Key = (job.metadata.namespace, job.metadata.name)
+        key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
-        strangers = self._strangers.among(key, {each["metadata"]["name"] for each in jobs})
-        refusals = self._refusals.of(jobs, pods)
+        strangers = self._strangers.among(key, uid, {each["metadata"]["name"] for each in jobs})
+        refusals = self._refusals.of(key, uid, jobs, pods)
         objects = Objects(
             jobs=[*jobs, *strangers],
             pods=pods,
@@ -96,8 +96,8 @@ class Looking:
             events=refusals.events,
             unasked=refusals.unasked,
             polled=self._polled(),
-            denied=self._denials.of(key),
-            switchers=self._switchers.of(job, jobs),
+            denied=self._denials.known(key, uid),
+            switchers=self._switchers.of(key, uid, job, jobs),
         )
         observed, asked_s = self._asked(job, observe(job, objects))
         return Seen(
@@ -131,8 +131,8 @@ class Looking:
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
-        self._strangers.forget(key)
-        self._denials.forget(key)
+        for each in (self._strangers, self._denials, self._refusals, self._switchers):
+            each.forget(key)
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
         """Return what was observed with what has to be asked for, and seconds until it is asked anew."""

@@ -4,13 +4,14 @@ No cache holds them, as they need not carry our label. One is met when a Job can
 its name is taken, and is looked at again, now and then, until it is gone.
 """
 
-import threading
 import time
 from collections.abc import Callable, Collection
 from typing import Any
 
 from palaestra.cluster import Api, NotFound
 from palaestra.cluster.resources import JOBS
+from palaestra.observe import trimmed
+from palaestra.operator.memory import Memory
 from palaestra.operator.poller import Key
 
 RECHECK_S = 10.0
@@ -18,8 +19,8 @@ RECHECK_S = 10.0
 Object = dict[str, Any]
 
 
-class Strangers:
-    """The strangers that were met, by TrainingJob; safe to use from several threads.
+class Strangers(Memory[str, tuple[float, Object]]):
+    """When a stranger was met last, and what it was, by TrainingJob and name.
 
     Args:
         api: the cluster.
@@ -27,42 +28,29 @@ class Strangers:
     """
 
     def __init__(self, api: Api, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
         self._api = api
         self._clock = clock
-        self._lock = threading.Lock()
-        self._met: dict[Key, dict[str, tuple[float, Object]]] = {}
 
-    def meet(self, key: Key, name: str) -> Object | None:
+    def meet(self, key: Key, uid: str, name: str) -> Object | None:
         """Return the Job that has a name which a TrainingJob needs, and remember it; None: it is gone."""
+        others = {each: met for each, met in self.known(key, uid).items() if each != name}
         try:
-            found = self._api.get(JOBS, key[0], name)
+            found = trimmed(self._api.get(JOBS, key[0], name))
         except NotFound:
-            self._forget(key, name)
+            self.keep(key, uid, others)
             return None
-        with self._lock:
-            self._met.setdefault(key, {})[name] = (self._clock(), found)
+        self.keep(key, uid, {**others, name: (self._clock(), found)})
         return found
 
-    def among(self, key: Key, known: Collection[str]) -> list[Object]:
+    def among(self, key: Key, uid: str, cached: Collection[str]) -> list[Object]:
         """Return the strangers in the way of a TrainingJob, as they were ten seconds ago at most.
 
-        `known` are the names of the Jobs that are in the cache: those are no strangers any more.
+        `cached` are the names of the Jobs that are in the cache: those are no strangers any more.
         """
-        with self._lock:
-            met = {name: at for name, (at, _) in self._met.get(key, {}).items()}
-        for name, at in met.items():
-            if name in known:
-                self._forget(key, name)
-            elif self._clock() - at >= RECHECK_S:
-                self.meet(key, name)
-        with self._lock:
-            return [found for _, found in self._met.get(key, {}).values()]
-
-    def forget(self, key: Key) -> None:
-        """Forget those of a TrainingJob that is gone."""
-        with self._lock:
-            self._met.pop(key, None)
-
-    def _forget(self, key: Key, name: str) -> None:
-        with self._lock:
-            self._met.get(key, {}).pop(name, None)
+        met = {name: met for name, met in self.known(key, uid).items() if name not in cached}
+        self.keep(key, uid, met)
+        for name, (at, _) in met.items():
+            if self._clock() - at >= RECHECK_S:
+                self.meet(key, uid, name)
+        return [found for _, found in self.known(key, uid).values()]
