@@ -6,14 +6,24 @@ import pytest
 import structlog.testing
 from prometheus_client import CollectorRegistry, Histogram
 
+from palaestra.api.reasons import Reason
 from palaestra.cluster import Conflict, WorkQueue
 from palaestra.cluster.backoff import Backoff
+from palaestra.decide import Replace, SetSuspend, Stop
+from palaestra.decide.decision import Basis
+from palaestra.operator.acting import Acting
 from palaestra.operator.confirming import Outdated
+from palaestra.operator.denials import Denials
 from palaestra.operator.workers import Workers
-from palaestra.operator.writing import NotLeading
+from palaestra.operator.writing import NotLeading, Writer
 
 WAIT_S = 10.0
 GOOD, BAD = ("robots", "good"), ("robots", "bad")
+RAW = {"metadata": {"namespace": "robots", "name": "bad", "uid": "u", "resourceVersion": "7"}}
+OF_REPLICA = {"job": "bad-0", "replica": 0, "basis": Basis(uid="job-uid", version="20")}
+WHY = {"reason": Reason.STALLED, "message": "it"}
+EVICTION = {"pod": "bad-0-x", "uid": "pod", "times": 1, **WHY}
+MODIFIED = 'Operation cannot be fulfilled on jobs.batch "bad-0": the object has been modified'
 
 
 class Desk:
@@ -131,3 +141,50 @@ def test_a_conflict_that_repeats_is_logged_and_ever_more_rarely(desk):
 
     assert [line["times"] for line in lines if line["event"] == "conflict repeats"][:3] == [4, 8, 16]
     assert "pod job-0-x" in lines[0]["error"]
+
+
+class Refusing:
+    """An API server in which somebody else always writes first."""
+
+    def get(self, *_):
+        """Return the TrainingJob as it was decided on."""
+        return RAW
+
+    def list(self, *_, **__):
+        """Return no pod."""
+        return []
+
+    def merge(self, *_, **__):
+        """Refuse."""
+        raise Conflict(409, "Conflict", MODIFIED)
+
+    evict = merge
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        Stop(**OF_REPLICA, **WHY),
+        SetSuspend(**OF_REPLICA, suspend=True),
+        Replace(**OF_REPLICA, **EVICTION),
+        Replace(**OF_REPLICA, **EVICTION, marked=True),
+    ],
+    ids=["stop", "suspend", "mark", "evict"],
+)
+def test_a_change_of_a_job_that_always_conflicts_is_logged_with_the_api_servers_words(action, desk):
+    """A replica that is past its deadline and is not stopped must not train on in silence."""
+    api = Refusing()
+    acting = Acting(api, Writer(api, lambda: 1), None, Denials())
+    tries = threading.Semaphore(0)
+
+    def reconcile(_):
+        tries.release()
+        acting.carry_out(RAW, (action,))
+
+    with structlog.testing.capture_logs() as lines:
+        desk(reconcile).queue.add(BAD)
+        assert all(tries.acquire(timeout=WAIT_S) for _ in range(10))
+
+    repeated = [line for line in lines if line["event"] == "conflict repeats"]
+    assert [(line["job"], line["times"]) for line in repeated] == [(BAD, 4), (BAD, 8)]
+    assert MODIFIED in repeated[0]["error"]
