@@ -1,5 +1,6 @@
 """Attempts and restarts: exact, whatever was seen of what happened, and never falling."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -229,6 +230,149 @@ def test_a_pod_that_was_replaced_before_the_suspension_is_a_disruption(training)
     assert restarts(scene) == (2, 0, 1, 0)
 
 
+def pause(scene, pod, *, resumes=True):
+    """Let the author suspend the job, and its controller delete the pod; with `resumes` resume it at once."""
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    tell_suspension(scene, "True")
+    scene.objects["pods"].remove(pod)
+    if resumes:
+        resume(scene)
+
+
+def resume(scene):
+    """Let the author resume the job, and its controller tell so."""
+    scene.raw["spec"]["suspend"] = False
+    scene.settle()
+    tell_suspension(scene, "False")
+
+
+def test_a_suspension_within_the_second_of_its_pod_is_counted(training):
+    """Times of the control plane are whole seconds; the mark on the Job names the pod that was ended."""
+    scene, pod = training()
+    pause(scene, pod)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 0, 1)
+
+
+def test_a_pod_that_is_seen_after_the_suspension_that_ended_it_is_counted_as_such(accepted):
+    """The cache of pods may lag; the patch that resumes the Job names the pod."""
+    scene = accepted()
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    late = scene.running_pod()
+    scene.settle()
+    scene.objects["pods"].remove(late)
+    resume(scene)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 0, 1)
+
+
+@pytest.mark.parametrize("how", ["taken", "deleted", "gone", "interrupted"])
+def test_a_pod_that_had_ended_before_the_suspension_is_a_disruption(how, training, last_word):
+    """It would have been replaced anyway."""
+    scene, pod = training()
+    if how == "taken":
+        scene.take(pod)
+    elif how == "deleted":
+        scene.delete(pod)
+    elif how == "gone":
+        scene.objects["pods"].clear()
+    else:
+        scene.end(pod, 75, last_word())
+    scene.settle(15)
+    scene.raw["spec"]["suspend"] = True
+    scene.settle(15)
+    scene.objects["pods"].clear()
+    scene.pass_(15)
+    resume(scene)
+    scene.pass_(15)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 1, 0)
+
+
+def test_a_failure_before_the_suspension_stays_a_failure(training, last_word):
+    """The trainer had ended, and the Job has booked it."""
+    scene, pod = training()
+    scene.end(pod, 70, last_word())
+    scene.count_failures(1)
+    pause(scene, pod)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 1, 0, 0)
+
+
+def test_a_job_that_is_suspended_twice_before_the_next_pod_has_one_suspension(training):
+    """The second one ended nothing, and does not make a disruption of the first."""
+    scene, pod = training()
+    pause(scene, pod)
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    resume(scene)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 0, 1)
+
+
+def test_a_mark_is_counted_once(training):
+    """It stays on the Job; the next pod is another."""
+    scene, pod = training()
+    pause(scene, pod)
+    taken = scene.running_pod()
+    scene.settle()
+    scene.take(taken)
+    scene.pass_(15)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (3, 0, 1, 1)
+
+
+def test_a_suspension_by_somebody_else_after_one_of_ours_goes_by_its_times(training):
+    """The mark names an earlier pod; Kueue writes none."""
+    scene, pod = training()
+    pause(scene, pod)
+    second = scene.running_pod()
+    scene.settle(15)
+    scene.objects["pods"].remove(second)
+    scene.pass_(15)
+    tell_suspension(scene, "False")
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (3, 0, 0, 2)
+
+
+def test_a_suspension_by_an_earlier_release_goes_by_its_times(training):
+    """That release wrote neither annotation; the upgrade came before the resumption."""
+    scene, pod = training()
+    pause(scene, pod, resumes=False)
+    scene.job()["metadata"].pop("annotations")
+    scene.settle(15)
+    scene.raw["metadata"]["generation"] = 2
+    resume(scene)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 0, 1)
+
+
 ENDS = ("failure", "taken", "deleted", "suspended")
 
 
@@ -259,6 +403,38 @@ def test_the_counts_are_those_of_what_happened(accepted, lives):
     assert not [each for each in decision.actions if isinstance(each, Stop)]
     counts = restarts(scene)
     assert counts == (len(lives) + 1, truth["failure"], truth["taken"] + truth["deleted"], truth["suspended"])
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(("failure", "taken", "paused", "late")), st.integers(0, 2)), max_size=6
+    )
+)
+def test_suspensions_are_counted_however_fast_they_follow(accepted, lives):
+    """With the other causes they add up to the attempts, and no count ever falls."""
+    scene = accepted(backoffLimit=100)
+    truth, before, failures = dict.fromkeys(("failure", "taken", "paused"), 0), (0, 0, 0, 0), 0
+    for end, seconds in lives:
+        if end == "late":
+            scene.raw["spec"]["suspend"] = True
+            scene.settle()
+        pod = scene.running_pod()
+        scene.settle(seconds)
+        if end in {"paused", "late"}:
+            pause(scene, pod)
+        else:
+            failures += _end(scene, pod, end, failures)
+            scene.pass_(10)  # as the Job controller does before the next pod
+        truth["paused" if end == "late" else end] += 1
+        counts = restarts(scene)
+        assert counts[0] == 1 + sum(counts[1:])
+        assert all(old <= new for old, new in zip(before, counts, strict=True))
+        before = counts
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (len(lives) + 1, truth["failure"], truth["taken"], truth["paused"])
 
 
 def _end(scene, pod, end, failures):

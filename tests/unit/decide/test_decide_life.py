@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide import Create, SetSuspend, Stop, accept, prepare
-from palaestra.observe import Objects, observe
+from palaestra.observe import Objects, Suspended, observe
 
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 
@@ -201,7 +201,8 @@ def test_suspending_is_one_patch_of_each_job_that_goes_on(training):
     scene.objects["pods"].clear()
     scene.settle()
 
-    assert decision.actions == (SetSuspend(job="job-0", replica=0, suspend=True),)
+    mark = Suspended(pod="pod-0", lived=True)
+    assert decision.actions == (SetSuspend(job="job-0", replica=0, suspend=True, mark=mark),)
     assert (scene.status.phase, scene.replica().reason) == (Phase.SUSPENDED, "Suspended")
     assert (scene.status.active_seconds, scene.status.active_since) == (60, None)
 

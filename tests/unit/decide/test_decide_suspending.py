@@ -7,8 +7,10 @@ import pytest
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide import SetSuspend, as_data
+from palaestra.observe import Suspended
 
 SUSPEND_SET = "palaestra.dev/suspend-set"
+SUSPENDED = "palaestra.dev/suspended"
 
 
 def by_kueue(scene, *, suspend):
@@ -72,18 +74,22 @@ def test_the_author_is_heeded_whatever_somebody_else_has_set(suspended, training
     scene.settle()
     scene.raw["spec"]["suspend"] = True
 
-    decision = scene.step()
+    [action] = scene.step().actions
 
-    assert decision.actions == (SetSuspend(job="job-0", replica=0, suspend=True),)
+    assert isinstance(action, SetSuspend)
+    assert action.suspend is True
     assert scene.job()["metadata"]["annotations"][SUSPEND_SET] == "true"
     assert scene.settle().actions == ()
 
 
 def test_what_was_set_is_written_by_the_same_patch():
     """An operator that is killed between two patches would take its own for somebody else's."""
-    patch = SetSuspend(job="job-0", replica=0, suspend=True).patch
+    mark = Suspended(pod="pod-0", lived=True)
 
-    assert patch == {"metadata": {"annotations": {SUSPEND_SET: "true"}}, "spec": {"suspend": True}}
+    patch = SetSuspend(job="job-0", replica=0, suspend=True, mark=mark).patch
+
+    annotations = {SUSPEND_SET: "true", SUSPENDED: "pod-0 lived"}
+    assert patch == {"metadata": {"annotations": annotations}, "spec": {"suspend": True}}
 
 
 def test_a_job_of_an_earlier_release_is_taken_as_it_stands(training):

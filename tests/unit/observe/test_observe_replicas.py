@@ -156,6 +156,7 @@ def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
         "annotations": {
             "palaestra.dev/stopped": "Stalled: it",
             "palaestra.dev/suspend-set": "true",
+            "palaestra.dev/suspended": "pod-0 lived",
             "other": "x",
         },
         "managedFields": [{"manager": "palaestra-operator"}],

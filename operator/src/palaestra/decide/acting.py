@@ -7,7 +7,7 @@ from palaestra.api.status import TERMINAL, ReplicaStatus
 from palaestra.decide.decision import Action, Basis, Create, Discard, Replace, SetSuspend, Stop
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.replicas import Decided
-from palaestra.decide.suspending import to_resume, to_set
+from palaestra.decide.suspending import mark, to_resume, to_set
 from palaestra.observe.views import JobView, Observed, PodView, ReplicaObserved
 from palaestra.plan import Object, Plan, ReplicaPlan
 
@@ -105,6 +105,7 @@ def _switches(
                 job=seen.job.name,
                 replica=seen.index,
                 suspend=job.spec.suspend,
+                mark=mark(seen, it.status.pod, suspend=job.spec.suspend),
                 basis=_basis(seen.job),
             )
 

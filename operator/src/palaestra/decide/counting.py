@@ -8,7 +8,8 @@ number:
 
     trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
     operator    the operator replaced the pod, by the mark on its Job
-    suspension  the Job was suspended between the two pods
+    suspension  the operator suspended the Job while the pod lived, by the mark on the Job; where somebody
+                else suspended it, the Job was suspended between the two pods, by its controller's times
     disruption  all others: the cluster or a person took the pod, or it exited with 75
 
 A failed pod that was not replaced yet is no restart. Restarts of simulators are counted within an attempt
@@ -22,7 +23,7 @@ from datetime import timedelta
 
 from palaestra.api.status import Phase, PodReference, ReplicaStatus, Restarts
 from palaestra.observe.reading import MOST_COUNT
-from palaestra.observe.views import PodView, ReplicaObserved
+from palaestra.observe.views import JobView, PodView, ReplicaObserved
 from palaestra_sim.protocol.status import ExitCode
 
 MOST_UNSEEN = 100  # pods that a trainer's record may have and nobody saw: a record is not to be trusted
@@ -62,14 +63,18 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
 
 
 def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
-    """Return the pods made after the one that the status names, oldest first."""
+    """Return the pods made after the one that the status names, oldest first.
+
+    Times are whole seconds: where the named pod is gone, a pod of the same second came after it. An older one
+    that is still listed had failed, and the Job controller waits seconds before it makes the next.
+    """
     named = old.pod
     if named is None:
         return tuple(pods)
     uids = [each.uid for each in pods]
     if named.uid in uids:
         return tuple(pods[uids.index(named.uid) + 1 :])
-    return tuple(each for each in pods if each.created > named.created)
+    return tuple(each for each in pods if each.created >= named.created)
 
 
 def failed_by_itself(pod: PodView) -> bool:
@@ -82,6 +87,11 @@ def has_run(pod: PodView) -> bool:
     """Return whether a pod's trainer has run, or does."""
     trainer = pod.trainer
     return trainer is not None and (trainer.running_since is not None or trainer.exit is not None)
+
+
+def lives(pod: PodView) -> bool:
+    """Return whether a pod's trainer may still run, and nobody has deleted the pod."""
+    return not pod.ended and pod.gone_by is None and exit_code(pod) is None
 
 
 def exit_code(pod: PodView) -> int | None:
@@ -149,13 +159,24 @@ def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
 
 
 def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
+    """Return 1 if a suspension ended one of the pods that were replaced since."""
+    if not newer or seen.job is None:
+        return 0
+    replaced = {old.pod.uid if old.pod is not None else "", *(each.uid for each in newer[:-1])}
+    mark = seen.job.suspension
+    if mark is not None and mark.pod in replaced:
+        return int(mark.lived)
+    return _suspended_by_times(old, seen.job, newer)
+
+
+def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodView]) -> int:
     """Return 1 if the Job was suspended after the named pod was made, and resumed for the newest."""
-    if old.pod is None or not newer or seen.job is None:
+    if old.pod is None:
         return 0
     named, newest = old.pod.created, newer[-1].created
-    if (paused := seen.job.paused) is not None:  # the pod is seen before the Job tells that it was resumed
+    if (paused := job.paused) is not None:  # the pod is seen before the Job tells that it was resumed
         return int(named <= paused < newest)
-    resumed = seen.job.resumed
+    resumed = job.resumed
     return int(resumed is not None and named + _DATED_LATE < resumed <= newest + _DATED_LATE)
 
 

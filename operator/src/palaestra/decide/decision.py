@@ -8,7 +8,8 @@ from typing import Any
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Status
 from palaestra.decide.times import Record
-from palaestra.observe.jobs import REPLACED, STOPPED
+from palaestra.observe.jobs import REPLACED, STOPPED, SUSPENDED
+from palaestra.observe.views import Suspended
 from palaestra.plan.job import suspend_set
 
 
@@ -87,20 +88,25 @@ class Replace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetSuspend:
-    """Suspend or resume the Job of a replica. Never given for a job with a queue: Kueue owns that."""
+    """Suspend or resume the Job of a replica. Never given for a job with a queue: Kueue owns that.
+
+    Attributes:
+        mark: of the pod that the suspension ends, or ended; None: the Job's mark stays as it is.
+    """
 
     job: str
     replica: int
     suspend: bool
+    mark: Suspended | None = None
     basis: Basis = field(default=Basis(), compare=False)
 
     @property
     def patch(self) -> dict[str, Any]:
         """Return the merge patch of the Job."""
-        return {
-            "metadata": {"annotations": suspend_set(suspend=self.suspend)},
-            "spec": {"suspend": self.suspend},
-        }
+        annotations = suspend_set(suspend=self.suspend)
+        if self.mark is not None:
+            annotations[SUSPENDED] = f"{self.mark.pod} {'lived' if self.mark.lived else 'ended'}"
+        return {"metadata": {"annotations": annotations}, "spec": {"suspend": self.suspend}}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

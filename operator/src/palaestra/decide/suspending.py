@@ -1,7 +1,9 @@
 """Whose doing it is that a Job is suspended, or is not: the operator's, a queue's or somebody else's."""
 
 from palaestra.api import TrainingJob
-from palaestra.observe.views import JobView, Observed, ReplicaObserved
+from palaestra.api.status import PodReference
+from palaestra.decide.counting import lives
+from palaestra.observe.views import JobView, Observed, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to go on from the last checkpoint"
 SOMEBODY = "somebody else"  # where no field manager is known
@@ -44,6 +46,23 @@ def seen_generation(job: TrainingJob, observed: Observed) -> int | None:
 def to_resume(job: TrainingJob, seen: JobView | None) -> bool:
     """Return whether the operator has to resume a Job: its next pod would be a new one."""
     return not job.spec.suspend and to_set(job, seen)
+
+
+def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) -> Suspended | None:
+    """Return what the patch that suspends or resumes a Job writes of the current pod; None: nothing.
+
+    A pod may be made before the suspension and seen after it. The patch that resumes names such a pod: a
+    suspended Job makes none.
+    """
+    job = seen.job
+    if job is None or current is None or job.suspended == suspend:
+        return None
+    named = job.suspension is not None and job.suspension.pod == current.uid
+    lived = seen.pod is not None and lives(seen.pod)
+    if suspend:  # again, before the next pod is made: the mark that is there is right
+        return None if named and not lived else Suspended(pod=current.uid, lived=lived)
+    late = job.suspend_set is True and not named
+    return Suspended(pod=current.uid, lived=True) if late else None
 
 
 def overruled(job: TrainingJob, seen: JobView) -> bool:

@@ -29,6 +29,7 @@ from palaestra.observe.views import (
     ReplicaObserved,
     Source,
     SourceKind,
+    Suspended,
 )
 
 __all__ = [
@@ -49,6 +50,7 @@ __all__ = [
     "ReplicaObserved",
     "Source",
     "SourceKind",
+    "Suspended",
     "lacking",
     "last_refusal",
     "observe",

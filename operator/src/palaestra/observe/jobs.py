@@ -3,14 +3,16 @@
 import re
 
 from palaestra.observe.reading import condition, count, holds, part, parts, text, time
-from palaestra.observe.views import JobEnd, JobView, Raw, Replaced
+from palaestra.observe.views import JobEnd, JobView, Raw, Replaced, Suspended
 from palaestra.plan.job import QUEUE_LABEL, SUSPEND_SET
 
 # What others may change in the spec of a Job of ours, besides `suspend`.
 SETTINGS = ("parallelism", "backoffLimit", "activeDeadlineSeconds", "ttlSecondsAfterFinished")
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
+SUSPENDED = "palaestra.dev/suspended"  # annotation of a Job: "<uid of the pod> lived", or "<uid> ended"
 REPLACED = "palaestra.dev/replaced"  # annotation of a Job: "<times> <uid of the pod> <reason>: <message>"
 _REPLACED = re.compile(r"(\d{1,9}) (\S{1,253}) (\w{1,60}): (.{0,1024})")
+_SUSPENDED = re.compile(r"(\S{1,253}) (lived|ended)")
 
 # The outcome is certain before the last pod has ended: a pod on a lost node never does.
 _ENDS = (
@@ -34,6 +36,7 @@ def job_view(raw: Raw) -> JobView:
         version=text(metadata, "resourceVersion", 253),
         suspended=part(raw, "spec").get("suspend") is True,
         suspend_set=_suspend_set(part(metadata, "annotations")),
+        suspension=_suspension(part(metadata, "annotations")),
         paused=turned.get("True"),
         resumed=turned.get("False"),
         stopped=_stopped(part(metadata, "annotations")),
@@ -58,6 +61,12 @@ def _stopped(annotations: dict[str, object]) -> tuple[str, str] | None:
 
 def _suspend_set(annotations: dict[str, object]) -> bool | None:
     return {"true": True, "false": False}.get(text(annotations, SUSPEND_SET, 10))
+
+
+def _suspension(annotations: dict[str, object]) -> Suspended | None:
+    """Return the mark of the pod that a suspension ended; None: there is none that could be ours."""
+    mark = _SUSPENDED.fullmatch(text(annotations, SUSPENDED, 300))
+    return None if mark is None else Suspended(pod=mark[1], lived=mark[2] == "lived")
 
 
 def _replaced(annotations: dict[str, object]) -> Replaced | None:

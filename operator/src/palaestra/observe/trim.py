@@ -8,8 +8,9 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from palaestra.observe.jobs import SETTINGS
+from palaestra.observe.jobs import REPLACED, SETTINGS, STOPPED, SUSPENDED
 from palaestra.observe.shortening import shortened
+from palaestra.plan.job import SUSPEND_SET
 
 _METADATA = (
     "name", "namespace", "uid", "resourceVersion", "generation", "creationTimestamp",
@@ -20,7 +21,7 @@ _POD_STATUS = (
     "phase", "reason", "message", "startTime", "podIP", "conditions",
     "initContainerStatuses", "containerStatuses",
 )  # fmt: skip
-_ANNOTATIONS = ("palaestra.dev/stopped", "palaestra.dev/replaced", "palaestra.dev/suspend-set")
+_ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET)
 
 SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: the bytes of the whole without its status
 SMALL = 65_536  # bytes; one that is not larger is kept without it

@@ -198,6 +198,19 @@ class Replaced:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Suspended:
+    """The mark on a Job that the operator has suspended.
+
+    Attributes:
+        pod: uid of the current attempt's pod at that time.
+        lived: the suspension ended it; False: it had ended, or was being deleted, before.
+    """
+
+    pod: str
+    lived: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JobView:
     """The batch/v1 Job of a replica.
 
@@ -206,6 +219,7 @@ class JobView:
         suspended: as its spec says.
         suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: an earlier
             release made the Job, or the Job has a queue.
+        suspension: our mark of the pod that our last suspension ended; None: it has none.
         paused: since when it is, by its controller's word; None: it is not.
         resumed: when it last was, by its controller's word; None: it never was suspended or still is.
         stopped: reason and message of our stop mark; None: it has none.
@@ -223,6 +237,7 @@ class JobView:
     version: str = ""
     suspended: bool = False
     suspend_set: bool | None = None
+    suspension: Suspended | None = None
     paused: datetime | None = None
     resumed: datetime | None = None
     stopped: tuple[str, str] | None = None
