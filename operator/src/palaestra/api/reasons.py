@@ -301,9 +301,10 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.START_TIMEOUT: Row(
         "{what}",
-        "the replica has waited for its first step as long as `startTimeoutSeconds` allows, and nobody says "
-        "what for",
-        "`kubectl describe pod`; raise `startTimeoutSeconds`, in a new TrainingJob, if it may take longer",
+        "the replica did not reach its first step within `startTimeoutSeconds`, and no other reason explains "
+        "the wait",
+        "run `kubectl describe pod`; if a start may take longer, raise `startTimeoutSeconds` in a new "
+        "TrainingJob",
     ),
     Reason.SIMULATOR_OUT_OF_MEMORY: Row(
         "container {container} was killed for its memory ({limit}, {times} so far); "
@@ -403,9 +404,9 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.EDITED: Row(
         "{what} was changed by somebody else: {fact}",
-        "an object that the operator made is not as it was made; it is said once for each edit, "
-        "and nothing is put back",
-        "undo the edit if nobody meant it",
+        "somebody changed an object that the operator had made; the operator emits one event for each edit "
+        "and does not restore the object",
+        "if the edit was a mistake, undo it",
     ),
 }
 

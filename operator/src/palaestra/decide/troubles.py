@@ -31,7 +31,7 @@ FULL = ("StorageFull", "DiskFull")  # how a last word begins; the second in olde
 
 
 def objects_refused(it: Situation) -> Finding | None:
-    """The API server makes no object of the replica; nothing in the cluster tells of it."""
+    """The API server refuses to create an object of the replica; no event in the cluster reports it."""
     if it.seen.job is not None or not it.seen.denied or it.pod is not None:
         return None
     phase = Phase.SUSPENDED if it.job.spec.suspend else Phase.PENDING
