@@ -4,7 +4,7 @@ import json
 from datetime import UTC, datetime
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from palaestra.api.status import Status
@@ -40,7 +40,7 @@ def replica(index, phase="Running", *, simulators=32, text="x", long=200, kills=
             "log": [text * long] * 10,
             "faults": [fault] * 10,
         },
-        "memoryKills": [{"container": f"sim-collect-{i}", **kill} for i in range(kills)],
+        "memoryKills": [{"container": f"sim-{'g' * 20}-{i}", **kill} for i in range(kills)],
     }
 
 
@@ -49,6 +49,11 @@ def whole(replicas):
     told = {"type": "Running", "status": "True", "reason": "Training", "message": "x" * 1024}
     status = {"phase": "Running", "conditions": [told | {"lastTransitionTime": TIME}], "replicas": replicas}
     return as_data(Status.model_validate(status, by_alias=True, by_name=False))
+
+
+def counted(replica):
+    """Return how often each container was killed for its memory, and when last."""
+    return [(each["container"], each["times"], each["last"]) for each in replica["memoryKills"]]
 
 
 def job(size=0, **annotations):
@@ -109,6 +114,7 @@ def test_a_replica_that_failed_keeps_its_log_longest():
     kills=st.integers(0, 34),
     taken=st.integers(0, 950_000),
 )
+@example(phases=["Failed"] * 100, simulators=32, text="\U0001f600", kills=34, taken=950_000)
 def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
     phases, simulators, text, kills, taken
 ):
@@ -124,6 +130,7 @@ def test_every_status_fits_beside_its_spec_and_keeps_what_is_decided_by(
     assert [{name: it.get(name) for name in KEPT} for it in cut["replicas"]] == [
         {name: it.get(name) for name in KEPT} for it in status["replicas"]
     ]
+    assert [counted(it) for it in cut["replicas"]] == [counted(it) for it in status["replicas"]]
     assert as_data(Status.model_validate(cut, by_alias=True, by_name=False))["phase"] == status["phase"]
 
 

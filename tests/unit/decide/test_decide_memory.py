@@ -2,6 +2,10 @@
 
 import pytest
 
+from palaestra.decide import fitted
+from palaestra.observe.trim import SIZE
+
+FULL = {"metadata": {"annotations": {SIZE: "1400000"}}}  # a spec that leaves its status no room at all
 GROUP = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
 GROUPS = [GROUP, {"name": "evaluate", "role": "Evaluate"}]
 
@@ -64,6 +68,24 @@ def test_each_kill_is_counted_once(scene_and_pod):
     assert kills(scene) == [("sim-collect-0", 3, "512Mi")]
     assert len(first) == 1
     assert "3 so far" in last[0]
+
+
+def test_a_kill_is_one_event_also_where_the_status_has_no_room(scene_and_pod):
+    """Without a trace of it in the status each look would find it anew, for as long as the pod lives."""
+    scene, pod = scene_and_pod
+    kill(scene, pod)
+    scene.settle(1)
+    repeated = []
+    for _ in range(3):
+        scene.raw["status"] = fitted(FULL, scene.raw["status"])
+        repeated += told(scene.step(30))
+    kill(scene, pod, restarts=2)
+
+    last = told(scene.settle(1))
+
+    assert repeated == []
+    assert len(last) == 1
+    assert "2 so far" in last[0]
 
 
 def test_a_simulator_that_crashed_was_not_killed_for_its_memory(scene_and_pod):

@@ -2,7 +2,8 @@
 
 etcd refuses an object of more than 1.5 MiB, and the operator would send it again for ever. Each field of a
 status has a bound of its own, but a hundred replicas of 32 simulators are larger together, and the author's
-spec comes on top. What is left out here is only told to people; no decision depends on it.
+spec comes on top. What is left out here is only shown to people: no decision depends on it, and no event, or
+each look would emit it again.
 """
 
 import json
@@ -14,19 +15,20 @@ from palaestra.observe.reading import part, text
 from palaestra.observe.trim import SIZE, SMALL
 
 MOST_BYTES = 1_400_000  # of the whole object, as it is sent; etcd takes 1,572,864, with who wrote which field
-SHORT = 100  # characters of a message, where nothing else helps
+SHORT = 100  # bytes of a message as it is sent, where little else helps
 
 Data = dict[str, Any]
 Cut = Callable[[Data], Data]
 
 _HEALTHY = frozenset({Phase.RUNNING.value, Phase.SUCCEEDED.value})
+_OF_KILL = ("container", "times", "last")
 
 
 def fitted(job: Mapping[str, Any], status: Data) -> Data:
     """Return a status as `as_data` gives it, without the details for which its job has no room.
 
-    The same status gives the same result, and a result is not cut again. A spec that leaves less than a
-    quarter of a megabyte may leave too little.
+    The same status gives the same result, and a result is not cut again. A spec that leaves less than 450,000
+    bytes may leave too little.
     """
     room = MOST_BYTES - _taken(job)
     for cut in CUTS:
@@ -75,7 +77,9 @@ def _messages(replica: Data) -> Data:
 
 
 def _memory_kills(replica: Data) -> Data:
-    return _without(replica, "memoryKills")
+    """Return a replica whose kills are counted, and known again by their time."""
+    kills = [{name: each[name] for name in _OF_KILL} for each in replica.get("memoryKills", ())]
+    return {**replica, "memoryKills": kills}
 
 
 def _conditions(status: Data) -> Data:
@@ -103,9 +107,10 @@ def _in_attempt(replica: Data, cut: Cut) -> Data:
 
 def _shortened(data: Data) -> Data:
     message = data.get("message")
-    if message is None or len(message) <= SHORT:
+    if message is None or _size(message) <= SHORT:
         return data
-    return {**data, "message": f"{message[: SHORT - 3]}..."}
+    most = next(n for n in range(SHORT, -1, -1) if _size(message[:n]) <= SHORT - len("..."))
+    return {**data, "message": f"{message[:most]}..."}
 
 
 def _without(data: Data, name: str) -> Data:
