@@ -19,23 +19,26 @@ WATCH_S = 600.0
 Object = dict[str, Any]
 
 
-def end_state(place: Place) -> dict[str, dict[str, Object]]:
+def end_state(place: Place, changes: Iterable[tuple[str, Object]]) -> dict[str, dict[str, Object]]:
     """Return all objects of a namespace that are about TrainingJobs, by kind and name.
 
-    The name of a pod is made up by the Job controller; pods are numbered by replica instead.
+    The name of a pod is made up by the Job controller; pods are numbered by replica instead, as they came by
+    what a watch reported. Their times are whole seconds, and two may be made in one.
     """
     state = {
         resource.kind: {each["metadata"]["name"]: each for each in place.all(resource)}
         for resource in (TRAINING_JOBS, *MADE)
     }
-    state["Pod"] = dict(_numbered(place.all(PODS)))
+    state["Pod"] = dict(_numbered(place.all(PODS), changes))
     state["ConfigMap"].pop("kube-root-ca.crt", None)
     return state
 
 
-def _numbered(pods: Iterable[Object]) -> Iterator[tuple[str, Object]]:
+def _numbered(pods: Iterable[Object], changes: Iterable[tuple[str, Object]]) -> Iterator[tuple[str, Object]]:
     counts: Counter[str] = Counter()
-    for pod in sorted(pods, key=lambda each: each["metadata"]["creationTimestamp"]):
+    uids = dict.fromkeys(pod["metadata"]["uid"] for _, pod in changes)
+    came = {uid: number for number, uid in enumerate(uids)}
+    for pod in sorted(pods, key=lambda each: came.get(each["metadata"]["uid"], len(came))):
         replica = "-".join(_replica(pod)[1:])
         counts[replica] += 1
         yield f"{replica}#{counts[replica]}", pod

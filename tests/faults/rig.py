@@ -106,7 +106,7 @@ class Rig:
             operator = stack.enter_context(self._operator(place, course, Path(folder)))
             pods = stack.enter_context(PodWatch(self._api, place.name))
             wrong = _played(place, workload)
-            state, unsettled = _settled(place, course, wanted)
+            state, unsettled = _settled(place, course, pods, wanted)
             wrong += unsettled + doubles(pods.changes())
             wrong += [f"unforeseen: {line}" for line in operator.unforeseen()]
         return Run(
@@ -141,11 +141,13 @@ def _played(place: Stage, workload: str) -> list[str]:
     return []
 
 
-def _settled(place: Stage, course: Course, wanted: Undisturbed | None) -> tuple[Leaves, list[str]]:
+def _settled(
+    place: Stage, course: Course, pods: PodWatch, wanted: Undisturbed | None
+) -> tuple[Leaves, list[str]]:
     """Return the end state once it is as wanted and nothing is asked for; and what is wrong with it."""
     ends = time.monotonic() + SETTLES_S
     while True:
-        found = end_state(place)
+        found = end_state(place, pods.changes())
         state = leaves(found)
         wrong = orphans(found)
         if wanted is not None:
