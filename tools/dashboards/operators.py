@@ -195,7 +195,10 @@ def _latency() -> Panel:
 def _memory() -> Panel:
     return Panel(
         question="Does its memory grow?",
-        says="It grows with the number of jobs (75 MB for 200). It grows without them: please report it.",
+        says=(
+            "It grows with the number of jobs: 49 MiB without any, 18 MiB for each 1,000 planned, 2.4 MiB "
+            "for each 1,000 finished. It grows without them: please report it."
+        ),
         unit=units.BytesIEC,
         least=0,
         width=12,

@@ -1,10 +1,12 @@
 """What others refuse, what is not there, and what a job may not open; each is told with its reason."""
 
 from http import HTTPStatus
+from pathlib import Path
 
 import pytest
+import yaml
 
-from palaestra.cluster import Resource
+from palaestra.cluster import Forbidden, Resource
 from palaestra.cluster.resources import DEFINITIONS, JOBS, PODS, SECRETS, TRAINING_JOBS
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
@@ -13,6 +15,7 @@ from tests.integration.operator.cluster import local_queues
 from tests.integration.operator.installed import USER
 from tests.waiting import eventually
 
+PLATFORM = Path(__file__).parents[3] / "manifests" / "examples" / "platform"
 QUOTAS = Resource(api_version="v1", kind="ResourceQuota", plural="resourcequotas")
 BINDINGS = Resource(api_version="rbac.authorization.k8s.io/v1", kind="RoleBinding", plural="rolebindings")
 TOKEN = {"name": "TOKEN", "secretKeyRef": {"name": "token", "key": "token"}}
@@ -55,6 +58,19 @@ def test_pods_that_are_refused_are_told_in_the_words_of_the_api_server(place, st
 def refused(replica):
     """Whether a status says of a replica that its pods are refused."""
     return replica.get("reason") == "PodsRefused"
+
+
+def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place):
+    """The API server refuses the next one as it is applied; the operator never has to hold it."""
+    example, _ = yaml.safe_load_all((PLATFORM / "quota.yaml").read_text())
+    [counted] = [name for name in example["spec"]["hard"] if name.startswith("count/")]
+    few = {"apiVersion": "v1", "kind": "ResourceQuota", "metadata": {"name": "few"}}
+    place.create(QUOTAS, few | {"spec": {"hard": {counted: "1"}}})
+    eventually(lambda: place.get(QUOTAS, "few").get("status", {}).get("hard") == {counted: "1"}, 60)
+    place.train("first")
+
+    with pytest.raises(Forbidden, match=f"exceeded quota: few, requested: {counted}=1"):
+        place.train("second")
 
 
 def test_a_claim_that_is_refused_is_told_and_made_when_there_is_room(place, start):
