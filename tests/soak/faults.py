@@ -29,7 +29,7 @@ SEED = 1  # of the sample that is taken below full scale
 
 def measure(scale):
     """Return how many plans came to the same end as undisturbed runs, and those that did not."""
-    with rig() as at, ThreadPoolExecutor(AT_ONCE) as pool:
+    with rig() as at, several_at_once() as pool:
         undisturbed = dict(zip(WORKLOADS, pool.map(at.undisturbed, WORKLOADS), strict=True))
         every = list(plans({name: each.counts for name, each in undisturbed.items()}))
         chosen = random.Random(SEED).sample(every, max(round(len(every) * scale), 1))
@@ -66,6 +66,16 @@ def repeat(seed):
         "wrong": run.wrong,
         "claims": {"the run comes to the same as an undisturbed one": not run.wrong},
     }
+
+
+@contextmanager
+def several_at_once() -> Iterator[ThreadPoolExecutor]:
+    """Run what the block asks for, several at once; what has not begun when it is interrupted never does."""
+    pool = ThreadPoolExecutor(AT_ONCE)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
