@@ -308,5 +308,5 @@ def test_a_pod_that_is_not_there_and_was_not_asked_about_says_so(make_scene):
     assert scene.replica().reason == "Starting"
     assert scene.replica().message == (
         "its pod is about to be created; why that takes long was not asked, as too many others wait; "
-        "`kubectl describe` tells"
+        "`kubectl describe` shows it"
     )

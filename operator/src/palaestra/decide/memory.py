@@ -24,7 +24,7 @@ def killed_for_memory(container: ContainerView) -> bool:
 def memory_kills(it: Situation) -> tuple[MemoryKills, ...]:
     """Return the kills by container, those that are seen for the first time added.
 
-    A kill is told from another by its pod and the container's run in it. Of the pods before the one that
+    A kill differs from another by its pod and the container's run in it. Of the pods before the one that
     the status names all is known.
     """
     kills = {each.container: each for each in it.old.memory_kills}

@@ -1,4 +1,4 @@
-"""What the trainer last told, as the status has it, and since when it stands still.
+"""What the trainer reported last, as the status has it, and since when it stands still.
 
 What it does not tell any more stays as it was: unknown is neither zero nor stalled.
 """
@@ -66,9 +66,9 @@ def last_progress(it: Situation) -> datetime | None:
 def standstill(it: Situation) -> Wait | None:
     """Return the wait for the next step, or for the next one of an evaluation; None: it does not train.
 
-    Where the trainer tells how long ago an environment stepped, the wait began then. A trainer of an older
-    release tells only when, by its own clock: that is compared with what it told before, and with no time
-    of ours.
+    Where the trainer reports how long ago an environment stepped, the wait began then. A trainer of an older
+    release reports only when, by its own clock: that is compared with what it reported before, and with
+    no time of ours.
     """
     polled = it.seen.polled
     if polled is None or not it.trains or it.pod is None:

@@ -6,7 +6,7 @@ from palaestra.decide.attempts import paused
 from palaestra.decide.situation import Finding, Situation, found, told
 from palaestra.decide.suspending import unheeded
 
-UNASKED = "; why that takes long was not asked, as too many others wait; `kubectl describe` tells"
+UNASKED = "; why that takes long was not asked, as too many others wait; `kubectl describe` shows it"
 
 
 def held(it: Situation) -> Finding | None:

@@ -20,7 +20,7 @@ class Wait:
     Attributes:
         key: what is waited for, within a replica; a wait of another key begins anew.
         seconds: that it may take.
-        begun_s: when it began, on the monotonic clock, where something tells; None: at its first sight.
+        begun_s: when it began, on the monotonic clock, where something says; None: at its first sight.
     """
 
     key: tuple[str, ...]

@@ -57,7 +57,7 @@ def old_pod_holds_claim(it: Situation) -> Finding | None:
 
 
 def pods_refused(it: Situation) -> Finding | None:
-    """The API server makes no pod; only the Job's events tell."""
+    """The API server makes no pod; only the Job's events say why."""
     refused = it.seen.refused
     words = it.seen.denied or (refused.message if refused is not None else "")
     return None if it.pod is not None or not words else found(Reason.PODS_REFUSED, words=words)
@@ -81,7 +81,7 @@ def unschedulable(it: Situation) -> Finding | None:
 
 
 def volume_not_mounted(it: Situation) -> Finding | None:
-    """A node has taken the pod, and a volume is not mounted; only the pod's events tell."""
+    """A node has taken the pod, and a volume is not mounted; only the pod's events say why."""
     if it.pod is None or not it.seen.unmounted:
         return None
     return found(Reason.VOLUME_NOT_MOUNTED, pod=it.pod.name, words=it.seen.unmounted)

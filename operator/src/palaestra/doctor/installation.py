@@ -42,9 +42,9 @@ def runs(site: Site) -> Iterator[Finding]:
 
 
 def images(site: Site) -> Iterator[Finding]:
-    """Tell whether the operator's image, and those of jobs that name none, are named by digest."""
+    """Check that the operator's image, and those of jobs that name none, are named by digest."""
     deployment = _deployment(site)
-    if deployment is not None:  # that there is none is what `runs` tells
+    if deployment is not None:  # `runs` reports that there is none
         yield judged_images(_container(deployment))
 
 

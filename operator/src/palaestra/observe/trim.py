@@ -30,7 +30,7 @@ SMALL = 65_536  # bytes; one that is not larger is kept without it
 def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
     """Return an object as far as it is read while nothing of it is planned.
 
-    Kinds that nobody here reads are returned whole, without what is told of their writers.
+    Kinds that nobody here reads are returned whole, without the fields about their writers.
     """
     kind = raw.get("kind")
     kept = {name: raw[name] for name in ("apiVersion", "kind") if name in raw}
@@ -45,7 +45,7 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def whole(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an object with all that it holds, without what is told of its writers."""
+    """Return an object with all that it holds, without the fields about its writers."""
     return {**raw, "metadata": _metadata(raw)}
 
 

@@ -32,7 +32,7 @@ from palaestra.operator.caches import Caches
 from palaestra.operator.looking import Looking, Seen, earliest
 from palaestra.operator.poller import Key
 from palaestra.operator.records import Records
-from palaestra.operator.telling import Telling, Told
+from palaestra.operator.telling import StatusWrite, Telling
 from palaestra.plan import ClusterLayout
 
 Object = Mapping[str, Any]
@@ -92,11 +92,11 @@ class Controller:
             return None
         times = self._times(self._records.of(key, raw["metadata"]["uid"]))
         look = self._look(raw, times)
-        told = self._carry_out(raw, look, times)
-        if told.stored is not None and _just_accepted(raw, told.stored):
-            look = self._decide_anew(told.stored, look, times)
-            told = self._carry_out(trimmed(told.stored), look, times)
-        return earliest(look.decision.wake_after_s, look.again_s, told.again_s)
+        written = self._carry_out(raw, look, times)
+        if written.stored is not None and _just_accepted(raw, written.stored):
+            look = self._decide_anew(written.stored, look, times)
+            written = self._carry_out(trimmed(written.stored), look, times)
+        return earliest(look.decision.wake_after_s, look.again_s, written.again_s)
 
     def _look(self, raw: Object, times: Times) -> "_Look":
         """Return what there is of a job, and what follows."""
@@ -115,15 +115,15 @@ class Controller:
         decision = decide(accept(stored), look.seen.observed, look.prepared, times)
         return replace(look, decision=decision, just_accepted=True)
 
-    def _carry_out(self, raw: Object, look: "_Look", times: Times) -> Told:
+    def _carry_out(self, raw: Object, look: "_Look", times: Times) -> StatusWrite:
         """Do what was decided, then write it."""
         key, decision = (raw["metadata"]["namespace"], raw["metadata"]["name"]), look.decision
         self._records.keep(key, raw["metadata"]["uid"], decision.record)
         denied = self._acting.carry_out(raw, decision.actions, confirmed=look.just_accepted)
-        told = self._telling.tell(raw, decision, denied, times.clock_s)
+        written = self._telling.tell(raw, decision, denied, times.clock_s)
         if denied:
             raise next(iter(denied.values()))
-        return told
+        return written
 
     def _observe(self, raw: Object) -> tuple[TrainingJob, Seen]:
         """Return a job with what there is of it, read whole if it is to be planned.

@@ -21,7 +21,7 @@ Written = Callable[[Object, Object], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class StatusWrite:
     """What became of a status.
 
     Attributes:
@@ -50,7 +50,7 @@ class Telling:
         self._written: dict[Key, float] = {}
         self._futile: dict[Key, tuple[str, Object]] = {}
 
-    def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> Told:
+    def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> StatusWrite:
         """Write what changed; `clock_s` is the monotonic clock: nobody sets it.
 
         What was refused was not planned; the next look writes why into the status.
@@ -60,29 +60,29 @@ class Telling:
             NotLeading: another operator may lead.
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
-        told = Told()
+        written = StatusWrite()
         if decision.status is not None:
-            told = self._write(key, raw, fitted(raw, as_data(decision.status)), clock_s)
+            written = self._write(key, raw, fitted(raw, as_data(decision.status)), clock_s)
         for each in decision.events:
             if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
                 self._record(raw, each)
-        return told
+        return written
 
     def _record(self, raw: Object, event: Happening) -> None:
         whose = "" if event.replica is None else f"replica {event.replica}: "
         self._recorder.record(raw, event.type, event.reason, whose + event.message, once=event.once)
 
-    def _write(self, key: Key, raw: Object, status: dict[str, Any], clock_s: float) -> Told:
+    def _write(self, key: Key, raw: Object, status: dict[str, Any], clock_s: float) -> StatusWrite:
         old = raw.get("status")
         with self._lock:
             last_s = self._written.get(key)
         in_s = write_in_s(old, status, None if last_s is None else clock_s - last_s)
         if in_s is None or in_s > 0:
-            return Told(again_s=in_s)
+            return StatusWrite(again_s=in_s)
         patch, version = difference(old, status), raw["metadata"]["resourceVersion"]
         with self._lock:
             if self._futile.get(key) == (version, patch):
-                return Told()
+                return StatusWrite()
         stored = self._writer.status(raw, patch)
         changed = stored["metadata"]["resourceVersion"] != version
         if changed:
@@ -93,7 +93,7 @@ class Telling:
             self._futile.pop(key, None)
             if not changed:
                 self._futile[key] = (version, patch)
-        return Told(stored=stored)
+        return StatusWrite(stored=stored)
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
