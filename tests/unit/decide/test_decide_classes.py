@@ -110,6 +110,35 @@ def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
     assert stops(scene.step(100)) == ["StartTimeout"]
 
 
+@pytest.mark.parametrize("before_s", [0, 1, 59])
+def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_the_same(accepted, before_s):
+    """One that has just been restarted has forgotten it; whoever reads the status has to mend the image."""
+    scene = accepted(startTimeoutSeconds=100)
+    pod = scene.new_pod()
+    scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
+    scene.settle()
+
+    scene.container(pod, "trainer", waiting="ContainerCreating")
+    found = [*stops(scene.settle(100 - before_s)), *stops(scene.settle(before_s))]
+
+    assert found == ["ImagePull"]
+    assert scene.replica().reason == "ImagePull"
+    assert "allows; a moment ago: " in scene.replica().message
+
+
+def test_a_trouble_that_has_passed_is_not_the_reason(accepted):
+    """What keeps the replica from its first step by now has no name."""
+    scene = accepted(startTimeoutSeconds=1000)
+    pod = scene.new_pod()
+    scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")
+    scene.settle()
+
+    scene.container(pod, "trainer", waiting="ContainerCreating")
+    scene.settle(939)
+
+    assert stops(scene.settle(61)) == ["StartTimeout"]
+
+
 def test_time_in_a_queue_or_suspended_is_no_wait_for_a_first_step(make_scene):
     """A queue may take the week."""
     scene = make_scene(scheduling={"queueName": "robots"}, startTimeoutSeconds=100)

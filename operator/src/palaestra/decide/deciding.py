@@ -57,13 +57,14 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
 
 
 def _record(job: TrainingJob, each: Sequence[Decided], status: Status, times: Times) -> Record:
-    """Return what this look leaves to the next: the waits that go on, and the active time."""
+    """Return what this look leaves to the next: the waits that go on, their troubles, and the active time."""
     return Record(
         waits={
             (it.status.index, *wait.key): times.since_s(it.status.index, wait)
             for it in each
             for wait in it.waits
         },
+        troubles={it.status.index: it.trouble for it in each if it.trouble is not None},
         active_s=times.active_s(job.status.active_seconds),
         active_at_s=times.clock_s if status.active_since is not None else None,
     )

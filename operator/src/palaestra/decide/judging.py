@@ -20,7 +20,10 @@ from palaestra.api.status import Phase
 from palaestra.decide import final, outcomes, replacing, standing, troubles
 from palaestra.decide.conditions import Told
 from palaestra.decide.situation import STARTING, Check, Finding, Situation, Verdict, after
-from palaestra.decide.times import Wait
+from palaestra.decide.times import Trouble, Wait
+
+FIRST_STEP = ("first step",)  # the key of the wait for it
+MOMENT_S = 60  # in which a kubelet that was restarted, or tries again, shows a reason anew
 
 
 class Kind(StrEnum):
@@ -43,6 +46,7 @@ class Judged:
         replace: why its pod is replaced; None: it is not.
         left_s: seconds after which time alone may change something.
         waits: what is waited for.
+        trouble: what keeps it from its first step; None: nothing that has a name, or it was made.
     """
 
     verdict: Verdict
@@ -50,6 +54,7 @@ class Judged:
     replace: Told | None = None
     left_s: tuple[float, ...] = ()
     waits: tuple[Wait, ...] = ()
+    trouble: Trouble | None = None
 
 
 def judge(it: Situation) -> Judged:
@@ -71,6 +76,7 @@ def judge(it: Situation) -> Judged:
         replace=shown.told if replaced else None,
         left_s=left_s,
         waits=waits,
+        trouble=_trouble(it, shown.told) if FIRST_STEP in {each.key for each in waits} else None,
     )
 
 
@@ -80,11 +86,26 @@ def start_timeout(it: Situation) -> Finding | None:
         return None
     seconds = it.job.spec.start_timeout_s
     asked = (finding for kind, check in JUDGED if kind in SHOWN and (finding := check(it)) is not None)
-    why = next(finding.told for finding in asked if finding.left_s <= 0)
-    reason = Reason.START_TIMEOUT if why.reason in _NO_TROUBLE else why.reason
-    words = f"no step within {seconds} s, as long as startTimeoutSeconds allows; {why.message}"
-    why = Told(reason=reason, message=one_line(words, LONGEST_MESSAGE))
-    return after(it, Wait(key=("first step",), seconds=seconds), why)
+    shown = next(finding.told for finding in asked if finding.left_s <= 0)
+    trouble = _trouble(it, shown)
+    reason = Reason.START_TIMEOUT if trouble is None else trouble.told.reason
+    why = shown.message
+    if trouble is not None and trouble.gone_s is not None:
+        why = f"a moment ago: {trouble.told.message}"
+    words = f"no step within {seconds} s, as long as startTimeoutSeconds allows; {why}"
+    told = Told(reason=reason, message=one_line(words, LONGEST_MESSAGE))
+    return after(it, Wait(key=FIRST_STEP, seconds=seconds), told)
+
+
+def _trouble(it: Situation, shown: Told) -> Trouble | None:
+    """Return what keeps a replica from its first step; a kubelet may show nothing of it for a moment."""
+    if shown.reason not in _NO_TROUBLE:
+        return Trouble(told=shown)
+    last, now_s = it.times.record.troubles.get(it.seen.index), it.times.clock_s
+    if last is None:
+        return None
+    gone_s = now_s if last.gone_s is None else last.gone_s
+    return replace(last, gone_s=gone_s) if now_s - gone_s <= MOMENT_S else None
 
 
 def _is_past_its_start(it: Situation) -> bool:

@@ -9,7 +9,7 @@ from palaestra.decide.memory import memory_kills
 from palaestra.decide.progress import progress
 from palaestra.decide.remembering import last_attempt
 from palaestra.decide.situation import Situation, Verdict
-from palaestra.decide.times import Wait
+from palaestra.decide.times import Trouble, Wait
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +22,7 @@ class Decided:
         replace: why to replace its pod; None: it stays.
         left_s: seconds after which time alone may change something.
         waits: what is waited for, to be remembered until the next look.
+        trouble: what keeps it from its first step, to be remembered too; None: nothing that has a name.
     """
 
     status: ReplicaStatus
@@ -29,6 +30,7 @@ class Decided:
     replace: Told | None = None
     left_s: tuple[float, ...] = ()
     waits: tuple[Wait, ...] = ()
+    trouble: Trouble | None = None
 
 
 def decided(it: Situation) -> Decided:
@@ -40,6 +42,7 @@ def decided(it: Situation) -> Decided:
         replace=judged.replace,
         left_s=judged.left_s,
         waits=judged.waits,
+        trouble=judged.trouble,
     )
 
 

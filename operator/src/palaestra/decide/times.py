@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
+from palaestra.decide.conditions import Told
+
 WaitKey = tuple[int | str, ...]  # the replica, what is waited for, and what would make it another wait
 
 
@@ -29,16 +31,31 @@ class Wait:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Trouble:
+    """What keeps a replica from its first step.
+
+    Attributes:
+        told: the reason and its message.
+        gone_s: the first look that did not find it any more, on the monotonic clock; None: it is there.
+    """
+
+    told: Told
+    gone_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
     """What one look leaves to the next one of the same process; nobody needs it to go on.
 
     Attributes:
         waits: when each wait that goes on was first found, on the monotonic clock.
+        troubles: by replica, while it waits for its first step.
         active_s: seconds that the job was active, as far as this process knows.
         active_at_s: until when they are counted; None: the job is not active.
     """
 
     waits: Mapping[WaitKey, float] = field(default_factory=dict)
+    troubles: Mapping[int, Trouble] = field(default_factory=dict)
     active_s: float = 0.0
     active_at_s: float | None = None
 
