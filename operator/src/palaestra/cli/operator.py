@@ -26,6 +26,26 @@ NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 def add(commands: Commands) -> None:
     """Add the command."""
     parser = command(commands, "operator", _operator, "look after the jobs of a cluster", OPERATOR)
+    _add_looking(parser)
+    parser.add_argument(
+        "--leader-elect",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="wait for the Lease before anything is written; default: yes",
+    )
+    parser.add_argument(
+        "--metrics-address",
+        metavar="HOST:PORT",
+        default="0.0.0.0:8080",
+        help="of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
+    )
+    _add_cluster(parser)
+    _add_pods(parser)
+    _add_images(parser)
+
+
+def _add_looking(parser: argparse.ArgumentParser) -> None:
+    """Add which jobs are looked at, how many at once and how often."""
     parser.add_argument(
         "--namespace",
         metavar="NS",
@@ -44,21 +64,6 @@ def add(commands: Commands) -> None:
         default=600.0,
         help="seconds after which every job is looked at again; default: 600",
     )
-    parser.add_argument(
-        "--leader-elect",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="wait for the Lease before anything is written; default: yes",
-    )
-    parser.add_argument(
-        "--metrics-address",
-        metavar="HOST:PORT",
-        default="0.0.0.0:8080",
-        help="of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
-    )
-    _add_cluster(parser)
-    _add_pods(parser)
-    _add_images(parser)
 
 
 def _add_pods(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 
 from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.job import API_VERSION, KIND
-from palaestra.api.status import TERMINAL
+from palaestra.api.status import TERMINAL, PodReference
 from palaestra.api.yaml_text import NotYaml, read
 from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob
 from palaestra.client.fetching import fetch
@@ -187,13 +187,7 @@ class Client:
             NoSuchJob: there is none of that name.
             NoPod: the replica has no pod, or its container did not start.
         """
-        job = self.get(name)
-        pod = next((each.pod for each in job.status.replicas if each.index == replica), None)
-        if pod is None:
-            raise NoPod(
-                f"job {name}: replica {replica} has no pod; "
-                f"the job has {job.spec.replicas}, and `palaestra describe {name}` tells what they wait for"
-            )
+        pod = _newest_pod(self.get(name), replica)
         try:
             yield from self.api.logs(
                 self.namespace, pod.name, container, follow=follow, tail=tail, within_s=deadline_s
@@ -265,6 +259,22 @@ class Client:
             return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, {"spec": {"suspend": suspend}}))
         except NotFound as error:
             raise NoSuchJob.of(name, self.namespace) from error
+
+
+def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
+    """Return the newest pod of a replica.
+
+    Raises:
+        NoPod: it has none.
+    """
+    pod = next((each.pod for each in job.status.replicas if each.index == replica), None)
+    if pod is None:
+        name = job.metadata.name
+        raise NoPod(
+            f"job {name}: replica {replica} has no pod; "
+            f"the job has {job.spec.replicas}, and `palaestra describe {name}` tells what they wait for"
+        )
+    return pod
 
 
 def _data(job: TrainingJob | Mapping[str, Any] | Path) -> Any:

@@ -59,26 +59,31 @@ def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: flo
     target = into / job.metadata.name / str(replica)
     if target.exists():
         raise NotFetched(f"{target}: is there already; move it away, or name another folder")
-    with _source(api, job, replica, deadline) as source:
-        try:
-            _copy(api, source, target, deadline)
-        except Unreachable as error:
-            if time.monotonic() < deadline:
-                raise
-            raise TookTooLong(
-                f"{source.directory} in pod {source.pod}: was not copied in time; "
-                "allow more time with --timeout"
-            ) from error
-        except (ApiError, ClientError):  # some of which are OSErrors too
-            raise
-        except CommandFailed as error:
-            raise NotFetched(
-                f"{source.directory} in pod {source.pod}: cannot be read ({error}); "
-                "type the same command when the run has ended"
-            ) from error
-        except (OSError, tarfile.TarError) as error:
-            raise NotFetched(f"{target}: {error}; choose a folder that can be written") from error
+    with _source(api, job, replica, deadline) as source, _with_remedies(source, target, deadline):
+        _copy(api, source, target, deadline)
     return target
+
+
+@contextmanager
+def _with_remedies(source: Source, target: Path, deadline: float) -> Iterator[None]:
+    """Raise what goes wrong in the block as an error that names the place and the remedy."""
+    try:
+        yield
+    except Unreachable as error:
+        if time.monotonic() < deadline:
+            raise
+        raise TookTooLong(
+            f"{source.directory} in pod {source.pod}: was not copied in time; allow more time with --timeout"
+        ) from error
+    except (ApiError, ClientError):  # some of which are OSErrors too
+        raise
+    except CommandFailed as error:
+        raise NotFetched(
+            f"{source.directory} in pod {source.pod}: cannot be read ({error}); "
+            "type the same command when the run has ended"
+        ) from error
+    except (OSError, tarfile.TarError) as error:
+        raise NotFetched(f"{target}: {error}; choose a folder that can be written") from error
 
 
 def _copy(api: Api, source: Source, target: Path, deadline: float) -> None:

@@ -30,25 +30,12 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
         lives_s: whole seconds after which it ends by itself.
     """
     spec = copy.deepcopy(dict(template["spec"]))
-    trainer = trainer_of(template)
     spec.pop("initContainers", None)
     spec |= {
         "activeDeadlineSeconds": lives_s,
         "terminationGracePeriodSeconds": GRACE_S,
         "volumes": [each for each in spec["volumes"] if each["name"] == VOLUME],
-        "containers": [
-            {
-                "name": CONTAINER,
-                "image": trainer["image"],
-                "imagePullPolicy": trainer["imagePullPolicy"],
-                "command": ["sleep", str(lives_s)],
-                "securityContext": trainer["securityContext"],
-                "resources": RESOURCES,
-                "volumeMounts": [
-                    {**each, "readOnly": True} for each in trainer["volumeMounts"] if each["name"] == VOLUME
-                ],
-            }
-        ],
+        "containers": [_reader(trainer_of(template), lives_s)],
     }
     labels = {"app.kubernetes.io/managed-by": "palaestra", FETCH_LABEL: job.metadata.name}
     return {
@@ -61,6 +48,21 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
             "ownerReferences": [{**owner(job), "controller": False, "blockOwnerDeletion": False}],
         },
         "spec": spec,
+    }
+
+
+def _reader(trainer: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
+    """Return the container: the trainer's image and rights, and of its mounts the run, to be read only."""
+    return {
+        "name": CONTAINER,
+        "image": trainer["image"],
+        "imagePullPolicy": trainer["imagePullPolicy"],
+        "command": ["sleep", str(lives_s)],
+        "securityContext": trainer["securityContext"],
+        "resources": RESOURCES,
+        "volumeMounts": [
+            {**each, "readOnly": True} for each in trainer["volumeMounts"] if each["name"] == VOLUME
+        ],
     }
 
 

@@ -25,7 +25,6 @@ def pod_template(
     replica: Replica, config_map: Mapping[str, Any], worlds: Mapping[str, bytes]
 ) -> dict[str, Any]:
     """Return the template; `config_map` is the replica's, `worlds` are those in it."""
-    scheduling = replica.job.spec.scheduling
     installed = install_sidecar(replica)
     init = [
         *([installed] if installed else []),
@@ -33,21 +32,14 @@ def pod_template(
         *(sidecar(replica, simulator, worlds) for simulator in replica.simulators),
     ]
     main = trainer(replica)
-    metadata: dict[str, Any] = {"labels": {**scheduling.pod_labels, **replica.labels}}
-    if scheduling.pod_annotations:
-        metadata["annotations"] = scheduling.pod_annotations
     return {
-        "metadata": metadata,
+        "metadata": _metadata(replica),
         "spec": {
             "restartPolicy": "Never",
             "automountServiceAccountToken": False,
             "enableServiceLinks": False,
             "terminationGracePeriodSeconds": GRACE_S,
-            "securityContext": {
-                **UNPRIVILEGED,
-                "fsGroup": USER,
-                "fsGroupChangePolicy": "OnRootMismatch",
-            },
+            "securityContext": {**UNPRIVILEGED, "fsGroup": USER, "fsGroupChangePolicy": "OnRootMismatch"},
             **_scheduling(replica),
             "initContainers": init,
             "containers": [main],
@@ -58,6 +50,15 @@ def pod_template(
             ],
         },
     }
+
+
+def _metadata(replica: Replica) -> dict[str, Any]:
+    """Return labels and annotations; the job's own labels never replace ours."""
+    scheduling = replica.job.spec.scheduling
+    metadata: dict[str, Any] = {"labels": {**scheduling.pod_labels, **replica.labels}}
+    if scheduling.pod_annotations:
+        metadata["annotations"] = scheduling.pod_annotations
+    return metadata
 
 
 def _scheduling(replica: Replica) -> dict[str, Any]:
