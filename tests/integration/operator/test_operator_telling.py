@@ -1,9 +1,6 @@
 """What the operator tells: progress from the trainers, metrics, and how little it asks for."""
 
-import http.server
-import json
-import threading
-from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -11,9 +8,9 @@ import pytest
 from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
 from tests.integration.operator.installed import USER
 from tests.metrics import complaints, documented, served
+from tests.trainer_status import serving
 from tests.waiting import eventually
 
-PORT = 9090  # a trainer's own
 WRITTEN_S = 60.0  # asked for every 10 s, written every 30 s
 STATUS = TrainerStatus(
     step=1200,
@@ -30,33 +27,8 @@ STATUS = TrainerStatus(
 @pytest.fixture
 def trainer():
     """A trainer that answers /status at the address of a pod."""
-
-    class Answer(http.server.BaseHTTPRequestHandler):
-        def do_GET(self):
-            at = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
-            body = json.dumps(STATUS.to_json() | {"last_progress": at}).encode()
-            self.send_response(200)
-            self.send_header("Content-Length", str(len(body)))
-            self.end_headers()
-            self.wfile.write(body)
-
-        def log_message(self, *_):
-            pass
-
-    with serving(Answer) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield server.server_address[0]
-        server.shutdown()
-        thread.join()
-
-
-def serving(answer):
-    """Return a server with a trainer's port, at an address of the loopback where it is free."""
-    for last in range(1, 255):
-        with suppress(OSError):  # somebody else tests here, too
-            return http.server.ThreadingHTTPServer((f"127.90.90.{last}", PORT), answer)
-    raise AssertionError(f"port {PORT} is taken at every address")
+    with serving(lambda: replace(STATUS, last_progress=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}")) as address:
+        yield address
 
 
 def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):

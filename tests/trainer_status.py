@@ -1,0 +1,68 @@
+"""A trainer's /status at an address of the loopback, for operators under test that ask pods."""
+
+import http.server
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import BinaryIO
+
+from palaestra.plan.layout import STATUS_PORT
+from palaestra_sim.protocol.status import TrainerStatus
+
+HEAD = b"HTTP/1.0 200 OK\r\nContent-Type: application/json\r\n"
+
+
+class StatusServer:
+    """Serves from now on, on a trainer's port, until it is closed.
+
+    Attributes:
+        host: its address.
+    """
+
+    def __init__(self, answer: Callable[[BinaryIO], object]) -> None:
+        """Give each question to `answer`, which writes head and body, in a thread of its own."""
+
+        class Handler(http.server.BaseHTTPRequestHandler):
+            def do_GET(self) -> None:
+                with suppress(OSError):  # an operator hangs up when it has enough
+                    answer(self.wfile)
+
+            def log_message(self, *_: object) -> None:
+                """Print nothing."""
+
+        self._server = _at_a_free_address(Handler)
+        self.host = str(self._server.server_address[0])
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Serve no longer."""
+        self._server.shutdown()
+        self._thread.join()
+        self._server.server_close()
+
+
+@contextmanager
+def serving(status: Callable[[], TrainerStatus]) -> Iterator[str]:
+    """Answer each question with what `status` returns; yields the address."""
+    server = StatusServer(lambda out: out.write(b"".join(answer(status()))))
+    try:
+        yield server.host
+    finally:
+        server.close()
+
+
+def answer(status: TrainerStatus) -> tuple[bytes, bytes]:
+    """Return head and body of a trainer's answer."""
+    body = json.dumps(status.to_json()).encode()
+    return HEAD + b"Content-Length: %d\r\n\r\n" % len(body), body
+
+
+def _at_a_free_address(
+    handler: type[http.server.BaseHTTPRequestHandler],
+) -> http.server.ThreadingHTTPServer:
+    for last in range(1, 255):
+        with suppress(OSError):  # somebody else tests here, too
+            return http.server.ThreadingHTTPServer((f"127.90.90.{last}", STATUS_PORT), handler)
+    raise AssertionError(f"port {STATUS_PORT} is taken at every address")
