@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.cluster import Resource
-from palaestra.cluster.resources import JOBS, PODS
+from palaestra.cluster.resources import JOBS, PODS, TRAINING_JOBS
 from palaestra.observe.jobs import REPLACED
 from palaestra_sim.protocol.status import FaultRecord, Termination
 from tests.waiting import eventually
@@ -20,6 +20,7 @@ SPENT = Termination(
     faults=(FAULT,),
 )
 BUDGETS = Resource(api_version="policy/v1", kind="PodDisruptionBudget", plural="poddisruptionbudgets")
+PAUSES = 4
 SAVED = Termination(step=20, reason="Interrupted: SIGTERM received", log=("checkpoint written",))
 
 
@@ -48,6 +49,24 @@ def test_the_last_lines_and_faults_stay_when_the_pod_is_gone(place, start, contr
     assert "Last Attempt:" in described
     assert "budget spent" in described
     assert "no answer within 5 s" in described
+
+
+def test_suspensions_are_counted_however_fast_they_follow(place, start):
+    """Times of the control plane are whole seconds; these are over sooner."""
+    start()
+    place.train()
+    for _ in range(PAUSES):
+        [pod] = place.pods()
+        eventually(lambda pod=pod: replica(place).get("pod", {}).get("name") == pod["metadata"]["name"])
+        place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": True}})
+        place.until("Suspended")
+        eventually(lambda pod=pod: place.get(PODS, pod["metadata"]["name"]) is None)
+        place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": False}})
+
+    eventually(lambda: replica(place).get("attempt") == PAUSES + 1)
+
+    restarts = replica(place)["restarts"]
+    assert (restarts["suspension"], restarts["disruption"]) == (PAUSES, 0)
 
 
 def evict(place, pod):
