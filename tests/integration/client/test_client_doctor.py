@@ -55,6 +55,7 @@ def test_a_cluster_without_nodes_storage_and_operator_is_told_so(found):
         "API server": "ok",
         "nodes": "wrong",
         "TrainingJobs": "ok",
+        "namespace": "ok",
         "to look at jobs": "ok",
         "to author jobs": "ok",
         "to read logs": "ok",
@@ -128,7 +129,7 @@ def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
     assert findings["leader"].fact == "is me"
 
 
-def install(place, **container):
+def install(place, *, replicas=1, **container):
     """Make the operator's Deployment, which nothing carries out."""
     container = {"name": "operator", "image": "palaestra-operator:0.0.0"} | container
     labels = {"a": "b"}
@@ -142,7 +143,7 @@ def install(place, **container):
             "apiVersion": "apps/v1",
             "kind": "Deployment",
             "metadata": {"name": NAME},
-            "spec": {"selector": {"matchLabels": labels}, "template": template},
+            "spec": {"replicas": replicas, "selector": {"matchLabels": labels}, "template": template},
         },
     )
 
@@ -157,6 +158,31 @@ def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
     assert "0 of 1 are ready" in findings["operator"].fact
     assert "palaestra-operator:0.0.0" in findings["operator"].fact
     assert "service account chosen may not" in findings["operator's rights"].fact
+
+
+def test_an_operator_that_is_scaled_to_0_is_told_so_with_the_command_that_scales_it(found, place):
+    """It has no pod whose log would say why nothing happens, and nobody can lead."""
+    install(place, replicas=0)
+
+    findings = found()
+
+    told = [findings[what] for what in ("operator", "leader", "metrics")]
+    scale = f"`kubectl scale -n {place.name} deployment/palaestra-operator --replicas=1`"
+    assert [(each.verdict, each.remedy) for each in told] == [(Verdict.WRONG, scale)] * 3
+    assert told[0].fact.startswith(f"is scaled to 0 in {place.name}")
+
+
+def test_a_namespace_that_does_not_exist_is_told_with_how_to_make_or_choose_one(place):
+    """RBAC would grant rights in it all the same, and a dry run there only says that it is not found."""
+    site = Site(api=place.api, namespace="nosuch", operator_namespace=place.name)
+
+    findings = {each.what: each for each in examine(site)}
+
+    assert findings["namespace"].verdict is Verdict.WRONG
+    assert findings["namespace"].fact == "nosuch does not exist"
+    assert "`kubectl create namespace nosuch`" in findings["namespace"].remedy
+    assert "-n" in findings["namespace"].remedy
+    assert "nosuch" not in " ".join(each.fact for what, each in findings.items() if what != "namespace")
 
 
 def test_a_pod_is_tried_with_the_image_that_the_operator_gives(place):

@@ -10,10 +10,10 @@ from palaestra.doctor import Finding, Site, Verdict, examine
 from palaestra.operator.options import DEFAULT_NAMESPACE
 
 DOCTOR = """\
-Looks at a cluster: version, sidecars, the definition of TrainingJobs, storage, the operator, its images, its
-leader, its rights and its metrics, and your own rights. Says what is wrong and the remedy. Reads the cluster;
-writes nothing but its output, since what has to be tried is a dry run. Ends with 1 if anything is wrong; a
-warning does not count, nor does what could not be seen.
+Looks at a cluster: version, sidecars, the definition of TrainingJobs, the namespace, storage, the operator,
+its images, its leader, its rights and its metrics, and your own rights. Says what is wrong and the remedy.
+Reads the cluster; writes nothing but its output, since what has to be tried is a dry run. Ends with 1 if
+anything is wrong; a warning does not count, nor does what could not be seen.
 """
 WIDTH = 18
 

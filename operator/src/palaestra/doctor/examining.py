@@ -1,17 +1,18 @@
 """All checks, in the order in which one may be the cause of the next."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from palaestra.cluster import ApiError, Forbidden
 from palaestra.doctor.finding import Check, Finding, Site, Verdict, unknown, wrong
 from palaestra.doctor.installation import images, leads, metrics, operator_rights, runs
-from palaestra.doctor.platform import answers, definition, nodes, sidecars, storage
+from palaestra.doctor.platform import answers, definition, namespace, nodes, sidecars, storage
 from palaestra.doctor.rights import own_rights
 
 CHECKS: tuple[tuple[str, Check], ...] = (
     ("API server", answers),
     ("nodes", nodes),
     ("TrainingJobs", definition),
+    ("namespace", namespace),
     ("your rights", own_rights),
     ("sidecars", sidecars),
     ("storage class", storage),
@@ -21,15 +22,24 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     ("operator's rights", operator_rights),
     ("metrics", metrics),
 )
+# Where one of the first is wrong, the others would say nothing or mislead: RBAC grants rights in a namespace
+# that does not exist, too.
+POINTLESS: Mapping[Check, frozenset[Check]] = {
+    answers: frozenset(check for _, check in CHECKS),
+    namespace: frozenset({own_rights, sidecars, operator_rights}),
+}
 
 
 def examine(site: Site) -> Iterator[Finding]:
-    """Yield what each check comes to; only the first where the API server does not answer."""
+    """Yield what each check comes to; skip those that `POINTLESS` names after one that is wrong."""
+    skipped: frozenset[Check] = frozenset()
     for what, check in CHECKS:
+        if check in skipped:
+            continue
         found = list(_findings(what, check, site))
         yield from found
-        if check is answers and any(each.verdict is Verdict.WRONG for each in found):
-            return
+        if any(each.verdict is Verdict.WRONG for each in found):
+            skipped |= POINTLESS.get(check, frozenset())
 
 
 def _findings(what: str, check: Check, site: Site) -> Iterator[Finding]:

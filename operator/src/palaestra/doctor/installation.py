@@ -27,18 +27,18 @@ RENEWED_WITHIN_S = 20.0  # a Lease lasts 15
 def runs(site: Site) -> Iterator[Finding]:
     """Tell whether the operator is installed and ready."""
     deployment = _deployment(site)
+    remedy = _remedy(site, deployment)
     if deployment is None:
-        yield wrong(
-            "operator",
-            f"there is none in {site.operator_namespace}",
-            "install Palaestra, or name its namespace with --operator-namespace",
-        )
+        yield wrong("operator", f"there is none in {site.operator_namespace}", remedy)
         return
     image = _container(deployment)["image"]
-    wanted = deployment["spec"].get("replicas", 1)
+    wanted = _wanted(deployment)
+    if wanted == 0:
+        yield wrong("operator", f"is scaled to 0 in {site.operator_namespace}, image {image}", remedy)
+        return
     ready = deployment.get("status", {}).get("readyReplicas", 0)
     fact = f"{ready} of {wanted} are ready in {site.operator_namespace}, image {image}"
-    yield right("operator", fact) if ready else wrong("operator", fact, _logs(site))
+    yield right("operator", fact) if ready else wrong("operator", fact, remedy)
 
 
 def images(site: Site) -> Iterator[Finding]:
@@ -72,6 +72,10 @@ def leads(site: Site) -> Iterator[Finding]:
     if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
         yield right("leader", "there is no election")
         return
+    remedy = _remedy(site, deployment)
+    if deployment is not None and _wanted(deployment) == 0:
+        yield wrong("leader", f"the operator is scaled to 0 in {site.operator_namespace}", remedy)
+        return
     deadline = time.monotonic() + RENEWED_WITHIN_S
     seen = False
     try:
@@ -82,9 +86,9 @@ def leads(site: Site) -> Iterator[Finding]:
                 return
             seen = True
     except TookTooLong:
-        yield wrong("leader", f"the Lease {NAME} was not renewed for {RENEWED_WITHIN_S:.0f} s", _logs(site))
+        yield wrong("leader", f"the Lease {NAME} was not renewed for {RENEWED_WITHIN_S:.0f} s", remedy)
         return
-    yield wrong("leader", f"there is no Lease {NAME} in {site.operator_namespace}", _logs(site))
+    yield wrong("leader", f"there is no Lease {NAME} in {site.operator_namespace}", remedy)
 
 
 def operator_rights(site: Site) -> Iterator[Finding]:
@@ -113,7 +117,8 @@ def metrics(site: Site) -> Iterator[Finding]:
     pods = site.api.list(PODS, site.operator_namespace, labels=f"{OPERATOR_LABEL}=true")
     running = [each for each in pods if each["status"].get("phase") == "Running"]
     if not running:
-        yield wrong("metrics", f"no operator runs in {site.operator_namespace}", _logs(site))
+        remedy = _remedy(site, _deployment(site))
+        yield wrong("metrics", f"no operator runs in {site.operator_namespace}", remedy)
         return
     name, port = running[0]["metadata"]["name"], _port(running[0])
     try:
@@ -164,6 +169,19 @@ def _container(deployment: Object) -> Object:
 def _port(pod: Object) -> int:
     ports = [port for each in pod["spec"]["containers"] for port in each.get("ports", ())]
     return next(int(port["containerPort"]) for port in ports if port.get("name") == PORT_NAME)
+
+
+def _wanted(deployment: Object) -> int:
+    return int(deployment["spec"].get("replicas", 1))
+
+
+def _remedy(site: Site, deployment: Object | None) -> str:
+    """Return what helps against an operator that does not do its work."""
+    if deployment is None:
+        return "install Palaestra, or name its namespace with --operator-namespace"
+    if _wanted(deployment) == 0:
+        return f"`kubectl scale -n {site.operator_namespace} deployment/{NAME} --replicas=1`"
+    return _logs(site)
 
 
 def _logs(site: Site) -> str:

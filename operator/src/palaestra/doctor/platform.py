@@ -8,8 +8,8 @@ from typing import Any
 from palaestra.api.crd import crd
 from palaestra.api.job import API_VERSION
 from palaestra.client.reading_pod import RESOURCES
-from palaestra.cluster import Forbidden, Invalid
-from palaestra.cluster.resources import DEFINITIONS, NODES, PODS, STORAGE_CLASSES
+from palaestra.cluster import Forbidden, Invalid, NotFound
+from palaestra.cluster.resources import DEFINITIONS, NAMESPACES, NODES, PODS, STORAGE_CLASSES
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
 from palaestra.doctor.installation import trainer_image
 from palaestra.plan.containers import SECURITY
@@ -67,6 +67,18 @@ def definition(site: Site) -> Iterator[Finding]:
         )
     else:
         yield right(what, f"are known as {version('palaestra')} knows them")
+
+
+def namespace(site: Site) -> Iterator[Finding]:
+    """Tell whether the namespace of the jobs exists."""
+    what, name = "namespace", site.namespace
+    try:
+        site.api.get(NAMESPACES, None, name)
+    except NotFound:
+        remedy = f"`kubectl create namespace {name}`, or choose one of `kubectl get namespaces` with -n"
+        yield wrong(what, f"{name} does not exist", remedy)
+    else:
+        yield right(what, f"{name} exists")
 
 
 def difference(ours: Any, found: Any, path: str) -> str | None:
