@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from palaestra.api import Status
 from palaestra.api.status import TERMINAL, Phase
+from palaestra.api.storage import Retain
 from palaestra.client.waiting import News
 from palaestra.cluster import Api, ApiError, NotFound
 from palaestra.cluster.resources import TRAINING_JOBS
@@ -56,11 +57,19 @@ def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
 
 
 def _passing(job: Object, within_s: float) -> Object:
-    """Return the job without a name, and with ends of its own where its author has set none."""
+    """Return the job without a name; its author's ends and `retain` stay, what is not set is made to pass."""
     metadata = {**job["metadata"], "generateName": f"{job['metadata']['name']}-"}
     del metadata["name"]
     ends = {"activeDeadlineSeconds": math.ceil(within_s) + SLACK_S, "ttlSecondsAfterFinished": TTL_S}
-    return {**job, "metadata": metadata, "spec": {**ends, **job["spec"]}}
+    spec = {**ends, **job["spec"], "storage": _passing_storage(job["spec"].get("storage", {}))}
+    return {**job, "metadata": metadata, "spec": spec}
+
+
+def _passing_storage(storage: Object) -> Object:
+    """Return the storage with claims that are deleted with the job; an existing claim is never deleted."""
+    if storage.get("existingClaim") is not None:
+        return storage
+    return {"retain": Retain.DELETE.value, **storage}
 
 
 def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:

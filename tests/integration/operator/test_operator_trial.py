@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from palaestra.cli import main
-from palaestra.cluster.resources import TRAINING_JOBS
+from palaestra.cluster.resources import CLAIMS, TRAINING_JOBS
 from palaestra.trial import TTL_S
 from tests.integration.operator.test_operator_lifecycle import DONE
 from tests.waiting import DEADLINE_S, eventually
@@ -59,6 +59,18 @@ def test_a_trial_that_succeeds_says_so_and_leaves_nothing(place, trial, pod, cap
     phases = [line.rpartition(": ")[2] for line in capsys.readouterr().out.splitlines()]
     assert phases[-1] == "Succeeded"
     assert place.all(TRAINING_JOBS) == []
+
+
+def test_a_trial_takes_its_claims_away_with_its_job(place, trial, pod):
+    """A pipeline that tries each release would fill its namespace's quota of storage."""
+
+    def see_claim():
+        found = pod()
+        assert len(place.all(CLAIMS)) == 1
+        place.end(found, word=DONE)
+
+    assert trial(see_claim) == 0
+    eventually(lambda: not place.all(CLAIMS))
 
 
 def test_a_trial_that_fails_says_why_and_leaves_nothing(place, trial, pod, capsys):
