@@ -1,5 +1,6 @@
 """What keeps a job from starting, each with its reason; most of it somebody can mend, and then it starts."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -35,7 +36,7 @@ def held(scene):
             {},
             "WorldMissing",
             "spec.simulators[0].world.configMap: there is no ConfigMap worlds here; "
-            "create it and the job starts",
+            'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
             id="no ConfigMap",
         ),
         pytest.param(
@@ -43,7 +44,7 @@ def held(scene):
             {("ConfigMap", "worlds"): config_map({"other.wbt": ""})},
             "WorldMissing",
             "spec.simulators[0].world.configMap.key: ConfigMap worlds has no key hall.wbt; "
-            "create it and the job starts",
+            "add it and the job starts",
             id="no such key",
         ),
         pytest.param(
@@ -58,7 +59,8 @@ def held(scene):
             {"trainer": SECRET},
             {},
             "SecretMissing",
-            "spec.trainer.env[0].secretKeyRef: there is no Secret keys here; create it and the job starts",
+            "spec.trainer.env[0].secretKeyRef: there is no Secret keys here; "
+            'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
             id="no Secret",
         ),
         pytest.param(
@@ -75,7 +77,7 @@ def held(scene):
             {},
             "ClaimMissing",
             "spec.storage.existingClaim: there is no PersistentVolumeClaim runs here; "
-            "create it and the job starts",
+            'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
             id="no claim",
         ),
         pytest.param(
@@ -108,6 +110,29 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
         (reason, message)
     ]
     assert scene.status.phase is Phase.PENDING
+
+
+@pytest.mark.parametrize(
+    ("spec", "kind", "name"),
+    [
+        ({"simulators": WORLD}, "ConfigMap", "worlds"),
+        ({"trainer": SECRET}, "Secret", "keys"),
+        ({"storage": {"existingClaim": "runs"}}, "PersistentVolumeClaim", "runs"),
+    ],
+)
+def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next(
+    make_scene, spec, kind, name
+):
+    """A person who follows the message has one round, not a second one about a label."""
+    scene = make_scene(**spec)
+    scene.settle()
+    label = re.search(r'with the label (\S+): "(\S+)"', held(scene)[1])
+
+    made = {"metadata": {"name": name, "labels": dict([label.groups()])}, "data": {"hall.wbt": WORLD_TEXT}}
+    scene.there[(kind, name)] = made
+    scene.settle()
+
+    assert scene.status.conditions[0].status == "True"
 
 
 def test_a_job_starts_when_its_world_appears(make_scene):

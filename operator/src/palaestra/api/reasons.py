@@ -132,7 +132,7 @@ ROWS: dict[Reason, Row] = {
         "run the release that wrote it, or make a new TrainingJob",
     ),
     Reason.WORLD_MISSING: Row(
-        "{field}: {fact}; create it and the job starts",
+        "{field}: {fact}; {remedy} and the job starts",
         "the ConfigMap of a world, or its key, is not there",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
@@ -147,7 +147,8 @@ ROWS: dict[Reason, Row] = {
         "whoever owns the ConfigMap sets the label",
     ),
     Reason.SECRET_MISSING: Row(
-        "{field}: there is no Secret {name} here; create it and the job starts",
+        "{field}: there is no Secret {name} here; "
+        'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
         "the Secret of a variable is not there",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
@@ -158,7 +159,8 @@ ROWS: dict[Reason, Row] = {
         "whoever owns the Secret labels it and binds the role `palaestra-job-secrets`: see Secrets below",
     ),
     Reason.CLAIM_MISSING: Row(
-        "{field}: there is no PersistentVolumeClaim {name} here; create it and the job starts",
+        "{field}: there is no PersistentVolumeClaim {name} here; "
+        'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
         "the existing claim that the job names is not there",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),

@@ -54,6 +54,7 @@ _NOT_FOR_JOBS = {
     SourceKind.SECRET: Reason.SECRET_NOT_FOR_JOBS,
     SourceKind.CLAIM: Reason.CLAIM_NOT_FOR_JOBS,
 }
+_CREATE = 'create it with the label palaestra.dev/for-jobs: "true"'
 _MISSING = {SourceKind.SECRET: Reason.SECRET_MISSING, SourceKind.CLAIM: Reason.CLAIM_MISSING}
 
 
@@ -164,7 +165,7 @@ def _missing(source: Source, observed: Observed) -> Hold | None:
         return None
     fact = f"there is no {source.kind} {source.name} here"
     reason = _MISSING.get(source.kind, Reason.WORLD_MISSING)
-    return _hold(reason, field=source.field, name=source.name, fact=fact)
+    return _hold(reason, field=source.field, name=source.name, fact=fact, remedy=_CREATE)
 
 
 def _closed(source: Source, observed: Observed) -> Hold | None:
@@ -177,7 +178,8 @@ def worlds_have_their_keys(job: TrainingJob, observed: Observed) -> Hold | None:
     """A ConfigMap without the key is as good as none."""
     for field, name, key in _world_keys(job):
         if _world(observed, name, key) is None:
-            return _hold(Reason.WORLD_MISSING, field=field, fact=f"ConfigMap {name} has no key {key}")
+            fact = f"ConfigMap {name} has no key {key}"
+            return _hold(Reason.WORLD_MISSING, field=field, fact=fact, remedy="add it")
     return None
 
 
