@@ -7,10 +7,11 @@ import yaml
 
 from palaestra import Client
 from palaestra.cli import main
+from palaestra.client import NotInstalled
 from palaestra.cluster import connect
 from palaestra.doctor import Site
 from palaestra.doctor.installation import leads
-from tests.integration.apiserver.server import refusal, reply, serving, stream
+from tests.integration.apiserver.server import raw, refusal, reply, serving, stream
 
 JOB = "apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: trial}\nspec: {}\n"
 NAMED = {"name": "trial-x7k2p", "namespace": "robots", "uid": "0d1f"}
@@ -178,6 +179,44 @@ def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
 
     assert len(script.of(watches=False)) == 1
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *("get", "get trial", "get -o name", "describe trial", "watch trial", "logs trial", "events trial"),
+        *("suspend trial", "resume trial", "delete trial", "fetch trial", "try FILE"),
+    ],
+)
+def test_a_cluster_that_does_not_know_trainingjobs_is_told_with_how_to_install_them(
+    server, tmp_path, capsys, command
+):
+    """The API server's own answer is `404 page not found`, and no job's name is to blame."""
+    script, kubeconfig = server
+    file = tmp_path / "job.yaml"
+    file.write_text(JOB)
+    script.calls = [raw(b"404 page not found\n", 404)]
+
+    code = main([*command.replace("FILE", str(file)).split(), f"--kubeconfig={kubeconfig}"])
+
+    [line] = capsys.readouterr().err.splitlines()
+    assert code == 1
+    assert "the cluster does not know TrainingJobs; install them with `palaestra crd | kubectl apply" in line
+
+
+def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
+    """Waiting and applying have no name to miss, and ended with an error of the transport."""
+    script, kubeconfig = server
+    script.calls = [raw(b"404 page not found\n", 404)]
+
+    with Client(kubeconfig=kubeconfig) as client:
+        for call in (
+            lambda: client.apply(yaml.safe_load(JOB)),
+            client.list,
+            lambda: client.wait("trial", deadline_s=1.0),
+        ):
+            with pytest.raises(NotInstalled):
+                call()
 
 
 def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):

@@ -7,8 +7,7 @@ from datetime import UTC, datetime
 from palaestra.api import validate
 from palaestra.cli.cluster import cluster_command, say
 from palaestra.cli.parsing import Commands
-from palaestra.client import Client, NoSuchJob
-from palaestra.cluster import NotFound
+from palaestra.client import Client, asked
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 from palaestra.plan.text import as_yaml
@@ -74,18 +73,15 @@ def _get(client: Client, options: argparse.Namespace) -> int:
         raise PalaestraError("NAME: excludes -A and -l; leave it out, or them")
     namespace = None if options.all_namespaces else client.namespace
     if options.output in {None, "wide"}:
-        try:
+        with asked(options.name, client.namespace):
             table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
-        except NotFound as error:
-            if options.name is None:  # the kind itself is not there
-                raise
-            raise NoSuchJob.of(options.name, client.namespace) from error
         say(server_table(table, wide=options.output == "wide", namespaces=options.all_namespaces))
         return 0
     if options.name:
         found = [client.raw(options.name)]
     else:
-        found = client.api.list(TRAINING_JOBS, namespace, labels=options.selector)
+        with asked(None, client.namespace):
+            found = client.api.list(TRAINING_JOBS, namespace, labels=options.selector)
     if options.output == "name":
         say(f"trainingjob.palaestra.dev/{each['metadata']['name']}" for each in found)
     elif options.output == "yaml":

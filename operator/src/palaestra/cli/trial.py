@@ -7,7 +7,7 @@ from pathlib import Path
 from palaestra.cli.cluster import REFUSED, cleaned_up, cluster_command, say
 from palaestra.cli.files import job
 from palaestra.cli.parsing import Commands
-from palaestra.client import Client
+from palaestra.client import Client, asked
 from palaestra.errors import PalaestraError, SpecErrors
 from palaestra.trial import TrialFailed, attempt
 from palaestra_sim.typed import seconds
@@ -40,7 +40,7 @@ def _try(client: Client, options: argparse.Namespace) -> int:
     content = tried.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content["metadata"].setdefault("namespace", client.namespace)
     try:
-        with cleaned_up():
+        with cleaned_up(), asked(None, client.namespace):
             attempt(client.api, content, within_s=options.within, tell=lambda line: say([line]))
     except TrialFailed as failed:
         sys.stderr.write(f"{failed}\n")

@@ -6,13 +6,22 @@
         client.apply(Path("job.yaml"))
         job = client.wait("job", deadline_s=3600)
 
-`client` is what people call; `reading` understands a status, `following` waits for changes, `waiting` puts
-them into lines, `happenings` reads events, `fetching` copies a run out of its volume, with the pod of
-`reading_pod`, which runs `packing`.
+`client` is what people call; `asking` raises what is not found, `reading` understands a status, `following`
+waits for changes, `waiting` puts them into lines, `happenings` reads events, `fetching` copies a run out of
+its volume, with the pod of `reading_pod`, which runs `packing`.
 """
 
+from palaestra.client.asking import asked
 from palaestra.client.client import Client
-from palaestra.client.errors import ClientError, EndedOtherwise, NoPod, NoSuchJob, NotFetched, TookTooLong
+from palaestra.client.errors import (
+    ClientError,
+    EndedOtherwise,
+    NoPod,
+    NoSuchJob,
+    NotFetched,
+    NotInstalled,
+    TookTooLong,
+)
 from palaestra.client.happenings import Happening
 from palaestra.client.reading import why
 
@@ -24,6 +33,8 @@ __all__ = [
     "NoPod",
     "NoSuchJob",
     "NotFetched",
+    "NotInstalled",
     "TookTooLong",
+    "asked",
     "why",
 ]

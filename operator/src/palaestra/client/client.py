@@ -9,6 +9,7 @@ from palaestra.api import Spec, Status, TrainingJob, validate
 from palaestra.api.job import API_VERSION, KIND
 from palaestra.api.status import TERMINAL, PodReference
 from palaestra.api.yaml_text import NotYaml, read
+from palaestra.client.asking import asked
 from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob
 from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
@@ -79,7 +80,8 @@ class Client:
         metadata = {"namespace": self.namespace, **data["metadata"]}
         # An empty spec that is applied twice is taken for one that is to be removed, and is then missing.
         spec = data["spec"] or {"replicas": Spec().replicas}
-        return _job(self.api.apply({**data, "metadata": metadata, "spec": spec}, manager=MANAGER))
+        with asked(None, self.namespace):
+            return _job(self.api.apply({**data, "metadata": metadata, "spec": spec}, manager=MANAGER))
 
     def get(self, name: str) -> TrainingJob:
         """Return a job as it is now.
@@ -92,7 +94,8 @@ class Client:
 
     def list(self, labels: str | None = None) -> tuple[TrainingJob, ...]:
         """Return all jobs of the namespace, or those that a label selector chooses."""
-        return tuple(_job(each) for each in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
+        with asked(None, self.namespace):
+            return tuple(_job(each) for each in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
 
     def raw(self, name: str) -> Object:
         """Return a job as the API server has it, as plain data.
@@ -100,10 +103,8 @@ class Client:
         Raises:
             NoSuchJob: there is none of that name.
         """
-        try:
+        with asked(name, self.namespace):
             return self.api.get(TRAINING_JOBS, self.namespace, name)
-        except NotFound as error:
-            raise NoSuchJob.of(name, self.namespace) from error
 
     def changes(self, name: str, *, deadline_s: float) -> Iterator[TrainingJob]:
         """Yield a job as it is, then after each change; ends when it has ended or was deleted.
@@ -114,11 +115,12 @@ class Client:
         """
         found = None
         deadline = time.monotonic() + deadline_s
-        for each in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
-            found = _job(each)
-            yield found
-            if current(found) and found.status.phase in TERMINAL:
-                return
+        with asked(None, self.namespace):
+            for each in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
+                found = _job(each)
+                yield found
+                if current(found) and found.status.phase in TERMINAL:
+                    return
         if found is None:
             raise NoSuchJob.of(name, self.namespace)
 
@@ -255,10 +257,8 @@ class Client:
         return fetch(self.api, self.get(name), replica, into, deadline=deadline)
 
     def _suspended(self, name: str, *, suspend: bool) -> TrainingJob:
-        try:
+        with asked(name, self.namespace):
             return _job(self.api.merge(TRAINING_JOBS, self.namespace, name, {"spec": {"suspend": suspend}}))
-        except NotFound as error:
-            raise NoSuchJob.of(name, self.namespace) from error
 
 
 def _newest_pod(job: TrainingJob, replica: int) -> PodReference:

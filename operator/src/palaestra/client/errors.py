@@ -1,6 +1,7 @@
 """What a client of a cluster can be told instead of what it asked for.
 
 ClientError
+├── NotInstalled        the cluster does not know TrainingJobs
 ├── NoSuchJob           there is no such TrainingJob, or it was deleted meanwhile
 ├── EndedOtherwise      the job ended, and not as it was waited for
 ├── TookTooLong         a deadline passed; the same call may be made again
@@ -12,11 +13,24 @@ What the API server itself refuses is an ApiError (palaestra.cluster.errors).
 
 from typing import Self
 
+from palaestra.api.job import API_VERSION
 from palaestra.errors import PalaestraError
+
+INSTALL = "`palaestra crd | kubectl apply --server-side -f -`"
 
 
 class ClientError(PalaestraError):
     """A cluster does not have, or do, what it was asked for."""
+
+
+class NotInstalled(ClientError):
+    """The cluster does not know TrainingJobs; retrying cannot help."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            f"{API_VERSION}: the cluster does not know TrainingJobs; install them with {INSTALL}, or choose "
+            "another cluster with --context; `palaestra doctor` tells what else is missing"
+        )
 
 
 class NoSuchJob(ClientError, LookupError):

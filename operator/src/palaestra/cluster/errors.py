@@ -2,6 +2,7 @@
 
 ApiError                    any answer but success; `retryable` says whether it may succeed later
 ├── NotFound                404
+│   └── NoSuchKind          404 without a word about an object: the kind itself is not served
 ├── AlreadyExists           409, the name is taken
 ├── Conflict                409, somebody else wrote first: read again
 ├── Forbidden               403, RBAC, quota or admission says no
@@ -58,6 +59,10 @@ class ApiError(PalaestraError, OSError):
 
 class NotFound(ApiError):
     """There is no such object, or no such kind of objects."""
+
+
+class NoSuchKind(NotFound):
+    """The API server does not serve this kind of objects, as before its definition is installed."""
 
 
 class AlreadyExists(ApiError):
@@ -149,6 +154,8 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
         status: the body; anything may be missing in it.
         retry_after: the Retry-After header, in seconds.
     """
+    if code == NOT_FOUND and not status:  # what an API server does not serve, it refuses in plain text
+        return NoSuchKind(code, "NoSuchKind", "the API server does not serve this kind of objects")
     reason = str(status.get("reason") or f"HTTP{code}")
     message = str(status.get("message") or "the API server gave no message")
     fallback = ServerError if code >= SERVER_ERROR else ApiError

@@ -7,6 +7,7 @@ from typing import Any
 
 from palaestra.api.crd import crd
 from palaestra.api.job import API_VERSION
+from palaestra.client.errors import INSTALL
 from palaestra.client.reading_pod import RESOURCES
 from palaestra.cluster import Forbidden, Invalid, NotFound
 from palaestra.cluster.resources import DEFINITIONS, NAMESPACES, NODES, PODS, STORAGE_CLASSES
@@ -52,7 +53,7 @@ def release(text: str) -> tuple[int, int]:
 
 def definition(site: Site) -> Iterator[Finding]:
     """Tell whether the cluster knows TrainingJobs, and as this release does."""
-    what, remedy = "TrainingJobs", "`palaestra crd | kubectl apply --server-side -f -`"
+    what, remedy = "TrainingJobs", INSTALL
     if not site.api.serves(API_VERSION):
         yield wrong(what, f"the cluster does not know {API_VERSION}", remedy)
         return
