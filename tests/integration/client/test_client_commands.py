@@ -37,8 +37,8 @@ def test_get_lists_with_the_columns_of_the_definition(typed, place, tell):
     code, [headings, *rows], _ = typed("get")
 
     assert code == 0
-    assert headings.split()[:5] == ["NAME", "STATUS", "REPLICAS", "STEP", "SUCCESS"]
-    assert [row.split()[:4] for row in rows] == [["a", "-", "-", "-"], ["b", "Running", "-", "12000"]]
+    assert headings.split()[:6] == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET"]
+    assert [row.split()[:5] for row in rows] == [["a", *"----"], ["b", "Running", "Because", "-", "12000"]]
     assert "ALGORITHM" in typed("get", "-o", "wide")[1][0]
 
 

@@ -1,5 +1,6 @@
 """The CustomResourceDefinition: structural, bounded, small, and true to the models."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -245,16 +246,22 @@ def test_of_the_metadata_only_the_name_is_bounded() -> None:
 def test_columns_show_what_there_is() -> None:
     """A column with a wrong path stays empty for ever."""
     for column in VERSION["additionalPrinterColumns"]:
-        path = column["jsonPath"].removeprefix(".")
+        path = re.sub(r"\[\?.*?\]", "[]", column["jsonPath"]).removeprefix(".")
         assert path in ALL or path == "metadata.creationTimestamp"
 
 
-def test_the_columns_of_every_day_are_five() -> None:
-    """The others are for `-o wide`."""
+def test_a_field_to_select_by_is_a_plain_one() -> None:
+    """An API server refuses the whole definition for a list or an object among them."""
+    for field in VERSION["selectableFields"]:
+        assert ALL[field["jsonPath"].removeprefix(".")]["type"] == "string"
+
+
+def test_the_columns_of_every_day_say_where_a_job_stands_and_why() -> None:
+    """Nobody asks for `-o wide` before there is something to look for: the other columns are for that."""
     columns = VERSION["additionalPrinterColumns"]
 
     assert [column["name"] for column in columns if not column.get("priority")] == [
-        "Status", "Replicas", "Step", "Success", "Age",
+        "Status", "Reason", "Replicas", "Step", "Target", "Success", "Age",
     ]  # fmt: skip
 
 
@@ -262,4 +269,5 @@ def test_status_is_written_apart_and_the_short_name_is_tj() -> None:
     """Who may edit a job may not edit what is told about it."""
     assert VERSION["subresources"] == {"status": {}}
     assert crd()["spec"]["names"]["shortNames"] == ["tj"]
+    assert crd()["spec"]["names"]["categories"] == ["all", "palaestra"]
     assert crd()["metadata"]["name"] == "trainingjobs.palaestra.dev"

@@ -1,7 +1,7 @@
 """The CustomResourceDefinition, made from the models.
 
-What an API server is to check stands in the models; what is Kubernetes' own, names, scope, columns
-and the status subresource, stands here.
+What an API server is to check stands in the models; what is Kubernetes' own, names, scope, columns,
+selectable fields and the status subresource, stands here.
 """
 
 from typing import Any
@@ -13,15 +13,21 @@ GROUP, VERSION = API_VERSION.split("/")
 
 _COLUMNS = (
     ("Status", "string", ".status.phase", "Where the job stands", 0),
+    ("Reason", "string", '.status.conditions[?(@.type=="Running")].reason', "Why it stands there", 0),
     ("Replicas", "string", ".status.running", "Replicas that run or have succeeded, of all", 0),
     ("Step", "integer", ".status.step", "Step of the replica that is furthest behind", 0),
+    ("Target", "integer", ".spec.trainer.steps", "Environment steps of the whole run", 0),
     ("Success", "number", ".status.successRate", "Success rate of the worst replica", 0),
     ("Algorithm", "string", ".spec.trainer.algorithm.name", "The learning algorithm", 1),
-    ("Target", "integer", ".spec.trainer.steps", "Environment steps of the whole run", 1),
     ("Started", "date", ".status.startTime", "When the first pod started", 1),
     ("Completed", "date", ".status.completionTime", "When the last replica ended", 1),
     ("Age", "date", ".metadata.creationTimestamp", "When the job was made", 0),
 )
+
+_SELECTABLE = (
+    ".status.phase",
+    ".spec.scheduling.queueName",
+)  # by `--field-selector`; Kubernetes 1.32 or newer
 
 
 def crd() -> dict[str, Any]:
@@ -38,6 +44,7 @@ def crd() -> dict[str, Any]:
                 "plural": "trainingjobs",
                 "singular": "trainingjob",
                 "shortNames": ["tj"],
+                "categories": ["all", "palaestra"],
             },
             "scope": "Namespaced",
             "versions": [
@@ -47,6 +54,7 @@ def crd() -> dict[str, Any]:
                     "storage": True,
                     "subresources": {"status": {}},
                     "additionalPrinterColumns": [_column(*column) for column in _COLUMNS],
+                    "selectableFields": [{"jsonPath": path} for path in _SELECTABLE],
                     "schema": {"openAPIV3Schema": schema()},
                 }
             ],

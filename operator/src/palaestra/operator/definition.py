@@ -3,6 +3,8 @@
 With `crds.install: false` an administrator applies the definition, and may forget to. Then the API
 server drops new fields of a status without an error. No decision depends on them, but people miss them.
 
+Columns and selectable fields are not compared: without them nothing that is written is lost.
+
 The definition is compared through the OpenAPI document, which every account may read: the operator has
 no right to read CustomResourceDefinitions. It does its work also where the document cannot be read.
 """
