@@ -204,6 +204,23 @@ def test_a_cluster_that_does_not_know_trainingjobs_is_told_with_how_to_install_t
     assert "the cluster does not know TrainingJobs; install them with `palaestra crd | kubectl apply" in line
 
 
+def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, capsys):
+    """The API server names the wrong one only, and `describe` has no list of them."""
+    script, kubeconfig = server
+    pod = {"name": "trial-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
+    status = {"replicas": [{"index": 0, "phase": "Running", "pod": pod}]}
+    refused = {"reason": "BadRequest", "message": "container nope is not valid for pod trial-0-x7k2p"}
+    script.calls = [
+        reply(obj=yaml.safe_load(JOB) | {"metadata": {**NAMED, "name": "trial"}, "status": status}),
+        reply(400, refused),
+    ]
+
+    assert main(["logs", "trial", "-c", "nope", f"--kubeconfig={kubeconfig}"]) == 1
+
+    there = "trainer, ros-master, sim-collect-0, sim-evaluate-0"
+    assert capsys.readouterr().err == f"pod trial-0-x7k2p: has no container nope; it has {there}\n"
+
+
 def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
     """Waiting and applying have no name to miss, and ended with an error of the transport."""
     script, kubeconfig = server

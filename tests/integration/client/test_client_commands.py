@@ -9,6 +9,7 @@ from contextlib import suppress
 import pytest
 import yaml
 
+from palaestra.cli import main
 from palaestra.cluster.resources import TRAINING_JOBS
 
 TRIAL = """\
@@ -62,6 +63,26 @@ def test_get_of_all_namespaces_names_them(typed, place):
 
     assert headings.startswith("NAMESPACE")
     assert [row.split()[1] for row in rows if row.startswith(f"{place.name} ")] == ["a"]
+
+
+def test_get_without_jobs_says_so_instead_of_headings_alone(typed, place):
+    """To standard error, as kubectl does, so that a script that counts lines counts none."""
+    assert typed("get") == (0, [], [f"no TrainingJobs in namespace {place.name}"])
+    assert typed("get", "-l", "a=b") == (
+        0,
+        [],
+        [f"no TrainingJobs with labels a=b in namespace {place.name}"],
+    )
+
+
+@pytest.mark.parametrize("form", [(), ("-o", "json")])
+def test_get_in_a_namespace_that_does_not_exist_says_so(control_plane, capsys, form):
+    """A misspelled namespace looked like one without jobs."""
+    code = main(["get", *form, f"--kubeconfig={control_plane.kubeconfig}", "--namespace=nosuch"])
+
+    out, err = capsys.readouterr()
+    assert (code, out) == (1, "")
+    assert err.startswith("namespace nosuch: does not exist; ")
 
 
 @pytest.mark.parametrize("name", [(), ("a",)])
@@ -220,6 +241,18 @@ def test_suspend_and_resume_change_the_spec(typed, place):
 
     assert suspended == [True, True]
     assert place.get(TRAINING_JOBS, "a")["spec"]["suspend"] is False
+
+
+@pytest.mark.parametrize("command", ["suspend", "resume"])
+def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_it(typed, place, command):
+    """`Invalid (422)` looked like a mistake in the job, and `resume` promised what only Kueue does."""
+    place.train("a", scheduling={"queueName": "robots"})
+
+    code, out, [line] = typed(command, "a")
+
+    assert (code, out) == (1, [])
+    assert line.startswith("job a: Kueue decides when it runs, since it is in the queue robots; ")
+    assert f"`kubectl get workloads -n {place.name}`" in line
 
 
 def test_delete_says_what_stays(typed, place):

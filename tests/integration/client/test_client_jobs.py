@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from palaestra.api import validate
-from palaestra.client import EndedOtherwise, NoPod, NoSuchJob, TookTooLong
+from palaestra.client import EndedOtherwise, NoPod, NoSuchJob, QueueDecides, TookTooLong
 from palaestra.cluster import Invalid
 from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from palaestra.errors import SpecErrors
@@ -180,12 +180,13 @@ def test_statuses_come_until_the_end(client, tell, later):
     assert seen[-3:] == ["Running", "Suspended", "Succeeded"]
 
 
-def test_a_job_in_a_queue_is_not_suspended(client):
-    """Its queue decides; the API server says so."""
+def test_a_job_in_a_queue_is_neither_suspended_nor_resumed_and_the_error_names_what_stops_it(client):
+    """Its queue decides; the API server's own words are those of a wrong spec, which it is not."""
     client.apply(training_job("a", scheduling={"queueName": "robots"}))
 
-    with pytest.raises(Invalid, match="Kueue suspends a job that has a queueName"):
-        client.suspend("a")
+    for call in (client.suspend, client.resume):
+        with pytest.raises(QueueDecides, match=r"job a: Kueue decides .* queue robots; .*spec\.active"):
+            call("a")
 
 
 def test_a_delete_with_a_deadline_waits_for_what_the_job_owns(client, place):

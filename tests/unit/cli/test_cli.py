@@ -211,8 +211,19 @@ def test_an_operator_without_a_cluster_says_how_to_name_one(tmp_path, fails):
     assert "--kubeconfig" in line
 
 
+def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
+    """It had those of `run` alone, which are not what `palaestra get` ends with."""
+    with pytest.raises(SystemExit):
+        main(["--help"])
+
+    out = " ".join(capsys.readouterr().out.split())
+    assert "exit codes of all commands: 0 done 1 failed, or the cluster has no such job" in out
+    assert "75, 80, 81, 82 of `run` alone" in out
+    assert "`COMMAND --help` explains those of one command" in out
+
+
 @pytest.mark.parametrize(
-    "arguments", [["--version"], ["--help"], ["run", "--help"], ["plan", "--help"], ["operator", "--help"]]
+    "arguments", [["--version"], ["run", "--help"], ["plan", "--help"], ["operator", "--help"]]
 )
 def test_help_and_version_say_what_they_are(arguments, capsys):
     """Every help ends with the exit codes."""

@@ -48,6 +48,20 @@ def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
     assert "b" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", ["-n", "--namespace=lab", "--context", "--kubeconfig"])
+def test_an_option_of_kubectls_before_the_command_is_told_where_it_goes(option, monkeypatch, capsys):
+    """As people type it for kubectl; argparse took the namespace for a command that does not exist."""
+    monkeypatch.setattr("sys.argv", ["/usr/bin/kubectl-palaestra"])
+
+    with pytest.raises(SystemExit) as ended:
+        main([option, "lab", "get"])
+
+    name = option.partition("=")[0]
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert ended.value.code == 2
+    assert line.endswith(f"{name}: goes behind the command, as in `kubectl palaestra get {name} ...`")
+
+
 @pytest.mark.parametrize(
     ("program", "shown"),
     [("kubectl-palaestra", "usage: kubectl palaestra"), ("palaestra", "usage: palaestra")],

@@ -7,7 +7,7 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
-from palaestra.cli.parsing import EXIT_CODES, WRONG_INPUT
+from palaestra.cli.parsing import ALL_EXIT_CODES, CONTEXT, KUBECONFIG, NAMESPACE, WRONG_INPUT
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import KILLED, LocalError
 from palaestra_sim.errors import SimError
@@ -24,7 +24,11 @@ OPERATOR = ["operator"]
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     typed = sys.argv[1:] if arguments is None else arguments
-    options = _parser(typed[:1]).parse_args(typed)
+    parser = _parser(typed[:1])
+    if typed and _of_a_cluster(typed[0]):
+        option = typed[0].partition("=")[0]
+        parser.error(f"{option}: goes behind the command, as in `{_typed()} get {option} ...`")
+    options = parser.parse_args(typed)
     command: Callable[[argparse.Namespace], int] = options.command
     try:
         return command(options)
@@ -41,6 +45,11 @@ def _failed(error: Exception, exit_code: int) -> int:
     return exit_code
 
 
+def _of_a_cluster(argument: str) -> bool:
+    """Return whether an argument is one of kubectl's options, which only commands on a cluster take."""
+    return argument.partition("=")[0] in {*NAMESPACE, CONTEXT, KUBECONFIG}
+
+
 def _typed() -> str:
     """Return how the command line is called: by itself, or by kubectl, which finds a plugin by its name."""
     return "kubectl palaestra" if Path(sys.argv[0]).name == "kubectl-palaestra" else "palaestra"
@@ -50,7 +59,7 @@ def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=_typed(),
         description="Train robots in simulators, from a TrainingJob.",
-        epilog=EXIT_CODES,
+        epilog=ALL_EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"palaestra {version('palaestra')}")

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-from palaestra.cli.parsing import Commands, command
+from palaestra.cli.parsing import CONTEXT, KUBECONFIG, NAMESPACE, Commands, command
 from palaestra.client import Client, ClientError
 from palaestra.cluster import ApiError, Forbidden
 from palaestra.errors import SpecErrors
@@ -30,9 +30,9 @@ def cluster_command(
 ) -> argparse.ArgumentParser:
     """Return the parser of a new command on a cluster, with kubectl's options for which one."""
     parser = command(commands, name, _connected(work), summary, description, EXIT_CODES)
-    parser.add_argument("-n", "--namespace", metavar="NS", help="of the jobs; default: the context's")
-    parser.add_argument("--context", metavar="NAME", help="of the kubeconfig; default: its current one")
-    parser.add_argument("--kubeconfig", metavar="FILE", help="default: $KUBECONFIG, then ~/.kube/config")
+    parser.add_argument(*NAMESPACE, metavar="NS", help="of the jobs; default: the context's")
+    parser.add_argument(CONTEXT, metavar="NAME", help="of the kubeconfig; default: its current one")
+    parser.add_argument(KUBECONFIG, metavar="FILE", help="default: $KUBECONFIG, then ~/.kube/config")
     return parser
 
 

@@ -2,12 +2,13 @@
 
 import argparse
 import json
+import sys
 from datetime import UTC, datetime
 
 from palaestra.api import validate
 from palaestra.cli.cluster import cluster_command, say
 from palaestra.cli.parsing import Commands
-from palaestra.client import Client, asked
+from palaestra.client import Client, asked, check_namespace
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 from palaestra.plan.text import as_yaml
@@ -71,17 +72,34 @@ def _add_logs(commands: Commands) -> None:
 def _get(client: Client, options: argparse.Namespace) -> int:
     if options.name and (options.all_namespaces or options.selector):
         raise PalaestraError("NAME: excludes -A and -l; leave it out, or them")
-    namespace = None if options.all_namespaces else client.namespace
-    if options.output in {None, "wide"}:
-        with asked(options.name, client.namespace):
-            table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
-        say(server_table(table, wide=options.output == "wide", namespaces=options.all_namespaces))
+    show = _table if options.output in {None, "wide"} else _document
+    return show(client, options, None if options.all_namespaces else client.namespace)
+
+
+def _table(client: Client, options: argparse.Namespace, namespace: str | None) -> int:
+    """Print what `kubectl get` prints, or to standard error that there is nothing, and where."""
+    with asked(options.name, client.namespace):
+        table = client.api.table(TRAINING_JOBS, namespace, options.name, labels=options.selector)
+    if options.name is None and not table.get("rows"):
+        if namespace is not None:
+            check_namespace(client.api, namespace)
+        where = "the cluster" if namespace is None else f"namespace {namespace}"
+        chosen = f" with labels {options.selector}" if options.selector else ""
+        sys.stderr.write(f"no TrainingJobs{chosen} in {where}\n")
         return 0
+    say(server_table(table, wide=options.output == "wide", namespaces=options.all_namespaces))
+    return 0
+
+
+def _document(client: Client, options: argparse.Namespace, namespace: str | None) -> int:
+    """Print for programs what the API server has."""
     if options.name:
         found = [client.raw(options.name)]
     else:
         with asked(None, client.namespace):
             found = client.api.list(TRAINING_JOBS, namespace, labels=options.selector)
+        if namespace is not None and not found:
+            check_namespace(client.api, namespace)
     if options.output == "name":
         say(f"trainingjob.palaestra.dev/{each['metadata']['name']}" for each in found)
     elif options.output == "yaml":

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 WRONG_INPUT = 2
+NAMESPACE = ("-n", "--namespace")
+CONTEXT, KUBECONFIG = "--context", "--kubeconfig"
 
 EXIT_CODES = """\
 exit codes:
@@ -16,6 +18,15 @@ exit codes:
   81   training diverged
   82   training stalled
   130  killed by a second Ctrl-C; the same command goes on from the newest checkpoint
+"""
+ALL_EXIT_CODES = """\
+exit codes of all commands:
+  0    done
+  1    failed, or the cluster has no such job, refuses, or did not come to it in time; the last lines say why
+  2    the command line, a file, the kubeconfig or this machine is not as it must be; nothing was started
+  75, 80, 81, 82  of `run` alone
+  130  ended by Ctrl-C
+`COMMAND --help` explains those of one command.
 """
 
 

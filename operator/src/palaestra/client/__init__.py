@@ -11,15 +11,17 @@ waits for changes, `waiting` puts them into lines, `happenings` reads events, `f
 its volume, with the pod of `reading_pod`, which runs `packing`.
 """
 
-from palaestra.client.asking import asked
+from palaestra.client.asking import asked, check_namespace
 from palaestra.client.client import Client
 from palaestra.client.errors import (
     ClientError,
     EndedOtherwise,
     NoPod,
     NoSuchJob,
+    NoSuchNamespace,
     NotFetched,
     NotInstalled,
+    QueueDecides,
     TookTooLong,
 )
 from palaestra.client.happenings import Happening
@@ -32,9 +34,12 @@ __all__ = [
     "Happening",
     "NoPod",
     "NoSuchJob",
+    "NoSuchNamespace",
     "NotFetched",
     "NotInstalled",
+    "QueueDecides",
     "TookTooLong",
     "asked",
+    "check_namespace",
     "why",
 ]

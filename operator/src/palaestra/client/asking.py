@@ -1,10 +1,11 @@
-"""What it means that the API server found nothing: no such job, or no TrainingJobs at all in this cluster."""
+"""What it means that the API server found nothing: no such job, no namespace, or no TrainingJobs at all."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from palaestra.client.errors import NoSuchJob, NotInstalled
-from palaestra.cluster import NoSuchKind, NotFound
+from palaestra.client.errors import NoSuchJob, NoSuchNamespace, NotInstalled
+from palaestra.cluster import Api, Forbidden, NoSuchKind, NotFound
+from palaestra.cluster.resources import NAMESPACES
 
 
 @contextmanager
@@ -23,3 +24,17 @@ def asked(name: str | None, namespace: str) -> Iterator[None]:
         if name is None:
             raise
         raise NoSuchJob.of(name, namespace) from error
+
+
+def check_namespace(api: Api, name: str) -> None:
+    """Ask whether a namespace exists; without the right to ask, it is taken to exist.
+
+    Raises:
+        NoSuchNamespace: it does not.
+    """
+    try:
+        api.get(NAMESPACES, None, name)
+    except Forbidden:
+        return
+    except NotFound as error:
+        raise NoSuchNamespace.of(name) from error

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -10,7 +11,7 @@ from palaestra.api.job import API_VERSION, KIND
 from palaestra.api.status import TERMINAL, PodReference
 from palaestra.api.yaml_text import NotYaml, read
 from palaestra.client.asking import asked
-from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob
+from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob, QueueDecides
 from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
 from palaestra.client.happenings import Happening, happenings
@@ -20,7 +21,8 @@ from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
 from palaestra.cluster.api import Object
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import SpecErrors
-from palaestra.plan.replica import TRAINER
+from palaestra.plan import ClusterLayout, Images
+from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica
 
 MANAGER = "palaestra"
 FETCH_S = 600.0
@@ -187,9 +189,10 @@ class Client:
 
         Raises:
             NoSuchJob: there is none of that name.
-            NoPod: the replica has no pod, or its container did not start.
+            NoPod: the replica has no pod or no such container, or its container did not start.
         """
-        pod = _newest_pod(self.get(name), replica)
+        job = self.get(name)
+        pod = _newest_pod(job, replica)
         try:
             yield from self.api.logs(
                 self.namespace, pod.name, container, follow=follow, tail=tail, within_s=deadline_s
@@ -200,6 +203,11 @@ class Client:
                 f"`palaestra describe {name}` has the last lines of an attempt that has ended"
             ) from error
         except Invalid as error:
+            known = _containers(job, replica)
+            if container not in known:
+                raise NoPod(
+                    f"pod {pod.name}: has no container {container}; it has {', '.join(known)}"
+                ) from error
             raise NoPod(
                 f"pod {pod.name}: {error.message}; `palaestra describe {name}` names what it waits for"
             ) from error
@@ -214,16 +222,22 @@ class Client:
 
     def suspend(self, name: str) -> TrainingJob:
         """Let the pods of a job be deleted after a checkpoint; raises as `resume`."""
-        return self._suspended(name, suspend=True)
+        try:
+            return self._suspended(name, suspend=True)
+        except Invalid as error:
+            _check_queue(self.get(name), error)
+            raise
 
     def resume(self, name: str) -> TrainingJob:
         """Let a suspended job go on.
 
         Raises:
             NoSuchJob: there is none of that name.
-            Invalid: its queue decides.
+            QueueDecides: it is in a queue of Kueue's.
         """
-        return self._suspended(name, suspend=False)
+        job = self._suspended(name, suspend=False)
+        _check_queue(job)
+        return job
 
     def delete(self, name: str, *, deadline_s: float | None = None) -> None:
         """Delete a job and its pods; with a deadline, wait until it is gone. Claims stay with `retain: Keep`.
@@ -275,6 +289,24 @@ def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
             f"the job has {job.spec.replicas}, and `palaestra describe {name}` tells what they wait for"
         )
     return pod
+
+
+def _containers(job: TrainingJob, replica: int) -> tuple[str, ...]:
+    """Return the names of the containers of a replica whose logs people read."""
+    layout = ClusterLayout(images=Images.of_release(version("palaestra")))
+    simulators = Replica(job=job, index=replica, layout=layout).simulators
+    return (TRAINER, ROS_MASTER, *(each.container for each in simulators))
+
+
+def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:
+    """Return if no queue decides when a job runs.
+
+    Raises:
+        QueueDecides: one does; from the API server's `refusal`, if it was that.
+    """
+    queue = job.spec.scheduling.queue_name
+    if queue is not None:
+        raise QueueDecides.of(job.metadata.name, job.metadata.namespace, queue) from refusal
 
 
 def _data(job: TrainingJob | Mapping[str, Any] | Path) -> Any:

@@ -2,10 +2,12 @@
 
 ClientError
 ├── NotInstalled        the cluster does not know TrainingJobs
+├── NoSuchNamespace     the namespace does not exist
 ├── NoSuchJob           there is no such TrainingJob, or it was deleted meanwhile
+├── QueueDecides        a job in a queue is suspended and resumed by Kueue alone
 ├── EndedOtherwise      the job ended, and not as it was waited for
 ├── TookTooLong         a deadline passed; the same call may be made again
-├── NoPod               a replica has no pod whose log could be read
+├── NoPod               a replica has no pod, or no such container, whose log could be read
 └── NotFetched          a run could not be copied; nothing was written
 
 What the API server itself refuses is an ApiError (palaestra.cluster.errors).
@@ -33,6 +35,17 @@ class NotInstalled(ClientError):
         )
 
 
+class NoSuchNamespace(ClientError, LookupError):
+    """The namespace does not exist."""
+
+    @classmethod
+    def of(cls, name: str) -> Self:
+        """Return the error about a namespace of this name."""
+        return cls(
+            f"namespace {name}: does not exist; choose another with -n, `kubectl get namespaces` lists them"
+        )
+
+
 class NoSuchJob(ClientError, LookupError):
     """There is no such TrainingJob, or it was deleted meanwhile."""
 
@@ -45,6 +58,19 @@ class NoSuchJob(ClientError, LookupError):
         )
 
 
+class QueueDecides(ClientError):
+    """A job in a queue is suspended and resumed by Kueue alone."""
+
+    @classmethod
+    def of(cls, name: str, namespace: str, queue: str) -> Self:
+        """Return the error about a job in this queue."""
+        return cls(
+            f"job {name}: Kueue decides when it runs, since it is in the queue {queue}; to stop it, delete "
+            "it, or set spec.active of its Workloads to false "
+            f"(`kubectl get workloads -n {namespace}` lists them)"
+        )
+
+
 class EndedOtherwise(ClientError):
     """The job ended, and not as it was waited for."""
 
@@ -54,7 +80,7 @@ class TookTooLong(ClientError, TimeoutError):
 
 
 class NoPod(ClientError, LookupError):
-    """A replica has no pod whose log could be read."""
+    """A replica has no pod, or no such container, whose log could be read."""
 
 
 class NotFetched(ClientError):
