@@ -221,6 +221,33 @@ def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, caps
     assert capsys.readouterr().err == f"pod trial-0-x7k2p: has no container nope; it has {there}\n"
 
 
+@pytest.mark.parametrize(
+    ("path", "container"),
+    [
+        ({"fieldPath": "spec.containers{trainer}"}, "trainer"),
+        ({"fieldPath": "spec.initContainers{sim-collect-0}"}, "sim-collect-0"),
+        ({"fieldPath": "spec.hostname"}, ""),
+        ({}, ""),
+    ],
+)
+def test_an_event_knows_the_container_that_it_is_about(server, path, container):
+    """Kubelets write `Container created` for each of a pod, and no name into the message."""
+    script, kubeconfig = server
+    event = {
+        "metadata": {"name": "a", "creationTimestamp": "2026-01-31T12:00:00Z"},
+        "involvedObject": {"kind": "Pod", "name": "trial-0-x7k2p", **path},
+        "reason": "Created",
+        "message": "Container created",
+    }
+    job = yaml.safe_load(JOB) | {"metadata": {**NAMED, "name": "trial"}}
+    script.calls = [reply(obj=job), reply(obj={"metadata": {}, "items": [event]})]
+
+    with Client(kubeconfig=kubeconfig) as client:
+        [found] = client.events("trial")
+
+    assert (found.about, found.container) == ("Pod/trial-0-x7k2p", container)
+
+
 def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
     """Waiting and applying have no name to miss, and ended with an error of the transport."""
     script, kubeconfig = server

@@ -68,4 +68,25 @@ def test_events_have_an_age_and_a_count():
     lines = happened([event], NOW)
 
     assert " ".join(lines[1].split()) == "3m (x4) Warning BackOff Pod/job-0-x7k2p back-off restarting"
+
+
+def test_an_event_about_a_container_names_it():
+    """A pod of five containers had five lines `Container created`."""
+    event = Happening(
+        time=NOW,
+        warning=False,
+        about="Pod/job-0-x7k2p",
+        reason="Created",
+        message="Container created",
+        count=1,
+        container="sim-collect-0",
+    )
+
+    line = happened([event], NOW)[1]
+
+    assert " ".join(line.split()) == "0s Normal Created Pod/job-0-x7k2p (sim-collect-0) Container created"
+
+
+def test_no_events_are_told_in_words():
+    """A cluster forgets them after an hour."""
     assert happened([], NOW) == ["none that the cluster remembers"]

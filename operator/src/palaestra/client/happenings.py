@@ -13,6 +13,8 @@ from palaestra.cluster.resources import EVENTS
 
 MADE_FOR_REPLICAS = {"Job", "Pod", "PersistentVolumeClaim", "ConfigMap"}
 
+CONTAINER = re.compile(r"spec\.\w*[cC]ontainers\{(.+)\}")  # init and ephemeral ones, too
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Happening:
@@ -25,6 +27,7 @@ class Happening:
         reason: what, in one word; for those about the TrainingJob see docs/operations.md.
         message: what, in a sentence.
         count: how often.
+        container: of the pod that `about` names; empty: the pod as a whole, or no pod.
     """
 
     time: datetime
@@ -33,6 +36,7 @@ class Happening:
     reason: str
     message: str
     count: int
+    container: str = ""
 
 
 def happenings(api: Api, job: TrainingJob) -> tuple[Happening, ...]:
@@ -66,4 +70,11 @@ def _read(event: Mapping[str, Any]) -> Happening:
         reason=str(event.get("reason") or ""),
         message=str(event.get("message") or ""),
         count=int(event.get("count") or 1),
+        container=_container(str(about.get("fieldPath") or "")),
     )
+
+
+def _container(field_path: str) -> str:
+    """Return the name in a path such as `spec.initContainers{ros-master}`; empty for any other field."""
+    found = CONTAINER.fullmatch(field_path)
+    return found[1] if found else ""

@@ -24,7 +24,7 @@ def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
 
 
 def happened(happenings: Sequence[Happening], now: datetime) -> list[str]:
-    """Return the lines about events: when, whether a warning, reason, about what, message."""
+    """Return the lines about events: when, whether a warning, reason, object with container, message."""
     if not happenings:
         return ["none that the cluster remembers"]
     rows = [
@@ -32,7 +32,7 @@ def happened(happenings: Sequence[Happening], now: datetime) -> list[str]:
             short((now - each.time).total_seconds()) + (f" (x{each.count})" if each.count > 1 else ""),
             "Warning" if each.warning else "Normal",
             each.reason,
-            each.about,
+            f"{each.about} ({each.container})" if each.container else each.about,
             " ".join(each.message.split()),
         )
         for each in happenings
