@@ -125,8 +125,10 @@ def _readable(status: Object) -> Status:
 
 
 def _why(status: Object) -> str:
-    """Return what the status says last, in words for people."""
-    conditions = sorted(status.get("conditions", ()), key=lambda each: str(each["lastTransitionTime"]))
+    """Return reason and message of the condition that is the subject of the status."""
+    conditions = {each["type"]: each for each in status.get("conditions", ())}
     if not conditions:
         return "nothing has looked at it: does the operator run, and does it look after this namespace?"
-    return f"{conditions[-1]['reason']}: {conditions[-1]['message']}"
+    accepted = conditions.get("Accepted", {}).get("status") != "False"
+    subject = conditions.get(status.get("phase")) or conditions.get("Running" if accepted else "Accepted")
+    return f"{subject['reason']}: {subject['message']}" if subject else ""

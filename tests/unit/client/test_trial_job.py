@@ -1,13 +1,16 @@
-"""The job that `palaestra try` makes of its author's."""
+"""The job that `palaestra try` makes of its author's, and what it reports of its end."""
 
 import pytest
 
 from palaestra.cluster.errors import NotFound
-from palaestra.trial import attempt
+from palaestra.trial import TrialFailed, attempt
 
 
 class Server:
-    """An API server in which every job succeeds at once; it keeps what was created."""
+    """An API server in which every job comes to a status at once; it keeps what was created."""
+
+    def __init__(self, **status):
+        self.status = {"phase": "Succeeded", **status}
 
     def create(self, _, obj):
         """Keep the object, and return it as stored."""
@@ -15,8 +18,8 @@ class Server:
         return {**obj, "metadata": {"namespace": "lab", "name": "trial-x", "uid": "u"}}
 
     def get(self, *_):
-        """Return the job, which has succeeded."""
-        return {"status": {"phase": "Succeeded"}}
+        """Return the job with its status."""
+        return {"status": self.status}
 
     def delete(self, *_, **__):
         """Find that somebody else was faster."""
@@ -40,3 +43,25 @@ def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, 
     attempt(server, {"metadata": {"name": "trial"}, "spec": spec}, within_s=1, tell=str)
 
     assert server.made["spec"]["storage"] == created
+
+
+@pytest.mark.parametrize(
+    ("phase", "accepted", "subject"),
+    [("Pending", "True", "Running"), ("Pending", "False", "Accepted"), ("Failed", "True", "Failed")],
+)
+def test_a_trial_that_did_not_succeed_reports_the_whole_message(phase, accepted, subject, monkeypatch):
+    """The others only refer to it."""
+    conditions = [
+        {
+            "type": kind,
+            "status": accepted if kind == "Accepted" else str(kind == phase),
+            "reason": "ImagePull",
+            "message": "the whole message" if kind == subject else f"see the condition {subject}",
+        }
+        for kind in ("Accepted", "Running", "Suspended", "Succeeded", "Failed")
+    ]
+    server = Server(phase=phase, conditions=conditions)
+    monkeypatch.setattr("palaestra.trial.PERIOD_S", 0.01)
+
+    with pytest.raises(TrialFailed, match="ImagePull: the whole message"):
+        attempt(server, {"metadata": {"name": "trial"}, "spec": {}}, within_s=0.1, tell=str)

@@ -110,6 +110,8 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
         (reason, message)
     ]
     assert scene.status.phase is Phase.PENDING
+    elsewhere = {each.message for each in scene.status.conditions[1:]}
+    assert elsewhere == {"the job is Pending; see the condition Accepted"}
 
 
 @pytest.mark.parametrize(

@@ -157,6 +157,47 @@ def test_a_condition_keeps_the_time_at_which_it_last_changed(training):
     assert scene.status.conditions[1].status is ConditionStatus.TRUE
 
 
+def messages(scene):
+    """Return the message of each condition."""
+    return {each.type.value: each.message for each in scene.status.conditions}
+
+
+def test_why_a_job_waits_is_told_in_full_by_the_condition_running_alone(accepted):
+    """`kubectl describe` printed the same 300 characters four times, and hid what counts."""
+    scene = accepted()
+    scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
+
+    scene.settle()
+
+    assert "no such image" in messages(scene).pop("Running")
+    others = {kind: message for kind, message in messages(scene).items() if kind != "Running"}
+    assert others == {
+        "Accepted": "the spec is right and all that it names is there",
+        **dict.fromkeys(
+            ("Suspended", "Succeeded", "Failed"), "the job is Pending; see the condition Running"
+        ),
+    }
+
+
+def test_why_a_job_failed_is_told_in_full_by_the_condition_failed_alone(accepted, last_word):
+    """As above; `palaestra watch` and the event read it there."""
+    scene = accepted()
+    scene.end(scene.running_pod(), 81, last_word(reason="Diverged: NaN"))
+    scene.end_job("Failed", 0, "PodFailurePolicy")
+
+    scene.settle()
+
+    assert [kind for kind, message in messages(scene).items() if "Diverged: NaN" in message] == ["Failed"]
+    assert messages(scene)["Running"] == "the job is Failed; see the condition Failed"
+
+
+def test_every_condition_keeps_the_reason_in_one_word(accepted):
+    """Programs that read any of them, and the column of `kubectl get`, go on finding it."""
+    scene = accepted()
+
+    assert {each.reason for each in scene.status.conditions[1:]} == {"Starting"}
+
+
 def test_the_start_is_that_of_the_first_pod_and_stays(training):
     """Also when that pod is long gone."""
     scene, _ = training()

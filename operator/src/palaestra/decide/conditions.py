@@ -1,4 +1,8 @@
-"""The five conditions of a TrainingJob, each with a reason whether it holds or not."""
+"""The five conditions of a TrainingJob, each with a reason whether it holds or not.
+
+The subject of a job's reason is the condition of its phase; of a job that is Pending, it is Accepted while
+that does not hold, then Running.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,9 +39,18 @@ Claims = Mapping[ConditionType, Claim]
 
 
 def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
-    """Return the claim of each condition of a job that stands in `phase` for the reason `why`."""
+    """Return the claim of each condition of a job that stands in `phase` for the reason `why`.
+
+    All have the reason; only its subject has the whole message, or `kubectl describe` would print it
+    four times.
+    """
     true = _CONDITION_OF.get(phase)
-    others = {kind: Claim(holds=kind is true, told=why) for kind in _CONDITION_OF.values()}
+    subject = true or (ConditionType.RUNNING if accepted.holds else ConditionType.ACCEPTED)
+    elsewhere = Told(reason=why.reason, message=f"the job is {phase}; see the condition {subject}")
+    others = {
+        kind: Claim(holds=kind is true, told=why if kind is subject else elsewhere)
+        for kind in _CONDITION_OF.values()
+    }
     return {ConditionType.ACCEPTED: accepted, **others}
 
 
