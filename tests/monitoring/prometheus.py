@@ -86,10 +86,24 @@ class Prometheus:
 
 @contextmanager
 def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None) -> Iterator[Prometheus]:
+    """Run a Prometheus that asks `targets`, as `configured` runs one.
+
+    Raises:
+        NoPrograms, NotAnswered: as `configured` does.
+    """
+    scraped = [{"targets": [target.address], "labels": dict(target.labels)} for target in targets]
+    with configured([{"job_name": "palaestra", "static_configs": scraped}], folder, rules) as prometheus:
+        yield prometheus
+
+
+@contextmanager
+def configured(
+    scrapes: Sequence[Mapping[str, Any]], folder: Path, rules: Path | None = None
+) -> Iterator[Prometheus]:
     """Run a Prometheus with its files in `folder`, which exists and is empty, until the block ends.
 
     Args:
-        targets: asked every second.
+        scrapes: its scrape_configs; every target is asked every second.
         folder: for its configuration, data and log.
         rules: a file of alerting rules, looked at every second.
 
@@ -100,7 +114,7 @@ def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None)
     binaries = programs(PROGRAMS)
     with ExitStack() as running:
         prometheus = Prometheus(f"{ADDRESS}:{running.enter_context(HeldPorts()).any()}")
-        command = _command(binaries, folder, targets, rules, prometheus.address)
+        command = _command(binaries, folder, scrapes, rules, prometheus.address)
         process = running.enter_context(started(folder, command))
         ends = time.monotonic() + START_DEADLINE_S
         while not _is_ready(prometheus.address):
@@ -111,12 +125,11 @@ def scraping(targets: Sequence[Target], folder: Path, rules: Path | None = None)
 
 
 def _command(
-    binaries: Path, folder: Path, targets: Sequence[Target], rules: Path | None, address: str
+    binaries: Path, folder: Path, scrapes: Sequence[Mapping[str, Any]], rules: Path | None, address: str
 ) -> list[str]:
-    scraped = [{"targets": [target.address], "labels": dict(target.labels)} for target in targets]
     configuration = {
         "global": {"scrape_interval": f"{SCRAPE_S}s", "evaluation_interval": f"{SCRAPE_S}s"},
-        "scrape_configs": [{"job_name": "palaestra", "static_configs": scraped}],
+        "scrape_configs": list(scrapes),
         "rule_files": [str(rules)] if rules else [],
     }
     file = folder / "prometheus.yaml"
