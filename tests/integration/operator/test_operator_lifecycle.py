@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, TRAINING_JOBS
+from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
 from palaestra_sim.protocol.status import Termination
 from tests.integration.operator.cluster import stranger, world_map, world_of
 from tests.waiting import eventually
@@ -93,6 +93,29 @@ def test_suspending_and_resuming_changes_the_job_and_nothing_else(place, start):
 
     place.pods()
     assert place.children() == before
+
+
+def test_a_job_is_suspended_once_its_pod_has_ended_and_runs_in_no_dying_pod(place, start):
+    """`kubectl wait` for Suspended returned before the checkpoint, for Running on the pod that saved it."""
+    start()
+    place.train()
+    [pod] = place.pods()
+    place.bind(pod)
+    place.run(pod)
+    place.until("Running")
+
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": True}})
+    eventually(lambda: place.get(PODS, pod["metadata"]["name"])["metadata"].get("deletionTimestamp"))
+    eventually(lambda: place.condition("Running").get("reason") == "Suspending")
+    assert [place.condition(kind)["status"] for kind in ("Running", "Suspended")] == ["False", "False"]
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": False}})
+    eventually(lambda: place.get(JOBS, "job-0")["spec"]["suspend"] is False)
+    assert place.condition("Running")["status"] == "False"
+    place.api.merge(TRAINING_JOBS, place.name, "job", {"spec": {"suspend": True}})
+    place.end(pod, 75)
+
+    place.until("Suspended")
+    assert "Disrupted" not in place.events()
 
 
 def claim(name):

@@ -46,6 +46,7 @@ def test_suspended_time_does_not_count_for_the_active_deadline(training):
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
     scene.objects["pods"].clear()
+    scene.settle()
     scene.settle(600)
     scene.raw["spec"]["suspend"] = False
     scene.settle()

@@ -213,6 +213,7 @@ def test_resuming_goes_on_and_counts_on(training):
     scene.raw["spec"]["suspend"] = True
     scene.settle(60)
     scene.objects["pods"].clear()
+    scene.settle()
     scene.settle(600)
     scene.raw["spec"]["suspend"] = False
 

@@ -228,17 +228,18 @@ def test_each_action_and_each_change_is_one_event(make_scene):
     assert told == [("Accepted", None), ("Starting", 0), ("Planned", None), ("Planned", 0)]
 
 
-def test_suspending_and_resuming_are_told_once_each(training):
-    """By the action, not again by the status that follows."""
+def test_suspending_suspended_and_resumed_are_an_event_each(training):
+    """The first says that the pod saves a checkpoint, the second that it has ended."""
     scene, _ = training()
     scene.raw["spec"]["suspend"] = True
+    suspending = [each.reason.value for each in scene.settle().events]
+    scene.objects["pods"].clear()
     suspended = [each.reason.value for each in scene.settle().events]
     scene.raw["spec"]["suspend"] = False
-    scene.objects["pods"].clear()
 
     resumed = [each.reason.value for each in scene.settle().events]
 
-    assert suspended == ["Suspended"]
+    assert (suspending, suspended) == (["Suspending"], ["Suspended"])
     assert resumed == ["Resumed", "Starting"]
 
 

@@ -7,6 +7,7 @@ import pytest
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide import SetSuspend, as_data
+from palaestra.decide.suspending import BY_SPEC
 from palaestra.observe import Suspended
 
 SUSPEND_SET = "palaestra.dev/suspend-set"
@@ -29,6 +30,7 @@ def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
     """Kueue with manageJobsWithoutQueueName suspends it again at once: a fight of 22 patches a second."""
     scene, _ = training()
     by_kueue(scene, suspend=True)
+    scene.objects["pods"].clear()
 
     assert scene.settle().actions == ()
     assert (scene.status.phase, scene.replica().reason) == (Phase.SUSPENDED, "Suspended")
@@ -41,6 +43,7 @@ def test_who_suspended_a_job_is_told_as_an_event(training, reasons):
     """Somebody waits for a job that does not move."""
     scene, _ = training()
     by_kueue(scene, suspend=True)
+    scene.objects["pods"].clear()
 
     assert Reason.SUSPENDED in reasons(scene.settle())
 
@@ -49,6 +52,7 @@ def test_a_suspension_by_nobody_knows_whom_is_told_as_such(training):
     """An API server need not keep who wrote what."""
     scene, _ = training()
     scene.job()["spec"]["suspend"] = True
+    scene.objects["pods"].clear()
 
     scene.settle()
 
@@ -97,6 +101,7 @@ def test_a_job_of_an_earlier_release_is_taken_as_it_stands(training):
     scene, _ = training()
     without_annotation(scene)
     by_kueue(scene, suspend=True)
+    scene.objects["pods"].clear()
 
     assert scene.settle().actions == ()
     assert scene.replica().message.startswith("suspended by kueue, ")
@@ -229,3 +234,59 @@ def test_a_refused_patch_of_a_job_of_an_earlier_release_is_sent_again(training):
 
     assert [each.suspend for each in again.actions] == [True]
     assert scene.status.observed_generation == 2
+
+
+def test_a_job_is_suspended_once_its_pod_has_ended(training):
+    """Its trainer saves a checkpoint for up to a minute; who took the node before that would lose it."""
+    scene, pod = training()
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    scene.delete(pod)
+    scene.settle(5)
+
+    assert (scene.status.phase, scene.replica().reason) == (Phase.PENDING, "Suspending")
+    assert (
+        scene.replica().message
+        == f"pod {pod['metadata']['name']} saves a checkpoint and ends; suspended by {BY_SPEC}"
+    )
+
+    scene.objects["pods"].clear()
+    scene.settle(5)
+
+    assert (scene.status.phase, scene.replica().reason) == (Phase.SUSPENDED, "Suspended")
+
+
+def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, last_word):
+    """`kubectl wait --for=condition=Running` would return for a pod that is about to go; nor is it taken."""
+    scene, pod = training()
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    scene.delete(pod)
+    scene.raw["spec"]["suspend"] = False
+    events = [*scene.settle(1).events]
+
+    assert (scene.status.phase, scene.replica().reason) == (Phase.PENDING, "Suspending")
+
+    scene.end(pod, 75, last_word())
+    events += scene.settle(1).events
+    scene.objects["pods"].clear()
+    scene.pass_(1)
+    scene.running_pod()
+    events += scene.settle().events
+
+    assert scene.status.phase is Phase.RUNNING
+    assert scene.replica().last_attempt.reason == "Suspended"
+    assert Reason.DISRUPTED not in {each.reason for each in events}
+    assert (scene.replica().restarts.suspension, scene.replica().restarts.disruption) == (1, 0)
+
+
+def test_a_suspended_pod_on_a_lost_node_is_told_as_lost(training):
+    """It saves nothing any more; the Node object has to go before the job can be resumed."""
+    scene, pod = training()
+    scene.raw["spec"]["suspend"] = True
+    scene.settle()
+    scene.delete(pod)
+    scene.settle(1)
+    scene.settle(600)
+
+    assert scene.replica().reason == "NodeLost"

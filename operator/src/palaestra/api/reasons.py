@@ -35,6 +35,7 @@ class Reason(StrEnum):
     OLD_POD_TERMINATING = "OldPodTerminating"
     PLANNED = "Planned"
     QUEUED = "Queued"
+    SUSPENDING = "Suspending"
     SUSPENDED = "Suspended"
     RESUMED = "Resumed"
     STARTING = "Starting"
@@ -203,9 +204,16 @@ ROWS: dict[Reason, Row] = {
         "look at the Workload with `kubectl describe`: it tells what is short ([queues](queues.md))",
         warning=False,
     ),
+    Reason.SUSPENDING: Row(
+        "pod {pod} saves a checkpoint and ends; {by}",
+        "the replica is suspended, and its pod has not ended yet: the checkpoint is not safe before it has. "
+        "A job that is resumed meanwhile waits for this pod too",
+        "wait for `Suspended` before you take the node or the volume",
+        warning=False,
+    ),
     Reason.SUSPENDED: Row(
         "suspended by {by}",
-        "the pods were deleted after a checkpoint; the message says who set `suspend`: the TrainingJob's "
+        "the pods have ended after a checkpoint; the message says who set `suspend`: the TrainingJob's "
         "`spec.suspend`, or a field manager that changed the Job, such as Kueue. "
         "The operator does not undo what another has set",
         "set `spec.suspend: false`; what another has suspended, it has to resume",

@@ -11,7 +11,7 @@ from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
 from palaestra.decide.situation import Situation, told
-from palaestra.decide.suspending import suspended_by
+from palaestra.decide.suspending import ended_by_suspension, suspended_by
 from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, storage_eviction
 from palaestra.observe.views import JobView, PodView
 from palaestra.plan.replica import TRAINER
@@ -105,7 +105,7 @@ def deleted(attempt: Attempt) -> Told | None:
         return None
     if job is not None and (stop := stop_of(job)) is not None:
         return stop
-    if job is not None and job.suspended:
+    if job is not None and (job.suspended or ended_by_suspension(attempt.it.seen, pod)):
         return paused(attempt.it)
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # as the Job counts it
         how = f"{how_it_failed(attempt.it, pod)}; its pod was deleted, and it did not save in time"

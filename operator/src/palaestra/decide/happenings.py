@@ -17,11 +17,10 @@ from palaestra.decide.decision import (
     Stop,
 )
 from palaestra.decide.memory import limit_of
-from palaestra.decide.suspending import BY_SPEC
 from palaestra.plan.replica import TRAINER
 
 _ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
-_BY_ACTION = {Reason.PLANNED, Reason.SUSPENDED, Reason.RESUMED, Reason.EXPIRED}
+_BY_ACTION = {Reason.PLANNED, Reason.RESUMED, Reason.EXPIRED}
 _BY_ATTEMPT = {Reason.DISRUPTED}  # one event an attempt, whatever was seen of the time between two
 
 
@@ -52,10 +51,9 @@ def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
                 created.setdefault(replica, []).append(f"{thing['kind']} {thing['metadata']['name']}")
             case Stop(reason=reason, message=message, replica=replica):
                 yield happening(reason, message, replica)
-            case SetSuspend(suspend=suspend, replica=replica):
-                reason = Reason.SUSPENDED if suspend else Reason.RESUMED
-                yield happening(reason, say(reason, by=BY_SPEC), replica)
-            case Discard() | Replace():  # the replica's end, or its reason, has an event
+            case SetSuspend(suspend=False, replica=replica):
+                yield happening(Reason.RESUMED, say(Reason.RESUMED), replica)
+            case Discard() | Replace() | SetSuspend():  # the replica's end, or its reason, has an event
                 continue
             case Delete():
                 yield happening(Reason.EXPIRED, say(Reason.EXPIRED, seconds=action.after_s))
@@ -81,8 +79,7 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happe
     if before == (new.phase, new.reason) or new.reason is None or new.message is None:
         return
     reason = Reason(new.reason)
-    by_another = reason is Reason.SUSPENDED and new.message != say(reason, by=BY_SPEC)
-    if by_another or reason not in _BY_ACTION | _BY_ATTEMPT:
+    if reason not in _BY_ACTION | _BY_ATTEMPT:
         yield happening(reason, new.message, new.index)
 
 

@@ -4,7 +4,7 @@ from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide.attempts import paused
 from palaestra.decide.situation import Finding, Situation, found, told
-from palaestra.decide.suspending import unheeded
+from palaestra.decide.suspending import ended_by_suspension, unheeded
 
 UNASKED = "; why that takes long was not asked, as too many others wait; `kubectl describe` shows it"
 
@@ -14,6 +14,15 @@ def held(it: Situation) -> Finding | None:
     if it.hold is None:
         return None
     return Finding(told=it.hold.told, phase=Phase.PENDING if it.seen.job is None else Phase.SUSPENDED)
+
+
+def suspending(it: Situation) -> Finding | None:
+    """It is suspended, or was until a moment ago, and its pod still saves a checkpoint."""
+    pod = it.pod if it.seen.job is not None else None
+    if pod is None or not (it.suspended or ended_by_suspension(it.seen, pod)):
+        return None
+    by = paused(it).message if it.suspended else "then the next pod goes on from there"
+    return Finding(told=told(Reason.SUSPENDING, pod=pod.name, by=by), phase=Phase.PENDING)
 
 
 def suspended(it: Situation) -> Finding | None:

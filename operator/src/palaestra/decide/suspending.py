@@ -3,7 +3,7 @@
 from palaestra.api import TrainingJob
 from palaestra.api.status import PodReference
 from palaestra.decide.counting import lives
-from palaestra.observe.views import JobView, Observed, ReplicaObserved, Suspended
+from palaestra.observe.views import JobView, Observed, PodView, ReplicaObserved, Suspended
 
 BY_SPEC = "spec.suspend; set it to false to go on from the last checkpoint"
 SOMEBODY = "somebody else"  # where no field manager is known
@@ -63,6 +63,12 @@ def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) 
         return None if named and not lived else Suspended(pod=current.uid, lived=lived)
     late = job.suspend_set is True and not named
     return Suspended(pod=current.uid, lived=True) if late else None
+
+
+def ended_by_suspension(seen: ReplicaObserved, pod: PodView) -> bool:
+    """Return whether a pod was deleted because the operator suspended its Job; it may be resumed by now."""
+    mark = seen.job.suspension if seen.job is not None else None
+    return mark is not None and mark.lived and mark.pod == pod.uid and pod.gone_by is not None
 
 
 def overruled(job: TrainingJob, seen: JobView) -> bool:

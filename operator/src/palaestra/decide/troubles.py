@@ -12,6 +12,7 @@ from palaestra.decide.conditions import Told
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
 from palaestra.decide.situation import Finding, Situation, after, first_waiting, found, told
+from palaestra.decide.suspending import ended_by_suspension
 from palaestra.decide.times import Wait
 from palaestra.observe.views import ContainerKind, ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
@@ -140,6 +141,8 @@ def pod_was_taken(it: Situation) -> Finding | None:
         return None
     if (mark := mark_of(it, pod)) is not None:
         return Finding(told=mark)
+    if ended_by_suspension(it.seen, pod):  # and resumed: the next pod is on its way
+        return None
     if pod.disruption or pod.gone_by is not None:
         return found(Reason.DISRUPTED, pod=pod.name, words=pod.disruption or "it was deleted")
     return found(Reason.INTERRUPTED, pod=pod.name, how=how_it_failed(it, pod))
