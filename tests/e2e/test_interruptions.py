@@ -13,10 +13,11 @@ AMID = 150
 
 
 def suspend(namespace, name, pod):
-    """Suspend the job until its pod is gone, and resume it."""
+    """Suspend the job, see that it is called suspended once its pod has ended, and resume it."""
     namespace.patch(name, suspend=True)
-    namespace.wait(lambda: namespace.get("pods", pod) is None)
     namespace.wait(lambda: namespace.holds(name, "Suspended"))
+    left = namespace.get("pods", pod)
+    assert left is None or left["status"]["phase"] in {"Succeeded", "Failed"}
     assert namespace.status(name)["phase"] == "Suspended"
     namespace.patch(name, suspend=False)
 
