@@ -161,8 +161,8 @@ def _useful() -> Panel:
     return Panel(
         question="Which share of the time is training?",
         says=(
-            "Stepping, transport and learning, by namespace; the rest is evaluating, saving, starting and "
-            "recovering. It falls: see where the time of its runs goes (Training)."
+            "Stepping, transport and learning, by namespace; the rest is evaluating, saving, starting, "
+            "recovering and recycling. It falls: see where the time of its runs goes (Training)."
         ),
         unit=units.PercentUnit,
         least=0,

@@ -164,8 +164,8 @@ def _time() -> Panel:
         question="Where does its time go?",
         says=(
             "Each second of the trainer has one cause. Mostly stepping: the simulators are the limit, add "
-            "some. Mostly learning: give it more CPU. Recovering: it waits for restarts, after faults or for "
-            "`recycle`; see Simulators for which, and give the group a standby."
+            "some. Mostly learning: give it more CPU. Recovering: it waits for restarts after faults, see "
+            "Simulators. Recycling: for those of `recycle`. Against both, give the group a standby."
         ),
         unit=units.PercentUnit,
         look=Look.SHARES,

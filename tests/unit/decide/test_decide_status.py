@@ -89,6 +89,16 @@ def test_where_the_time_went_and_what_broke_is_told(training, simulator):
     assert (told.flapping, told.given_up, told.standby) == (True, True, "ready")
 
 
+@pytest.mark.parametrize(("seconds", "written"), [(0.4, None), (7.2, 7)])
+def test_recycling_is_written_once_there_was_some(training, seconds, written):
+    """Command lines of an older release refuse a field that they do not know."""
+    scene, pod = training()
+    scene.poll(pod, goodput={"stepping": 50.9, "recycling": seconds})
+    scene.settle()
+
+    assert scene.replica().goodput.recycling == written
+
+
 def test_every_cause_and_every_kind_of_fault_has_a_field():
     """The operator reads by name what a trainer of this release tells."""
     assert {to_camel(cause) for cause in Cause} == {to_camel(name) for name in Goodput.model_fields}

@@ -348,6 +348,7 @@ def test_kinds_and_causes_are_those_of_the_metrics_and_the_status() -> None:
         "checkpointing",
         "starting",
         "recovering",
+        "recycling",
     ]
 
 

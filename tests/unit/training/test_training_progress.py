@@ -174,6 +174,18 @@ def test_time_goes_on_where_the_attempt_before_ended(progress, clock):
     assert {cause: it for cause, it in counted.goodput.items() if it} == {"learning": 5.0, "starting": 2.0}
 
 
+def test_time_of_a_checkpoint_that_does_not_know_recycling_stays_where_it_was(progress, clock):
+    """An older release counted recycling as recovering, and nobody can tell the two apart any more."""
+    saved = Counters.from_json({"goodput": {"stepping": 3.0, "recovering": 2.0}})
+    progress.resumed(40, saved)
+    with progress.spending(Cause.RECYCLING):
+        clock.now = 4.0
+
+    goodput = progress.counted().goodput
+
+    assert (goodput["stepping"], goodput["recovering"], goodput["recycling"]) == (3.0, 2.0, 4.0)
+
+
 def test_a_phase_is_what_time_is_spent_on(progress):
     """One word, by which a person sees what the run does."""
     phases = [progress.phase]
@@ -183,6 +195,7 @@ def test_a_phase_is_what_time_is_spent_on(progress):
 
     assert phases == [
         "starting", "training", "training", "training", "evaluating", "saving", "starting", "recovering",
+        "recycling",
     ]  # fmt: skip
 
 

@@ -46,6 +46,22 @@ def test_a_time_ledger_of_no_seconds_is_left_out():
     assert not [line for line in told(make_job(goodput={})) if line.startswith("Time spent")]
 
 
+def test_slow_steps_are_told_apart_from_faults():
+    """`Faults: slow 1` made people look for a simulator that broke."""
+    both = told(make_job(faults={"dead": 2, "slow": 1}))
+
+    assert "Faults:         dead 2" in both
+    assert "Slow steps:     1, which are no faults" in both
+    assert not [line for line in told(make_job(faults={"slow": 1})) if line.startswith("Faults")]
+
+
+def test_recycling_is_told_apart_from_recovering():
+    """It is planned: nothing has to be mended. An older release reports none."""
+    lines = told(make_job(goodput={"stepping": 75, "recycling": 25}))
+
+    assert "Time spent:     stepping 75%, recycling 25%" in lines
+
+
 def test_where_the_run_lies_is_told():
     """It decides what is left when the job is deleted."""
     assert "Storage:       in the pod, and gone with it" in told(

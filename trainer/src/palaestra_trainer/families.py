@@ -136,7 +136,7 @@ BUILD = gauge(
 
 FAULTS = counter(
     "palaestra_simulator_faults_total",
-    "Faults that the trainer met; slow is a step that took too long, and breaks nothing.",
+    "Faults that the trainer met; `slow` counts steps that took too long, which are no faults.",
     SIMULATOR,
     KIND,
 )

@@ -32,6 +32,7 @@ PHASES: Mapping[Cause, str] = MappingProxyType(
         Cause.EVALUATING: "evaluating",
         Cause.CHECKPOINTING: "saving",
         Cause.RECOVERING: "recovering",
+        Cause.RECYCLING: "recycling",
     }
 )
 
@@ -120,13 +121,13 @@ class Progress:
 
     @property
     def phase(self) -> str:
-        """What the run does now: starting, training, evaluating, saving, recovering."""
+        """What the run does now: starting, training, evaluating, saving, recovering, recycling."""
         return PHASES.get(self._goodput.cause, "training")
 
     @property
     def awaits_simulators(self) -> bool:
         """Whether the run waits for simulators now, and nothing else."""
-        return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING}
+        return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING, Cause.RECYCLING}
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
         """Spend the time inside on `cause`, see `Goodput`."""

@@ -62,7 +62,7 @@ class LastAttempt(Reported):
 
 
 class Faults(Reported):
-    """How often simulators broke, over all attempts."""
+    """How often simulators broke, and were slow without breaking, over all attempts."""
 
     dead: Count = 0
     """Connections were refused or closed."""
@@ -71,7 +71,7 @@ class Faults(Reported):
     """No answer in time."""
 
     slow: Count = 0
-    """Steps that took more than ten times as long as usual; nothing was restarted for them."""
+    """Steps that took more than ten times as long as usual; they are no faults, and nothing was restarted."""
 
     wrong_data: Count = 0
     """Answers that cannot be right."""
@@ -99,8 +99,12 @@ class Goodput(Reported):
     """Seconds until the first step of each attempt."""
 
     recovering: Seconds = 0
-    """Seconds in which every simulator was broken, one was being recycled, or a resumed run was brought
-    back to where it was."""
+    """Seconds in which every simulator was broken, or a resumed run was brought back to where it was;
+    in releases that report no `recycling`, also those of recycling."""
+
+    recycling: Seconds | None = None
+    """Seconds in which training waited for a healthy simulator that was being restarted, as `recycle` plans
+    it; absent: none, or not reported."""
 
 
 class MemoryKills(Reported):

@@ -13,7 +13,7 @@ from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation
 from palaestra.decide.times import Wait
 from palaestra.observe.reading import MOST_COUNT, as_time
-from palaestra_sim.protocol.status import CheckpointStatus, Termination, TrainerStatus
+from palaestra_sim.protocol.status import Cause, CheckpointStatus, Termination, TrainerStatus
 
 EVALUATING = "evaluating"  # the trainer's phase while nothing is learned from
 LONGEST_NAME = 63  # of a simulator; those of our plan have 23 characters at most
@@ -90,7 +90,11 @@ def _spent(it: Situation, polled: TrainerStatus) -> dict[str, object]:
     if not polled.goodput:
         return {}
     before = it.old.goodput or Goodput()
-    seconds = {cause: min(int(spent), MOST_COUNT) for cause, spent in polled.goodput.items()}
+    seconds = {
+        cause: min(int(spent), MOST_COUNT)
+        for cause, spent in polled.goodput.items()
+        if cause != Cause.RECYCLING or spent >= 1.0  # older readers refuse a field that they do not know
+    }
     faults = {kind: min(times, MOST_COUNT) for kind, times in polled.faults.items()}
     return {
         "goodput": before.model_copy(update=seconds),

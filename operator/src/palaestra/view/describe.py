@@ -98,7 +98,11 @@ def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
         yield "Checkpoint", f"step {replica.last_checkpoint.step:,}, {ago(replica.last_checkpoint.time, now)}"
     yield "Progress", ago(replica.last_progress, now)
     yield "Restarts", _counts(replica.restarts.model_dump())
-    yield "Faults", _counts(replica.faults.model_dump()) if replica.faults else ""
+    if replica.faults is not None:
+        counts = replica.faults.model_dump()
+        slow = counts.pop("slow")
+        yield "Faults", _counts(counts)
+        yield "Slow steps", f"{slow:,}, which are no faults" if slow else ""
     yield "Memory kills", ", ".join(f"{each.container} {each.times}" for each in replica.memory_kills)
     yield "Steps lost", f"{replica.steps_lost:,}" if replica.steps_lost else ""
     yield "Time spent", _shares(replica.goodput) if replica.goodput else ""
@@ -123,7 +127,7 @@ def _counts(counts: dict[str, int]) -> str:
 
 
 def _shares(goodput: Goodput) -> str:
-    spent = goodput.model_dump()
+    spent = goodput.model_dump(exclude_none=True)
     total = sum(spent.values())
     return ", ".join(f"{cause} {seconds / total:.0%}" for cause, seconds in spent.items() if seconds)
 

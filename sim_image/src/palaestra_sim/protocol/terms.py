@@ -33,8 +33,9 @@ class Cause(StrEnum):
 
     STEPPING: simulators computed a step that training waited for. TRANSPORT: the rest of a step:
     asking, reading, the environment. LEARNING: all that the algorithm does besides. EVALUATING,
-    CHECKPOINTING: as named. STARTING: until the first step. RECOVERING: every simulator was broken,
-    one was being recycled, or a resumed run was brought back to where it had been.
+    CHECKPOINTING: as named. STARTING: until the first step. RECOVERING: every simulator was broken, or
+    a resumed run was brought back to where it had been. RECYCLING: a healthy simulator was being
+    restarted, as planned; older releases count it as recovering.
     """
 
     STEPPING = "stepping"
@@ -44,6 +45,7 @@ class Cause(StrEnum):
     CHECKPOINTING = "checkpointing"
     STARTING = "starting"
     RECOVERING = "recovering"
+    RECYCLING = "recycling"
 
 
 class StandbyState(StrEnum):

@@ -231,7 +231,7 @@ class Keeper:
         self._begin(self._recycle)
         while not self.up():
             let_others()
-            with self.watcher.spending(Cause.RECOVERING):
+            with self.watcher.spending(Cause.RECYCLING):
                 await_one([self], check)
 
     def _tell_of_recycling(self, reason: str) -> None:
