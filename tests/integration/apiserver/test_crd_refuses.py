@@ -235,6 +235,9 @@ MAY_NOT_CHANGE = [
     ("spec.simulators.0.world", {"file": "/other.wbt"}),
     ("spec.trainer.steps", 7),
     ("spec.trainer.algorithm.name", "A2C"),
+    ("spec.trainer.algorithm.hyperparameters", {"learning_rate": 0.1}),
+    ("spec.trainer.environment.options", {"max_steps": 7}),
+    ("spec.scheduling.affinity", {"nodeAffinity": {}}),
     ("spec.storage", {"size": "2Gi"}),
     ("spec.scheduling", {"queueName": "team"}),
     ("spec.network", {"egress": "Closed"}),
@@ -265,6 +268,29 @@ def test_what_may_not_change_is_refused_with_the_remedy(apply, path, value):
 
     assert code == 1
     assert_says(said, f"{path.split('.')[1]}.*{FROZEN}")
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("spec.trainer.steps", 7),
+        ("spec.trainer.image", "another:1"),
+        ("spec.trainer.algorithm.name", "A2C"),
+        ("spec.storage.size", "2Gi"),
+        ("spec.network.egress", "Closed"),
+        ("spec.scheduling.queueName", "team"),
+    ],
+    ids=str,
+)
+def test_the_refusal_of_a_change_names_the_field_that_was_changed(apply, path, value):
+    """`spec.trainer: cannot be changed` left a person with a diff of forty fields."""
+    job = make_job()
+    apply(job)
+
+    code, said = apply(changed(job, path, value))
+
+    assert code == 1
+    assert_says(said, f"{path}: .*{FROZEN}")
 
 
 def assert_says(said, message):

@@ -40,12 +40,17 @@ def rules_of(path: str) -> list[dict[str, str]]:
 
 
 def frozen(path: str) -> bool:
-    """Return whether the field at `path` must stay as it was."""
+    """Return whether the field at `path` must stay: by itself, with what it is in, or in all its parts."""
     above, _, name = path.rpartition(".")
-    here = any(rule["message"] == FROZEN for rule in rules_of(path))
-    return here or any(
-        rule["message"] == FROZEN and rule.get("fieldPath") == f".{name}" for rule in rules_of(above)
-    )
+    if "" in kept(path) or {"", f".{name}"} & kept(above):
+        return True
+    parts = ALL[path].get("properties", {})
+    return bool(parts) and all(frozen(f"{path}.{part}") for part in parts)
+
+
+def kept(path: str) -> set[str]:
+    """Return what the rules at `path` keep: fields of the object, or the empty path for all of it."""
+    return {rule.get("fieldPath", "") for rule in rules_of(path) if rule["message"] == FROZEN}
 
 
 def test_no_keyword_is_used_that_a_structural_schema_forbids() -> None:
@@ -207,6 +212,13 @@ def test_every_field_of_the_spec_is_either_frozen_or_may_change() -> None:
         "noProgressLimit",
         "ttlSecondsAfterFinished",
     ]
+
+
+def test_a_field_of_a_part_is_kept_by_a_rule_of_its_own() -> None:
+    """The API server's message names the place of the rule: `spec.trainer` is no help."""
+    alone = ("spec.trainer.steps", "spec.trainer.algorithm.name", "spec.storage.size", "spec.network.egress")
+
+    assert [path for path in alone if "" not in kept(path)] == []
 
 
 def test_groups_cannot_be_added_or_removed() -> None:

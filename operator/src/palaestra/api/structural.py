@@ -20,6 +20,7 @@ _KEPT = (
     "x-kubernetes-list-type", "x-kubernetes-list-map-keys", "x-kubernetes-validations",
     MAY_CHANGE,
 )  # fmt: skip
+_OPAQUE = "x-kubernetes-preserve-unknown-fields"
 _BOUNDS_OF = {"array": "Items", "object": "Properties"}
 
 
@@ -89,12 +90,18 @@ def _present(default: Any) -> Any:
 
 def freeze(schema: Schema) -> None:
     """Add rules to the object `schema` that keep each field, but for those that may change."""
+    whole = False  # an API server takes no rule for a field of any content, only for what it is in
     for name, inner in schema["properties"].items():
         if inner.get(MAY_CHANGE):
             continue
+        always = "default" in inner or name in schema.get("required", ())
         if _has_what_may_change(inner):
             _freeze_items(inner)
-        elif "default" in inner or name in schema.get("required", ()):
+        elif always and "properties" in inner:
+            freeze(inner)  # the message names the field that was changed, not the part that it is in
+        elif _OPAQUE in inner.get("additionalProperties", ()):
+            whole = True
+        elif always:
             _add(inner, {"rule": "self == oldSelf", "message": FROZEN})
         else:
             rule = (
@@ -102,6 +109,8 @@ def freeze(schema: Schema) -> None:
                 f" && (!has(self.{name}) || self.{name} == oldSelf.{name})"
             )
             _add(schema, {"rule": rule, "message": FROZEN, "fieldPath": f".{name}"})
+    if whole:
+        _add(schema, {"rule": "self == oldSelf", "message": FROZEN})
 
 
 def _freeze_items(inner: Schema) -> None:
