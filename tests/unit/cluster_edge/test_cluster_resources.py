@@ -10,6 +10,7 @@ from palaestra.cluster.errors import (
     Forbidden,
     Gone,
     Invalid,
+    NamespaceTerminating,
     NotFound,
     ServerError,
     TooManyRequests,
@@ -72,6 +73,16 @@ def test_each_refusal_has_its_error(code, reason, error):
 
     assert type(found) is error
     assert (found.code, found.message) == (code, "m")
+
+
+def test_a_namespace_that_is_being_deleted_is_told_from_a_missing_right():
+    """Both are 403 and Forbidden; the one passes with the namespace, the other waits for a person."""
+    causes = [{"reason": "NamespaceTerminating", "message": "namespace lab is being terminated"}]
+
+    found = from_status(403, {"reason": "Forbidden", "message": "m", "details": {"causes": causes}})
+
+    assert type(found) is NamespaceTerminating
+    assert not found.retryable
 
 
 @pytest.mark.parametrize(

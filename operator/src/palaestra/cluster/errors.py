@@ -6,6 +6,7 @@ ApiError                    any answer but success; `retryable` says whether it 
 ├── AlreadyExists           409, the name is taken
 ├── Conflict                409, somebody else wrote first: read again
 ├── Forbidden               403, RBAC, quota or admission says no
+│   └── NamespaceTerminating 403, nothing can be created in a namespace that is being deleted
 ├── Invalid                 400 and 422, the object is wrong: never retried
 ├── Gone                    410, the version to continue from is forgotten: list again
 ├── TooManyRequests         429, with the wait that the server asks for
@@ -84,6 +85,10 @@ class Forbidden(ApiError):
         return re.search(r" cannot \S+ resource ", self.message) is not None
 
 
+class NamespaceTerminating(Forbidden):
+    """The namespace is being deleted, so that nothing can be created in it any more; it never comes back."""
+
+
 class Invalid(ApiError):
     """The object is wrong; the message names the field."""
 
@@ -146,6 +151,9 @@ BY_CODE: dict[int, type[ApiError]] = {
 }
 
 
+BY_CAUSE: dict[str, type[ApiError]] = {"NamespaceTerminating": NamespaceTerminating}
+
+
 def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = None) -> ApiError:
     """Return the error for an HTTP status and the `Status` object that came with it.
 
@@ -159,10 +167,17 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
     reason = str(status.get("reason") or f"HTTP{code}")
     message = str(status.get("message") or "the API server gave no message")
     fallback = ServerError if code >= SERVER_ERROR else ApiError
-    error = BY_REASON.get(reason, BY_CODE.get(code, fallback))(code, reason, message)
+    kind = _by_cause(status) or BY_REASON.get(reason, BY_CODE.get(code, fallback))
+    error = kind(code, reason, message)
     if isinstance(error, TooManyRequests):
         error.retry_after_s = _seconds(retry_after)
     return error
+
+
+def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
+    """Return the error that a cause names where the reason is that of many."""
+    causes = (status.get("details") or {}).get("causes") or ()
+    return next((BY_CAUSE[each["reason"]] for each in causes if each.get("reason") in BY_CAUSE), None)
 
 
 def _seconds(text: str | None) -> float:

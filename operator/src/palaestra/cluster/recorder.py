@@ -2,7 +2,8 @@
 
 One Event for each (object, reason, message), whose count and last time go up when it happens again. Its name
 is made of these three, so that an operator that was started anew goes on counting instead of repeating.
-An event that cannot be written is logged and given up: nothing may wait for it.
+An event that cannot be written is logged and given up: nothing may wait for it. Only that its namespace is
+being deleted is raised, or the log would have a line for every event in it.
 """
 
 import hashlib
@@ -15,7 +16,7 @@ from typing import Any
 import structlog
 
 from palaestra.cluster.api import Api
-from palaestra.cluster.errors import AlreadyExists, ApiError, NotFound
+from palaestra.cluster.errors import AlreadyExists, ApiError, NamespaceTerminating, NotFound
 from palaestra.cluster.resources import EVENTS
 
 log = structlog.get_logger("palaestra.cluster")
@@ -54,10 +55,15 @@ class Recorder:
             reason: one word.
             message: a sentence; cut at 1024 characters.
             once: an event that is there already is left as it is.
+
+        Raises:
+            NamespaceTerminating: there will be no event about this object any more.
         """
         event = self._event(obj, kind, reason, message)
         try:
             self._write(event, once=once)
+        except NamespaceTerminating:
+            raise
         except ApiError as error:
             log.warning("event not written", reason=reason, name=event["metadata"]["name"], error=str(error))
 

@@ -11,7 +11,10 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
+import structlog
+
 from palaestra.api import TrainingJob
+from palaestra.cluster import NamespaceTerminating
 from palaestra.decide import (
     Decision,
     Prepared,
@@ -34,6 +37,8 @@ from palaestra.operator.poller import Key
 from palaestra.operator.records import Records
 from palaestra.operator.telling import StatusWrite, Telling
 from palaestra.plan import ClusterLayout
+
+log = structlog.get_logger(__name__)
 
 Object = Mapping[str, Any]
 
@@ -71,6 +76,7 @@ class Controller:
         self._layout = layout
         self._times = times
         self._records = Records()
+        self._terminating: set[Key] = set()  # of which it was logged
 
     def begin_anew(self) -> None:
         """Forget since when anything is waited for: another operator may have led meanwhile."""
@@ -80,7 +86,8 @@ class Controller:
         """Look at one TrainingJob and do what is to be done; return seconds until time may change that.
 
         Raises:
-            ApiError: it is to be tried again later; what was done stays done.
+            ApiError: it is to be tried again later; what was done stays done. In a namespace that is being
+                deleted nothing is tried again: each change in it is a look anyway.
             Outdated: the cache is behind.
             NotLeading: another operator may lead.
         """
@@ -89,7 +96,18 @@ class Controller:
             self._looking.forget(key)
             self._telling.forget(key)
             self._records.forget(key)
+            self._terminating.discard(key)
             return None
+        try:
+            return self._bring_closer(key, raw)
+        except NamespaceTerminating as error:
+            if key not in self._terminating:
+                self._terminating.add(key)
+                log.info("namespace terminates", job=key, error=str(error))
+            return None
+
+    def _bring_closer(self, key: Key, raw: Object) -> float | None:
+        """Look, decide and act; once more if that has just accepted the job."""
         times = self._times(self._records.of(key, raw["metadata"]["uid"]))
         look = self._look(raw, times)
         written = self._carry_out(raw, look, times)

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from palaestra.api.reasons import Reason
-from palaestra.cluster import Recorder
+from palaestra.cluster import NotFound, Recorder
 from palaestra.decide import Decision, Happening, as_data, fitted, write_in_s
+from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denied
 from palaestra.operator.poller import Key
 from palaestra.operator.writing import Writer, difference
@@ -57,6 +58,8 @@ class Telling:
 
         Raises:
             Conflict: the job is not as it was when this was decided.
+            Outdated: the job is gone.
+            NamespaceTerminating: no event can be written any more; the status was.
             NotLeading: another operator may lead.
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
@@ -83,7 +86,10 @@ class Telling:
         with self._lock:
             if self._futile.get(key) == (version, patch):
                 return StatusWrite()
-        stored = self._writer.status(raw, patch)
+        try:
+            stored = self._writer.status(raw, patch)
+        except NotFound as error:
+            raise Outdated(f"TrainingJob {key[1]} is gone and still in the cache") from error
         changed = stored["metadata"]["resourceVersion"] != version
         if changed:
             self._count(raw, status)
