@@ -13,6 +13,7 @@ from tests.pages import blocks
 
 PAGE = (ROOT / "docs" / "install.md").read_text()
 BLOCKS = blocks(PAGE, "sh")
+REGISTRY = blocks(PAGE, "sh with-a-registry")
 # Without nodes no job ends: `palaestra try` is tested with the operator, and `helm test` by `make e2e`.
 NO_NODES = 'helm() { [[ $1 == test ]] || command helm "$@"; }\n'
 AWAY = f"""
@@ -49,6 +50,37 @@ def typed(cluster, kubectl, tmp_path):
 
     yield type_in
     type_in(AWAY)
+
+
+def test_no_command_for_everybody_names_a_registry_that_is_a_placeholder():
+    """The upgrades after it keep its values: no image of somebody who typed them all could be pulled."""
+    assert [block for block in BLOCKS if "registry.example.com" in block] == []
+    assert len(REGISTRY) == 1
+
+
+def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, kubectl):
+    """The others are typed without them."""
+    for block in (BLOCKS[0], *REGISTRY):
+        typed(block)
+
+    images = kubectl("get", "deployment", f"--namespace={NAMESPACE}", "--output=jsonpath={..image}")
+    assert images.startswith("registry.example.com/robots/palaestra-operator@sha256:")
+
+
+def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubectl):
+    """Lease, Secrets, namespace and roles stayed, and the page did not name them."""
+    typed(BLOCKS[0])
+    kubectl("create", "secret", "generic", "notebooks", f"--namespace={NAMESPACE}")
+    kubectl("create", "namespace", "robots")
+    kubectl("apply", "--filename", str(ROOT / "manifests/examples/platform/roles.yaml"))
+    chapter = PAGE[PAGE.index("## Uninstall") : PAGE.index("## In some namespaces only")]
+
+    for block in blocks(chapter, "sh"):
+        typed(block)
+
+    kinds = "namespaces,clusterroles,clusterrolebindings,roles,rolebindings,customresourcedefinitions"
+    left = kubectl("get", kinds, "--all-namespaces", "--output=name")
+    assert [name for name in left.split() if "palaestra" in name] == []
 
 
 @pytest.mark.timeout(600)

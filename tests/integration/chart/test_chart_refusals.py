@@ -1,0 +1,18 @@
+"""What Helm refuses in a cluster that lacks something; no kinds of others are known here."""
+
+import pytest
+
+from tests.chart.helm import CHART, NAMESPACE, ROOT, HelmRefused, helm
+
+MONITORS = "monitoring.podMonitor.enabled=true"
+
+
+def test_monitors_are_refused_until_the_cluster_knows_their_kinds(control_plane):
+    """docs/install.md names these words, so that whoever meets them knows what to install first."""
+    install = ("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--create-namespace")
+    words = 'no matches for kind "PodMonitor"'
+
+    with pytest.raises(HelmRefused, match=words):
+        helm(*install, f"--set={MONITORS}", KUBECONFIG=str(control_plane.kubeconfig))
+
+    assert words in (ROOT / "docs" / "install.md").read_text()
