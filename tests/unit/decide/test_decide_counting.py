@@ -196,6 +196,42 @@ def test_a_resumption_may_be_dated_after_the_pod_that_it_made(training):
     assert restarts(scene) == (2, 0, 0, 1)
 
 
+def test_a_suspension_by_a_queue_that_the_status_showed_is_counted_however_late_its_end_is_dated(training):
+    """A Job controller that is busy takes the time of the resumption seconds after it has made the pod."""
+    scene, _ = training()
+    scene.job()["spec"]["suspend"] = True
+    tell_suspension(scene, "True")
+    scene.objects["pods"].clear()
+    scene.settle(15)
+    scene.job()["spec"]["suspend"] = False
+    scene.pass_(15)
+    scene.running_pod()
+    scene.pass_(5)
+    tell_suspension(scene, "False")
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 0, 1)
+
+
+def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(training):
+    """It would have been replaced anyway."""
+    scene, pod = training()
+    scene.take(pod)
+    scene.settle(5)
+    scene.job()["spec"]["suspend"] = True
+    scene.settle(5)
+    scene.objects["pods"].clear()
+    scene.settle(5)
+    scene.job()["spec"]["suspend"] = False
+    scene.pass_(15)
+    scene.running_pod()
+
+    scene.settle()
+
+    assert restarts(scene) == (2, 0, 1, 0)
+
+
 def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
     """The two come by two watches; what is told later is not counted again for the pod after that one."""
     scene, _ = training()

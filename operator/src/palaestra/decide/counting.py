@@ -9,7 +9,8 @@ number:
     trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
     operator    the operator replaced the pod, by the mark on its Job
     suspension  the operator suspended the Job while the pod lived, by the mark on the Job; where somebody
-                else suspended it, the Job was suspended between the two pods, by its controller's times
+                else suspended it, the status showed it suspended between the two pods, or it was by its
+                controller's times
     disruption  all others: the cluster or a person took the pod, or it exited with 75
 
 A failed pod that was not replaced yet is no restart. Restarts of simulators are counted within an attempt
@@ -21,6 +22,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 
+from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase, PodReference, ReplicaStatus, Restarts
 from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import JobView, PodView, ReplicaObserved
@@ -166,7 +168,16 @@ def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVie
     mark = seen.job.suspension
     if mark is not None and mark.pod in replaced:
         return int(mark.lived)
+    if old.phase is Phase.SUSPENDED or old.reason == Reason.SUSPENDING:
+        return int(not _ended_otherwise(old))
     return _suspended_by_times(old, seen.job, newer)
+
+
+def _ended_otherwise(old: ReplicaStatus) -> bool:
+    """Return whether the current pod of a suspended replica had ended before, for a reason of its own."""
+    last = old.last_attempt
+    known = last is not None and last.attempt == old.attempt
+    return known and last is not None and last.reason not in {Reason.SUSPENDED, Reason.QUEUED}
 
 
 def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodView]) -> int:
