@@ -109,15 +109,15 @@ def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
 
 @pytest.mark.after_the_long_run
 def test_kubectl_shows_a_job_in_one_line(long_run):
-    """Status, Replicas, Step, Success and Age are what a person looks for first."""
+    """Status, reason, replicas, step and success are what a person looks for first."""
     status = long_run.end()
     cluster, space = long_run.namespace.cluster, long_run.namespace
 
     header, line = cluster.kubectl("get", "tj", NAME, "-n", space.name).splitlines()
 
-    assert header.split() == ["NAME", "STATUS", "REPLICAS", "STEP", "SUCCESS", "AGE"]
-    assert line.split()[:4] == [NAME, "Succeeded", "2/2", "50000"]
-    assert float(line.split()[4]) == pytest.approx(status["successRate"])
+    assert header.split() == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET", "SUCCESS", "AGE"]
+    assert line.split()[:6] == [NAME, "Succeeded", "Succeeded", "2/2", "50000", "50000"]
+    assert float(line.split()[6]) == pytest.approx(status["successRate"])
 
 
 @pytest.mark.after_the_long_run
