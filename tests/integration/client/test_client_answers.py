@@ -51,7 +51,8 @@ def tried(server, tmp_path):
     file.write_text(JOB)
 
     def carry_out(phase, deletion):
-        condition = {"reason": "Because", "message": "so", "lastTransitionTime": "2026-01-31T12:00:00Z"}
+        why = {"reason": "Because", "message": "so", "lastTransitionTime": "2026-01-31T12:00:00Z"}
+        condition = {"type": phase or "Failed", "status": "True", **why}
         seen = reply(obj={"status": {"phase": phase, "conditions": [condition]}})
         script.calls = [
             reply(201, {"metadata": NAMED}),
