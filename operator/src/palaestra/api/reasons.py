@@ -75,7 +75,7 @@ class Reason(StrEnum):
 
     @classmethod
     def known(cls, word: str) -> "Reason":
-        """Return the reason of this word; one that nobody knows, as a newer release's, is `JobFailed`."""
+        """Return the reason of this name; an unknown one, as of a newer release, is `JobFailed`."""
         return cls(word) if word in set(cls) else cls.JOB_FAILED
 
     @classmethod
@@ -414,7 +414,7 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.EDITED: Row(
         "{what} was changed by somebody else: {fact}",
-        "somebody changed an object that the operator had made; the operator emits one event for each edit "
+        "an object that the operator made was edited; the operator emits one event for each edit "
         "and does not restore the object",
         "if the edit was a mistake, undo it",
     ),

@@ -146,7 +146,7 @@ class Client:
             until: the phase, or `ended`.
             deadline_s: for all of it.
             report: is called with a line for each phase that the job comes to and for each reason why a
-                replica waits, with since when, such as `print` or `logging.info`; None: nobody reads them.
+                replica waits and since when, as `print` or `logging.info`; None: none is reported.
 
         Raises:
             EndedOtherwise: it has ended, and not as `until` says.

@@ -8,9 +8,8 @@ number:
 
     trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
     operator    the operator replaced the pod, by the mark on its Job
-    suspension  the operator suspended the Job while the pod lived, by the mark on the Job; where somebody
-                else suspended it, the status showed it suspended between the two pods, or it was by its
-                controller's times
+    suspension  the operator suspended the Job while the pod lived, by the mark on the Job; if another
+                controller suspended it, the status showed so between the two pods, or the Job's times do
     disruption  all others: the cluster or a person took the pod, or it exited with 75
 
 A failed pod that was not replaced yet is no restart. Restarts of simulators are counted within an attempt
@@ -92,7 +91,7 @@ def has_run(pod: PodView) -> bool:
 
 
 def lives(pod: PodView) -> bool:
-    """Return whether a pod's trainer may still run, and nobody has deleted the pod."""
+    """Return whether a pod's trainer may still run and the pod is not being deleted."""
     return not pod.ended and pod.gone_by is None and exit_code(pod) is None
 
 
@@ -176,8 +175,9 @@ def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVie
 def _ended_otherwise(old: ReplicaStatus) -> bool:
     """Return whether the current pod of a suspended replica had ended before, for a reason of its own."""
     last = old.last_attempt
-    known = last is not None and last.attempt == old.attempt
-    return known and last is not None and last.reason not in {Reason.SUSPENDED, Reason.QUEUED}
+    if last is None or last.attempt != old.attempt:
+        return False
+    return last.reason not in {Reason.SUSPENDED, Reason.QUEUED}
 
 
 def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodView]) -> int:
@@ -185,7 +185,7 @@ def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodVie
     if old.pod is None:
         return 0
     named, newest = old.pod.created, newer[-1].created
-    if (paused := job.paused) is not None:  # the pod is seen before the Job tells that it was resumed
+    if (paused := job.paused) is not None:  # the new pod is seen before the Job's resumption
         return int(named <= paused < newest)
     resumed = job.resumed
     return int(resumed is not None and named + _DATED_LATE < resumed <= newest + _DATED_LATE)
