@@ -63,12 +63,12 @@ def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
     for seen, it in zip(observed.replicas, each, strict=True):
         if seen.job is None or seen.job.end is not None:
             continue
-        if it.stop is not None and seen.job.stopped is None:
+        if (stop := it.course.stop) is not None and seen.job.stopped is None:
             yield Stop(
                 job=seen.job.name,
                 replica=seen.index,
-                reason=it.stop.reason,
-                message=it.stop.message,
+                reason=stop.reason,
+                message=stop.message,
                 basis=_basis(seen.job, seen.pods),
             )
 
@@ -76,7 +76,8 @@ def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
 def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Replace]:
     """Yield the replacement of each pod that no kubelet heals; one that is being deleted is."""
     for seen, it in zip(observed.replicas, each, strict=True):
-        if it.replace is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
+        why = it.course.replace
+        if why is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
             continue
         mark = seen.job.replaced
         marked = mark is not None and mark.pod == seen.pod.uid
@@ -86,8 +87,8 @@ def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Repla
             pod=seen.pod.name,
             uid=seen.pod.uid,
             times=(mark.times if mark is not None else 0) + (not marked),
-            reason=it.replace.reason,
-            message=it.replace.message,
+            reason=why.reason,
+            message=why.message,
             marked=marked,
             basis=_basis(seen.job, seen.pods),
         )

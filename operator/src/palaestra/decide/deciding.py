@@ -13,6 +13,7 @@ from palaestra.decide.decision import Decision
 from palaestra.decide.edits import edits
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import of_actions, of_change
+from palaestra.decide.judging import Course
 from palaestra.decide.moments import first_of, seconds_to, whole
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.remembering import late_word
@@ -46,7 +47,7 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
         *actions(job, observed, prepared, each),
         *expired(job.metadata.name, job.metadata.uid, expiry, status, now),
     )
-    waits_s = (seconds_to(expiry, now), *(left_s for it in each for left_s in it.left_s))
+    waits_s = (seconds_to(expiry, now), *(left_s for it in each for left_s in it.course.left_s))
     return Decision(
         status=status,
         actions=todo,
@@ -62,9 +63,9 @@ def _record(job: TrainingJob, each: Sequence[Decided], status: Status, times: Ti
         waits={
             (it.status.index, *wait.key): times.since_s(it.status.index, wait)
             for it in each
-            for wait in it.waits
+            for wait in it.course.waits
         },
-        troubles={it.status.index: it.trouble for it in each if it.trouble is not None},
+        troubles={it.status.index: it.course.trouble for it in each if it.course.trouble is not None},
         active_s=times.active_s(job.status.active_seconds),
         active_at_s=times.clock_s if status.active_since is not None else None,
     )
@@ -84,7 +85,7 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
     )
     if old.phase in TERMINAL or job.status.phase in TERMINAL:
         late = old.model_copy(update={"last_attempt": late_word(situation)})
-        return Decided(status=late, stop=_still_to_stop(old, seen))
+        return Decided(status=late, course=Course(stop=_still_to_stop(old, seen)))
     return decided(situation)
 
 

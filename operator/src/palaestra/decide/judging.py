@@ -37,19 +37,18 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Judged:
-    """What follows for a replica.
+class Course:
+    """What follows for a replica, beside where it stands.
 
     Attributes:
-        verdict: where it stands, and why.
         stop: why to stop it for good; None: it goes on.
         replace: why its pod is replaced; None: it is not.
         left_s: seconds after which time alone may change something.
-        waits: what is waited for.
-        trouble: what keeps it from its first step; None: nothing that has a name, or it was made.
+        waits: what is waited for, to be remembered until the next look.
+        trouble: what keeps it from its first step, to be remembered too; None: nothing that has a name, or it
+            was made.
     """
 
-    verdict: Verdict
     stop: Told | None = None
     replace: Told | None = None
     left_s: tuple[float, ...] = ()
@@ -57,27 +56,27 @@ class Judged:
     trouble: Trouble | None = None
 
 
-def judge(it: Situation) -> Judged:
-    """Return what follows for a replica, by the first checks of the list that hold."""
+def judge(it: Situation) -> tuple[Verdict, Course]:
+    """Return where a replica stands and what follows, by the first checks of the list that hold."""
     asked = [(kind, finding) for kind, check in JUDGED if (finding := check(it)) is not None]
     left_s = tuple(finding.left_s for _, finding in asked if finding.left_s > 0)
     waits = tuple(finding.wait for _, finding in asked if finding.wait is not None)
     holding = [(kind, finding) for kind, finding in asked if finding.left_s <= 0]
     if (end := _first(holding, Kind.ENDED)) is not None:
-        return Judged(verdict=_verdict(it, end), waits=waits)
+        return _verdict(it, end), Course(waits=waits)
     stop = _first(holding, Kind.FINAL)
     if stop is not None and it.seen.job is None:  # there is nothing to stop, and nothing will be made
-        return Judged(verdict=Verdict(phase=Phase.FAILED, told=stop.told))
+        return Verdict(phase=Phase.FAILED, told=stop.told), Course()
     kind, shown = next((kind, each) for kind, each in holding if kind not in {Kind.ENDED, Kind.FINAL})
     replaced = kind is Kind.COUNTED and stop is None
-    return Judged(
-        verdict=_verdict(it, _refused(it, shown) if replaced else shown),
+    course = Course(
         stop=None if stop is None else stop.told,
         replace=shown.told if replaced else None,
         left_s=left_s,
         waits=waits,
         trouble=_trouble(it, shown.told) if FIRST_STEP in {each.key for each in waits} else None,
     )
+    return _verdict(it, _refused(it, shown) if replaced else shown), course
 
 
 def start_timeout(it: Situation) -> Finding | None:

@@ -1,49 +1,27 @@
 """One replica: from what its status said and what is seen to its status now, and what is done about it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from palaestra.api.status import TERMINAL, ReplicaStatus
-from palaestra.decide.conditions import Told
-from palaestra.decide.judging import judge
+from palaestra.decide.judging import Course, judge
 from palaestra.decide.memory import memory_kills
 from palaestra.decide.progress import progress
 from palaestra.decide.remembering import last_attempt
 from palaestra.decide.situation import Situation, Verdict
-from palaestra.decide.times import Trouble, Wait
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decided:
-    """What follows for a replica.
-
-    Attributes:
-        status: how it stands.
-        stop: why to stop it; None: it goes on.
-        replace: why to replace its pod; None: it stays.
-        left_s: seconds after which time alone may change something.
-        waits: what is waited for, to be remembered until the next look.
-        trouble: what keeps it from its first step, to be remembered too; None: nothing that has a name.
-    """
+    """The status of a replica, and what follows for it."""
 
     status: ReplicaStatus
-    stop: Told | None = None
-    replace: Told | None = None
-    left_s: tuple[float, ...] = ()
-    waits: tuple[Wait, ...] = ()
-    trouble: Trouble | None = None
+    course: Course = field(default_factory=Course)
 
 
 def decided(it: Situation) -> Decided:
     """Return what follows for a replica that had not ended."""
-    judged = judge(it)
-    return Decided(
-        status=_status(it, judged.verdict),
-        stop=judged.stop,
-        replace=judged.replace,
-        left_s=judged.left_s,
-        waits=judged.waits,
-        trouble=judged.trouble,
-    )
+    verdict, course = judge(it)
+    return Decided(status=_status(it, verdict), course=course)
 
 
 def _status(it: Situation, verdict: Verdict) -> ReplicaStatus:
