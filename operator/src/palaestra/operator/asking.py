@@ -1,0 +1,119 @@
+"""Ask the API server about objects that lack something: seldom, in turns, and of a bounded number.
+
+A watch would be expensive, and the answers are rarely needed. An object is asked about when it has lacked
+something for some seconds, and then at growing pauses. All objects of one `Asking` share a few requests a
+second and a bounded memory, so that a namespace with thousands of them takes nothing from the others.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from palaestra.operator.memory import Item, Memory
+from palaestra.operator.poller import Key
+
+PATIENCE_S = 5.0  # that an object may lack something
+RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the one before
+LONGEST_PAUSE_S = 300.0
+RATE = 4.0  # requests a second, about all objects together; with the one that is saved up, 5 in any second
+
+Fact = TypeVar("Fact")
+Ask = Callable[[str, Item], Fact | None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answers(Generic[Item, Fact]):
+    """What is known of objects that lack something.
+
+    Attributes:
+        facts: the last answer about each; an object without one is absent.
+        unasked: those about which nobody is asked, as there are too many.
+        again_s: when to look again; None: nothing is lacking.
+    """
+
+    facts: Mapping[Item, Fact]
+    unasked: frozenset[Item] = frozenset()
+    again_s: float | None = None
+
+
+@dataclass(slots=True)
+class _Lack(Generic[Fact]):
+    """What an object lacks: when to ask (again), and the last answer."""
+
+    due: float
+    pause_s: float = RECHECK_S
+    queued: bool = False
+    fact: Fact | None = None
+
+
+class Asking(Memory[Item, _Lack[Fact]]):
+    """The answers about objects that lack something, by TrainingJob and object.
+
+    Args:
+        ask: returns the answer about an object of a namespace; None: there is none.
+        clock: seconds that never go back.
+    """
+
+    def __init__(self, ask: Ask[Item, Fact], clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._ask = ask
+        self._clock = clock
+        self._turns = _Turns(clock())
+
+    def about(self, key: Key, uid: str, lacking: Collection[Item]) -> Answers[Item, Fact]:
+        """Return what is known about those objects of a TrainingJob that lack something.
+
+        Raises:
+            ApiError: an object had to be asked about, and there was no answer; the next try is after a pause.
+        """
+        known = self.known(key, uid)
+        due = self._clock() + PATIENCE_S
+        kept = self.keep(key, uid, {item: known.get(item) or _Lack(due) for item in lacking})
+        for item, lack in kept.items():
+            if self._is_due(lack):
+                lack.fact = self._ask(key[0], item)
+        unasked = frozenset(set(lacking) - kept.keys())
+        waits_s = [max(lack.due - self._clock(), 0.0) for lack in kept.values()]
+        return Answers(
+            facts={item: lack.fact for item, lack in kept.items() if lack.fact is not None},
+            unasked=unasked,
+            again_s=min([*waits_s, *(LONGEST_PAUSE_S for _ in unasked)], default=None),
+        )
+
+    def _is_due(self, lack: _Lack[Fact]) -> bool:
+        """Return whether to ask now; if so, the pause after that has begun."""
+        now = self._clock()
+        if now < lack.due:
+            return False
+        wait_s = self._turns.wait_s(now, queued=lack.queued)
+        lack.queued = wait_s > 0
+        lack.due = now + (wait_s or lack.pause_s)
+        if not lack.queued:
+            lack.pause_s = min(lack.pause_s * 2, LONGEST_PAUSE_S)
+        return not lack.queued
+
+
+class _Turns:
+    """Who may ask when: a bucket of one token, and a queue of moments for those that find it empty."""
+
+    def __init__(self, now: float) -> None:
+        self._lock = threading.Lock()
+        self._tokens, self._filled = 1.0, now
+        self._end = now  # of the queue
+
+    def wait_s(self, now: float, *, queued: bool) -> float:
+        """Return the seconds after which to come again; 0: this is the turn."""
+        with self._lock:
+            self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
+            self._filled = now
+            if not queued and now < self._end:
+                wait_s = self._end - now
+                self._end += 1 / RATE
+                return wait_s
+            if self._tokens < 1.0:
+                return (1.0 - self._tokens) / RATE
+            self._tokens = 0.0
+            self._end = max(self._end, now + 1 / RATE)
+            return 0.0
