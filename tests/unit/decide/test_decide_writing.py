@@ -65,6 +65,34 @@ def test_progress_waits_for_half_a_minute(change):
     assert write_in_s(OLD, new, None) == 0
 
 
+def queued(words):
+    """Return the status of a job that waits in a queue, in Kueue's words."""
+    told = {"reason": "Queued", "message": f"waits in queue trainings for Kueue: {words}"}
+    conditions = [{"type": "Suspended", "status": "True", **told}]
+    return {"phase": "Suspended", "conditions": conditions, "replicas": [{"index": 0, **told}]}
+
+
+@pytest.mark.parametrize(
+    ("words", "wait_s"),
+    [
+        ("cpu in flavor any-machine, 1.5 more needed", 25),
+        ("memory in flavor any-machine, 25Mi more needed", 0),
+    ],
+)
+def test_amounts_that_change_with_each_job_of_the_queue_are_written_as_progress(words, wait_s):
+    """What is short is news; how much of it changes whenever another job comes or goes."""
+    old = queued("cpu in flavor any-machine, 425m more needed")
+
+    assert write_in_s(old, queued(words), 5) == wait_s
+
+
+def test_a_number_in_another_message_is_news():
+    """How often a sidecar has crashed, for instance."""
+    old = changed({"reason": "SidecarCrashLoop", "message": "crashed 3 times"})
+
+    assert write_in_s(old, changed({"reason": "SidecarCrashLoop", "message": "crashed 4 times"}), 5) == 0
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -1,8 +1,13 @@
-"""When a status is worth a write: what people wait for at once, progress every half minute but its first."""
+"""When a status is worth a write: what people wait for at once, progress every half minute but its first.
 
+The amounts that Kueue says a job lacks count as progress: other jobs of the queue change them all the time.
+"""
+
+import re
 from collections.abc import Mapping
 from typing import Any
 
+from palaestra.api.reasons import Reason
 from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
@@ -13,6 +18,9 @@ _OF_REPLICA = frozenset(
     {"step", "target", "successRate", "meanReturn", "stepsPerSecond", "simulators", "lastCheckpoint",
      "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
+
+
+_AMOUNT = re.compile(r"\d[\w.]*")  # such as 425m or 1.5Gi
 
 
 def as_data(status: Status) -> dict[str, Any]:
@@ -44,16 +52,23 @@ def _without(status: Mapping[str, Any], names: frozenset[str]) -> dict[str, Any]
 
 def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
     rest = _without(status, _OF_JOB)
-    replicas = rest.get("replicas")
-    if isinstance(replicas, list):
-        rest["replicas"] = [_rest(each) for each in replicas]
+    for name, kept in (("replicas", _rest), ("conditions", _without_amounts)):
+        if isinstance(items := rest.get(name), list):
+            rest[name] = [kept(each) for each in items]
     return rest
+
+
+def _without_amounts(told: Any) -> Any:
+    """Return a condition or replica; of one that waits in a queue, without the amounts in its message."""
+    if not isinstance(told, Mapping) or told.get("reason") != Reason.QUEUED:
+        return told
+    return {**told, "message": _AMOUNT.sub("", str(told.get("message")))}
 
 
 def _rest(replica: Any) -> Any:
     if not isinstance(replica, Mapping):
         return replica
-    kept = {name: value for name, value in replica.items() if name not in _OF_REPLICA}
+    kept = {name: value for name, value in _without_amounts(replica).items() if name not in _OF_REPLICA}
     kept |= dict.fromkeys(_FIRST & replica.keys())  # that there is one is news; how large it is, is not
     restarts = kept.get("restarts")
     if isinstance(restarts, Mapping):  # those of simulators are as frequent as faults are
