@@ -14,7 +14,7 @@ import yaml
 from tests.cluster.images import version_of
 from tests.cluster.kueue import REPOSITORY
 from tests.e2e.cluster import Cluster, Object
-from tests.e2e.namespace import Namespace
+from tests.e2e.namespace import LONG_S, Namespace
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[2]
@@ -106,6 +106,17 @@ def wait_for_words(space: Namespace, job: str, kind: str, told: str) -> str:
         return found if told in found else ""
 
     return space.wait(said)
+
+
+def wait_for_message(space: Namespace, job: str, told: str) -> str:
+    """Wait until the status of a TrainingJob's first replica has these words, and return its message."""
+    path = "jsonpath={.status.replicas[0].message}"
+
+    def said() -> str:
+        found = space.cluster.kubectl("get", "tj", job, f"--namespace={space.name}", f"--output={path}")
+        return found if told in found else ""
+
+    return space.wait(said, LONG_S)
 
 
 def words(found: Object, kind: str) -> str:

@@ -14,6 +14,7 @@ from tests.e2e.kueue import (
     change_queue,
     leave_room_for_one,
     scheduling,
+    wait_for_message,
     wait_for_words,
     words,
     workload,
@@ -27,6 +28,7 @@ AMID = 150
 TRAINING = {"steps": 2000, "checkpoint": {"everySteps": EVERY_STEPS}, "evaluation": {"everySteps": 0}}
 # As large as a training, and over at once.
 ENDS = {"command": ["bash", "-c", "exit 0"], "evaluation": {"everySteps": 0}}
+SHORT = "insufficient unused quota for"
 # Why a job is never admitted, and Kueue's words for it.
 NEVER = {
     "nowhere": ({}, "nowhere", "LocalQueue nowhere doesn't exist"),
@@ -45,7 +47,7 @@ class Story:
 
     Attributes:
         waited: the replica of `patient` while `everyday` had the place.
-        short: Kueue's words then.
+        short: the message of its status then.
         at: the step of `everyday` when `urgent` came.
         preempted: the replica of `everyday` after that.
         why: Kueue's words then.
@@ -80,7 +82,7 @@ def story(robots):
     robots.apply(make_job("everyday", trainer=TRAINING, backoffLimit=0, scheduling=scheduling()))
     leave_room_for_one(robots, "everyday")
     robots.apply(make_job("patient", trainer=ENDS, scheduling=scheduling()))
-    short = wait_for_words(robots, "patient", "QuotaReserved", "insufficient unused quota for")
+    short = wait_for_message(robots, "patient", SHORT)
     waited = robots.wait_for_reason("patient", "Queued")
     _, at = robots.wait_for_step("everyday", AMID)
 
@@ -95,12 +97,12 @@ def story(robots):
     return Story(waited, short, at, preempted, why, attempts, {name: robots.replica(name) for name in names})
 
 
-def test_a_job_that_has_no_room_waits_and_its_status_names_the_queue(story):
-    """What is short is Kueue's to tell, in the Workload that docs/queues.md shows how to read."""
+def test_a_job_that_has_no_room_waits_and_its_status_has_the_words_of_kueue(story):
+    """What is short, without a right to read Workloads."""
     assert story.waited["phase"] == "Suspended"
-    assert story.waited["message"] == "waits in queue trainings for Kueue"
+    assert story.short.startswith("waits in queue trainings for Kueue: ")
+    assert SHORT in story.short
     assert story.waited["attempt"] == 0
-    assert "insufficient unused quota for" in story.short
 
 
 def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
@@ -137,12 +139,13 @@ def test_waiting_counts_as_nothing_and_a_preemption_as_a_suspension(story):
 
 
 @pytest.mark.parametrize("name", NEVER)
-def test_why_a_job_is_never_admitted_is_told_by_its_workload(name, robots):
-    """The page shows how to read it, and what helps."""
+def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
+    """The page shows the words, and what helps."""
     asked, queue, told = NEVER[name]
     trainer = ENDS | {"resources": {"requests": asked, "limits": asked}}
     robots.apply(make_job(name, trainer=trainer, scheduling={"queueName": queue}))
 
+    assert f"waits in queue {queue} for Kueue: " in wait_for_message(robots, name, told)
     assert told in wait_for_words(robots, name, "QuotaReserved", told)
     assert robots.wait_for_reason(name, "Queued")
 

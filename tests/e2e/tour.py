@@ -3,6 +3,7 @@
 What a person does there, not what the rights are: a right that nobody's wish needs is found by it.
 """
 
+from palaestra.plan.job import QUEUE_LABEL
 from palaestra_sim.world import builtin
 from tests.e2e.cluster import Object
 from tests.e2e.jobs import LITTLE, WAIT, make_claim, make_job
@@ -16,6 +17,7 @@ SPENT = {"metadata": {"name": "spent"}, "spec": {"hard": {"pods": "0"}}}
 def tour(place: Namespace, operators: str) -> None:
     """Have the operator whose pods are in the namespace `operators` do in `place` all that it ever does."""
     refer(place)
+    wait_in_queue(place)  # the operator asks why after 5 s; the steps from here on take longer
     give_up(place)
     stop_suspended(place)
     suspend(place, flag=False)
@@ -42,6 +44,12 @@ def refer(place: Namespace) -> None:
     for name in ("claimed", "mapped", "paused"):
         place.wait(lambda name=name: place.select("jobs", name), LONG_S)
     place.wait(lambda: "NameTaken" in place.reasons("taken"), LONG_S)
+
+
+def wait_in_queue(place: Namespace) -> None:
+    """Give a suspended Job a queue, as Kueue does in a namespace with a default; it is never admitted."""
+    place.cluster.patch("jobs", place.name, "mapped-0", {"metadata": {"labels": {QUEUE_LABEL: "default"}}})
+    place.wait(lambda: "Queued" in place.reasons("mapped"), LONG_S)
 
 
 def give_up(place: Namespace) -> None:

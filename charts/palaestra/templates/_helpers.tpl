@@ -84,4 +84,8 @@ readOnlyRootFilesystem: true
 - apiGroups: [""]
   resources: [events]
   verbs: [get, list, create, patch] # list: why a Job's pods could not be made
+# Why Kueue does not admit a Job: authors of TrainingJobs need not be allowed to read Workloads.
+- apiGroups: [kueue.x-k8s.io]
+  resources: [workloads]
+  verbs: [list]
 {{- end }}

@@ -67,28 +67,27 @@ def world_map() -> Object:
 
 def local_queues() -> Object:
     """Return the kind by which a cluster has heard of Kueue; the test plays it."""
-    kinds = {
-        "kind": "LocalQueue",
-        "listKind": "LocalQueueList",
-        "plural": "localqueues",
-        "singular": "localqueue",
-    }
+    return kind_of_kueue("LocalQueue", "v1beta1")
+
+
+def kind_of_kueue(kind: str, version: str) -> Object:
+    """Return a kind of Kueue's that takes any fields."""
+    singular = kind.lower()
+    names = {"kind": kind, "listKind": f"{kind}List", "plural": f"{singular}s", "singular": singular}
     schema = {"openAPIV3Schema": {"type": "object", "x-kubernetes-preserve-unknown-fields": True}}
-    definition = {
-        "apiVersion": "apiextensions.k8s.io/v1",
-        "kind": "CustomResourceDefinition",
-        "metadata": {"name": "localqueues.kueue.x-k8s.io"},
-        "spec": {
-            "group": "kueue.x-k8s.io",
-            "names": kinds,
-            "scope": "Namespaced",
-            "versions": [{"name": "v1beta1", "served": True, "storage": True, "schema": schema}],
-        },
-    }
     # A name of a group that belongs to Kubernetes' own projects needs their approval.
     approval = {"api-approved.kubernetes.io": "unapproved, plays Kueue in a test"}
-    definition["metadata"]["annotations"] = approval
-    return definition
+    return {
+        "apiVersion": "apiextensions.k8s.io/v1",
+        "kind": "CustomResourceDefinition",
+        "metadata": {"name": f"{singular}s.kueue.x-k8s.io", "annotations": approval},
+        "spec": {
+            "group": "kueue.x-k8s.io",
+            "names": names,
+            "scope": "Namespaced",
+            "versions": [{"name": version, "served": True, "storage": True, "schema": schema}],
+        },
+    }
 
 
 def stranger(name: str) -> Object:

@@ -4,6 +4,7 @@ from palaestra.cluster.resources import CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
 from palaestra.observe.jobs import REPLACED
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
+from palaestra.plan.job import QUEUE_LABEL
 from tests.chart.installation import installed
 from tests.chart.rights import Right, granted, uses
 from tests.integration.operator.cluster import stranger, world_map, world_of
@@ -40,9 +41,11 @@ def test_every_right_is_used_and_none_is_missing(place, start, control_plane):
         operator.stop()
         operator = start(elect=True)
     eventually(lambda: place.get(TRAINING_JOBS, "brief") is None)
+    wait_in_queue(place)
     limited(place, quota(pods=True))
     place.train("refused")
     eventually(lambda: "PodsRefused" in place.events("refused"))
+    eventually(lambda: Right("kueue.x-k8s.io", "workloads", "list") in used(control_plane))
 
     allowed = granted(installed(), NAMESPACE, NAME)
     assert {right for right in used(control_plane) if right.resource != "secrets"} == allowed - UNSEEN
@@ -64,6 +67,13 @@ def replace_pod(place):
     place.api.merge(JOBS, place.name, "job-0", {"metadata": {"annotations": {REPLACED: mark}}})
     eventually(lambda: "deletionTimestamp" in place.get(PODS, pod["metadata"]["name"])["metadata"])
     place.take(pod, "EvictionByEvictionAPI", "Eviction API: evicting", phase="Failed")
+
+
+def wait_in_queue(place):
+    """Give a suspended Job a queue, as Kueue does by a namespace's default; nobody admits it."""
+    place.train("queued", suspend=True)
+    eventually(lambda: place.get(JOBS, "queued-0"))
+    place.api.merge(JOBS, place.name, "queued-0", {"metadata": {"labels": {QUEUE_LABEL: "default"}}})
 
 
 def suspend(place, *, flag):

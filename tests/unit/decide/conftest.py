@@ -71,6 +71,7 @@ class Scene:
         self.denied: dict[int | None, str] = {}
         self.kueue = False
         self.switchers: dict[str, str] = {}
+        self.unadmitted: dict[str, str] = {}
         self.deleted = False
         self.budget = False  # a disruption budget that allows no eviction
         self.pods_made = 0
@@ -93,7 +94,7 @@ class Scene:
         job = accept(deepcopy(self.raw))
         sources = {each: self.there.get((each.kind.value, each.name)) for each in references(job)}
         known = {"polled": self.polled, "denied": self.denied, "switchers": self.switchers}
-        objects = Objects(**deepcopy(self.objects), **known)
+        objects = Objects(**deepcopy(self.objects), **known, unadmitted=self.unadmitted)
         observed = replace(observe(job, objects), sources=sources, kueue=self.kueue)
         times = Times(now=self.now, clock_s=self.clock_s, record=self.record)
         return decide(job, observed, prepare(job, observed, self.layout), times)

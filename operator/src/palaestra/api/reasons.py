@@ -199,9 +199,9 @@ ROWS: dict[Reason, Row] = {
         "created {objects}", "the objects of a replica were created", "nothing", warning=False
     ),
     Reason.QUEUED: Row(
-        "waits in queue {queue} for Kueue{again}",
-        "Kueue has not admitted the replica yet, or has taken it back",
-        "look at the Workload with `kubectl describe`: it tells what is short ([queues](queues.md))",
+        "waits in queue {queue} for Kueue{taken}{why}{again}",
+        "Kueue has not admitted the replica yet, or has taken it back; the words after the colon are Kueue's",
+        "wait, or change what the message names: see [queues](queues.md#train-in-a-queue)",
         warning=False,
     ),
     Reason.SUSPENDING: Row(

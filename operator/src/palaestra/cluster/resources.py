@@ -65,6 +65,8 @@ EVENTS = Resource(
 NETWORK_POLICIES = Resource(
     api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
 )
+# Kueue's, served since 0.15; the version that it stores since 0.16, so that no webhook has to convert it.
+WORKLOADS = Resource(api_version="kueue.x-k8s.io/v1beta2", kind="Workload", plural="workloads")
 LEASES = Resource(api_version="coordination.k8s.io/v1", kind="Lease", plural="leases")
 NODES = Resource(api_version="v1", kind="Node", plural="nodes", namespaced=False)
 NAMESPACES = Resource(api_version="v1", kind="Namespace", plural="namespaces", namespaced=False)

@@ -19,6 +19,7 @@ from palaestra_sim.protocol.status import ExitCode, Termination
 
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # what a deletion may lead to
 GONE = "its pod is gone; no last word"
+TAKEN, AGAIN = ", which took it back", "; it goes on from the last checkpoint"
 _HUNG = "SimulatorHung"  # how a last word begins
 
 
@@ -209,13 +210,13 @@ def stop_of(job: JobView) -> Told | None:
     return Told(reason=Reason.known(reason), message=message or f"stopped: {reason}")
 
 
-def paused(it: Situation) -> Told:
-    """Return why a Job is suspended, and by whom: with a queue that is Kueue's doing."""
+def paused(it: Situation, why: str = "") -> Told:
+    """Return why a Job is suspended, and by whom: with a queue that is Kueue's doing, maybe in its words."""
     queue = (it.seen.job.queue if it.seen.job else "") or it.job.spec.scheduling.queue_name
     if not queue:
         return told(Reason.SUSPENDED, by=suspended_by(it.job, it.seen))
-    again = ", which took it back; it goes on from the last checkpoint" if it.counted.attempt else ""
-    return told(Reason.QUEUED, queue=queue, again=again)
+    taken, again = (TAKEN, AGAIN) if it.counted.attempt else ("", "")
+    return told(Reason.QUEUED, queue=queue, taken=taken, why=f": {why}" if why else "", again=again)
 
 
 def success(word: Termination | None) -> str:

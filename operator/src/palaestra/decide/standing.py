@@ -1,8 +1,11 @@
 """Where a replica stands that goes on, and of which nothing is wrong."""
 
+from dataclasses import replace
+
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
-from palaestra.decide.attempts import paused
+from palaestra.decide.attempts import AGAIN, paused
+from palaestra.decide.conditions import Told
 from palaestra.decide.situation import Finding, Situation, found, told
 from palaestra.decide.suspending import ended_by_suspension, unheeded
 
@@ -27,7 +30,19 @@ def suspending(it: Situation) -> Finding | None:
 
 def suspended(it: Situation) -> Finding | None:
     """`spec.suspend` or a queue keeps it from running."""
-    return Finding(told=paused(it), phase=Phase.SUSPENDED) if it.suspended else None
+    if not it.suspended:
+        return None
+    why = paused(it, it.seen.unadmitted or "")
+    return Finding(told=replace(why, message=_with_words(it, why)), phase=Phase.SUSPENDED)
+
+
+def _with_words(it: Situation, why: Told) -> str:
+    """Return the message of `why`; an operator that was restarted keeps Kueue's words until it has asked."""
+    if it.seen.unasked:
+        return why.message + UNASKED
+    before, plain = it.old.message or "", why.message.removesuffix(AGAIN)
+    waited = it.old.reason == why.reason == Reason.QUEUED and before.startswith(f"{plain}: ")
+    return before if waited and it.seen.unadmitted is None else why.message
 
 
 def trainer_has_ended(it: Situation) -> Finding | None:

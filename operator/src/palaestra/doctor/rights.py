@@ -59,6 +59,7 @@ OPERATOR = (
     may("", "persistentvolumeclaims", "get list watch create"),
     may("networking.k8s.io", "networkpolicies", "list watch create patch"),
     may("", "events", "get list create patch"),
+    may("kueue.x-k8s.io", "workloads", "list"),
 )
 
 PERSON: tuple[tuple[str, tuple[Right, ...]], ...] = (

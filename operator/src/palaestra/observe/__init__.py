@@ -31,6 +31,7 @@ from palaestra.observe.views import (
     SourceKind,
     Suspended,
 )
+from palaestra.observe.workloads import why_not_admitted
 
 __all__ = [
     "ContainerKind",
@@ -57,4 +58,5 @@ __all__ = [
     "references",
     "trimmed",
     "whole",
+    "why_not_admitted",
 ]

@@ -71,6 +71,7 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
         refused=_refused(ours, newest, objects) if ours else None,
         denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
         unmounted=_unmounted(newest, objects) if newest else "",
+        unadmitted=objects.unadmitted.get(ours.uid) if ours else None,
         unasked=not objects.unasked.isdisjoint({ours.uid if ours else "", newest.uid if newest else ""}),
         switcher=one_line(objects.switchers.get(ours.uid) or "", MOST_NAME) if ours else "",
     )

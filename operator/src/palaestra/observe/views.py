@@ -52,7 +52,8 @@ class Objects:
         jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
             a Job that was found to have one of our names belongs among `jobs`, whoever owns it.
         events: FailedCreate events about those Jobs, and warnings about pods that wait for volumes.
-        unasked: uids of Jobs and pods about which no event was asked for, though they lack something.
+        unadmitted: by a Job's uid why Kueue has not admitted it, where that was asked for.
+        unasked: uids of Jobs and pods about which nothing was asked, though they lack something.
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
         denied: what the API server said when it last refused an object of a replica; None: an object of
             the whole job. Absent: nothing is refused.
@@ -66,6 +67,7 @@ class Objects:
     config_maps: Sequence[Raw] = ()
     policies: Sequence[Raw] = ()
     events: Sequence[Raw] = ()
+    unadmitted: Mapping[str, str] = field(default_factory=dict)
     unasked: frozenset[str] = frozenset()
     polled: Mapping[str, Polled] = field(default_factory=dict)
     denied: Mapping[int | None, str] = field(default_factory=dict)
@@ -284,7 +286,8 @@ class ReplicaObserved:
         denied: why an object of the replica could not be made; "": it could.
         unmounted: why the newest pod's volumes are not there, in the cluster's words; "": they are, or
             nobody said so.
-        unasked: its pod, or the pod's volumes, are not there, and nobody was asked why.
+        unadmitted: why Kueue has not admitted the Job; "": it has, or gives no reason; None: not asked yet.
+        unasked: its pod, the pod's volumes or Kueue's admission are not there, and nobody was asked why.
         switcher: the field manager that set the Job's `spec.suspend`, where it is not as the operator set it;
             "": it is, or the manager is unknown.
     """
@@ -300,6 +303,7 @@ class ReplicaObserved:
     refused: CreateFailure | None = None
     denied: str = ""
     unmounted: str = ""
+    unadmitted: str | None = None
     unasked: bool = False
     switcher: str = ""
 

@@ -1,8 +1,8 @@
 """Look at one TrainingJob: what the caches hold of it, and what has to be asked for.
 
 Some things are too rare to be watched by everybody all the time, and are asked for only while a job
-waits for them: what it refers to by name, why its pods cannot be made, a Job of somebody else that has
-a name of ours, and whether there is a Kueue.
+waits for them: what it refers to by name, why its pods cannot be made, why Kueue does not admit it, a Job of
+somebody else that has a name of ours, and whether there is a Kueue.
 """
 
 import time
@@ -22,6 +22,7 @@ from palaestra.cluster.resources import (
 )
 from palaestra.decide import complete, resuming
 from palaestra.observe import Objects, Observed, Polled, Raw, Source, SourceKind, observe, references, whole
+from palaestra.operator.admissions import Admissions
 from palaestra.operator.caches import Caches
 from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denials
@@ -74,6 +75,7 @@ class Looking:
         self._denials = denials
         self._polled = polled
         self._refusals = Refusals(api)
+        self._admissions = Admissions(api)
         self._switchers = Switchers(api)
         self._kueue = (-KUEUE_S, False)
 
@@ -87,6 +89,7 @@ class Looking:
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
         strangers = self._strangers.among(key, uid, {each["metadata"]["name"] for each in jobs})
         refusals = self._refusals.of(key, uid, jobs, pods)
+        admissions = self._admissions.of(key, uid, jobs, pods)
         objects = Objects(
             jobs=[*jobs, *strangers],
             pods=pods,
@@ -94,15 +97,15 @@ class Looking:
             config_maps=self._caches.children(CONFIG_MAPS, key),
             policies=self._caches.children(NETWORK_POLICIES, key),
             events=list(refusals.facts.values()),
-            unasked=frozenset(each for each, _ in refusals.unasked),
+            unadmitted=admissions.facts,
+            unasked=admissions.unasked | {each for each, _ in refusals.unasked},
             polled=self._polled(),
             denied=self._denials.known(key, uid),
             switchers=self._switchers.of(key, uid, job, jobs),
         )
         observed, asked_s = self._asked(job, observe(job, objects))
-        return Seen(
-            observed=observed, again_s=earliest(refusals.again_s, asked_s, RECHECK_S if strangers else None)
-        )
+        met_s = RECHECK_S if strangers else None
+        return Seen(observed=observed, again_s=earliest(refusals.again_s, admissions.again_s, asked_s, met_s))
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
         """Return what was seen of a job's copy, with all that the whole job refers to.
@@ -131,7 +134,7 @@ class Looking:
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
-        for each in (self._strangers, self._denials, self._refusals, self._switchers):
+        for each in (self._strangers, self._denials, self._refusals, self._admissions, self._switchers):
             each.forget(key)
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:

@@ -1,0 +1,116 @@
+"""What the status says of a replica that waits in a queue of Kueue's."""
+
+import pytest
+
+from palaestra.api.reasons import LONGEST_MESSAGE
+from palaestra.api.status import Phase
+
+SHORT = "insufficient unused quota for cpu in flavor any-machine, 425m more needed"
+WAITS = "waits in queue robots for Kueue"
+TAKEN = f"{WAITS}, which took it back"
+AGAIN = "; it goes on from the last checkpoint"
+
+
+@pytest.fixture
+def queued(make_scene):
+    """A job in a queue, that has not been admitted."""
+    scene = make_scene(scheduling={"queueName": "robots"})
+    scene.kueue = True
+    scene.settle()
+    return scene
+
+
+def say(scene, words):
+    """Let the Job's Workload say why it is not admitted."""
+    scene.unadmitted = {scene.job()["metadata"]["uid"]: words}
+    return scene.settle()
+
+
+def test_the_status_has_the_words_of_kueue(queued):
+    """Authors of jobs need not be allowed to read Workloads."""
+    decision = say(queued, SHORT)
+
+    assert (queued.status.phase, queued.replica().reason) == (Phase.SUSPENDED, "Queued")
+    assert queued.replica().message == f"{WAITS}: {SHORT}"
+    assert {each.message for each in queued.status.conditions if each.type == "Suspended"} == {
+        f"{WAITS}: {SHORT}"
+    }
+    assert decision.events == (), "the event of the reason was emitted before the words were known"
+
+
+def admit_and_take_back(scene, last_word):
+    """Let Kueue admit the job, and take it back from its pod."""
+    scene.job()["spec"]["suspend"] = False
+    pod = scene.running_pod()
+    scene.settle()
+    scene.job()["spec"]["suspend"] = True
+    scene.delete(pod)
+    scene.end(pod, 75, last_word())
+    scene.settle(5)
+
+
+def test_long_words_leave_the_rest_of_the_message_whole(queued, last_word):
+    """Kueue lists every flavor that it tried."""
+    admit_and_take_back(queued, last_word)
+
+    say(queued, "x" * 600)
+
+    message = queued.replica().message
+    assert message.startswith(f"{TAKEN}: xxx")
+    assert message.endswith(f"...{AGAIN}")
+    assert len(message) <= LONGEST_MESSAGE
+
+
+@pytest.mark.parametrize("words", [SHORT, "LocalQueue robots doesn't exist"])
+def test_an_operator_that_was_restarted_keeps_the_words_until_it_has_asked(words, queued):
+    """A thousand waiting jobs would else be written twice at each restart."""
+    say(queued, words)
+    before = queued.raw["status"]
+
+    queued.restart()
+    queued.unadmitted = {}
+    queued.settle()
+
+    assert queued.raw["status"] == before
+
+
+def test_words_that_no_longer_hold_are_dropped(queued):
+    """Kueue was asked, and gives no reason now."""
+    say(queued, SHORT)
+
+    say(queued, "")
+
+    assert queued.replica().message == WAITS
+
+
+def test_words_of_the_time_before_a_pod_are_not_kept(queued, last_word):
+    """It was admitted since; what it waits for now is something else."""
+    say(queued, SHORT)
+    queued.unadmitted = {}
+
+    admit_and_take_back(queued, last_word)
+
+    assert queued.replica().message == TAKEN + AGAIN
+
+
+def test_the_end_of_an_attempt_has_no_words_about_the_next(queued, last_word):
+    """Why Kueue took the replica back, and what it waits for since, are two things."""
+    admit_and_take_back(queued, last_word)
+
+    say(queued, SHORT)
+
+    assert queued.replica().message == f"{TAKEN}: {SHORT}{AGAIN}"
+    assert queued.replica().last_attempt.message == TAKEN + AGAIN
+
+
+def test_that_nobody_was_asked_is_told_once(queued):
+    """As of pods that are missing: the operator asks about 4,000 Jobs at most."""
+    say(queued, SHORT)
+    queued.unadmitted = {}
+    queued.objects["unasked"] = frozenset({queued.job()["metadata"]["uid"]})
+
+    for _ in range(2):
+        queued.settle()
+
+    assert queued.replica().message.startswith(f"{WAITS}; why that takes long was not asked")
+    assert queued.replica().message.count("was not asked") == 1
