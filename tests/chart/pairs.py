@@ -54,6 +54,7 @@ OTHERS: dict[str, Any] = {
     "tensorboard.enabled": True,
     "tensorboard.existingClaim": "runs",
     "tensorboard.namespace": "elsewhere",
+    "tensorboard.folder": "",
     "tensorboard.resources": RESOURCES,
     "jupyter.enabled": True,
     "jupyter.namespace": "elsewhere",

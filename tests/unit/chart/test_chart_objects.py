@@ -14,9 +14,10 @@ from palaestra.api.crd import crd
 from palaestra.cli import operator
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
+from palaestra_trainer.tensorboard_link import FOLDER
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
 from tests.chart.installation import SECRETS_ROLE
-from tests.chart.modes import DIGEST, MODES
+from tests.chart.modes import DIGEST, MODES, merged
 from tests.chart.rights import held
 
 CLUSTER_WIDE = {"ClusterRole", "ClusterRoleBinding", "CustomResourceDefinition"}
@@ -264,6 +265,15 @@ def test_tensorboard_changes_no_run(one):
 
     assert mounts["runs"]["readOnly"] is True
     assert pod["volumes"][0]["persistentVolumeClaim"] == {"claimName": "runs", "readOnly": True}
+
+
+@pytest.mark.parametrize(("chosen", "shown"), [({}, f"/runs/{FOLDER}"), ({"folder": ""}, "/runs")])
+def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
+    """It follows links, so with the whole claim it would show each run twice, once by a UID."""
+    made = objects(merged(MODES["offline"], {"tensorboard": chosen}))
+
+    [server] = pods(made)["palaestra-tensorboard"]["containers"]
+    assert server["command"][1] == f"--logdir={shown}"
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):

@@ -47,6 +47,9 @@ WRONG = [  # the value that is set, to what, and where below it the mistake is
     ("monitoring.prometheusRule.runbooks", "https://git.example.com/", ""),
     ("monitoring.dashboards.labels", {"grafana_dashboard": 1}, "/grafana_dashboard"),
     ("test.deadlineSeconds", -1, ""),
+    ("tensorboard.folder", "../secrets", ""),
+    ("tensorboard.folder", "/runs", ""),
+    ("tensorboard.folder", "runs --bind_all", ""),
     ("serviceAccount.name", "", ""),
 ]
 

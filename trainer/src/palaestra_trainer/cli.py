@@ -42,7 +42,8 @@ reads:
 writes:
   the run directory ({RUN_VARIABLE}): attempts.jsonl, checkpoints/, tensorboard/,
   evaluations.jsonl, model.zip (the best by evaluation), training.yaml and, at the end,
-  summary.json; the termination message (PALAESTRA_TERMINATION_LOG)
+  summary.json; the termination message (PALAESTRA_TERMINATION_LOG); on a claim, the link
+  tensorboard/<job>-<first 8 of its UID>/<replica> at its top
 
 A run directory with a checkpoint is resumed; one that is finished is reported.
 """

@@ -41,6 +41,7 @@ from palaestra_trainer.simulators.member import Member, Spared
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from palaestra_trainer.status_server import StatusServer
 from palaestra_trainer.summary import finished, summarise, write_summary
+from palaestra_trainer.tensorboard_link import link_curves
 from palaestra_trainer.termination import End, end_of, write_last_word
 from palaestra_trainer.watchdog import Watchdog, stalled
 
@@ -249,6 +250,7 @@ class Attempt:
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
         self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason)
+        link_curves(self._directory, self._configuration)
         log.info("training", attempt=attempt, reason=reason, target=self._configuration.steps)
 
     def _learn(self, model: BaseAlgorithm, conductor: Conductor) -> None:
