@@ -1,11 +1,14 @@
 """docs/install.md can be typed as it stands, from top to bottom."""
 
+import json
 import os
 import re
 import subprocess
 
 import pytest
+import yaml
 
+from palaestra.observe.sources import FOR_JOBS
 from tests.chart.helm import NAMESPACE, ROOT
 from tests.control_plane.programs import programs
 from tests.integration.chart.conftest import DEFINITION
@@ -21,6 +24,7 @@ helm uninstall palaestra --namespace {NAMESPACE} --ignore-not-found
 kubectl delete --ignore-not-found --filename manifests/install.yaml --filename manifests/crd.yaml
 kubectl delete --ignore-not-found --filename manifests/examples/platform/roles.yaml
 """
+IN_LAB = ("--namespace=lab", "--output=json")
 TYPED_S = 120
 
 
@@ -28,7 +32,7 @@ TYPED_S = 120
 def typed(cluster, kubectl, tmp_path):
     """Type some commands in a checkout, and return what they say."""
     kubectl("delete", "crd", DEFINITION, "--ignore-not-found")
-    for name in (NAMESPACE, "robots", "drones"):
+    for name in (NAMESPACE, "lab", "robots", "drones"):
         kubectl("delete", "namespace", name, "--ignore-not-found", "--wait")
     for name in ("charts", "manifests"):
         (tmp_path / name).symlink_to(ROOT / name)
@@ -65,6 +69,22 @@ def test_the_commands_for_a_registry_can_be_typed_after_the_installation(typed, 
 
     images = kubectl("get", "deployment", f"--namespace={NAMESPACE}", "--output=jsonpath={..image}")
     assert images.startswith("registry.example.com/robots/palaestra-operator@sha256:")
+
+
+def test_tensorboard_has_a_claim_that_jobs_may_name(typed, kubectl):
+    """No page made one: TensorBoard's pod waited for it, and a claim without the label holds each job."""
+    chapter = PAGE[PAGE.index("## TensorBoard and notebooks") : PAGE.index("## Upgrade")]
+    [job] = [yaml.safe_load(block) for block in blocks(chapter, "yaml")]
+
+    for block in (BLOCKS[0], *blocks(chapter, "sh")):
+        typed(block)
+
+    server = json.loads(kubectl("get", "deployment", "palaestra-tensorboard", *IN_LAB))
+    claim = json.loads(kubectl("get", "persistentvolumeclaim", "runs", *IN_LAB))
+    volume = server["spec"]["template"]["spec"]["volumes"][0]
+    assert job["spec"]["storage"] == {"existingClaim": "runs"}
+    assert volume["persistentVolumeClaim"]["claimName"] == "runs"
+    assert claim["metadata"]["labels"] == {FOR_JOBS: "true"}
 
 
 def test_an_uninstalled_palaestra_leaves_nothing_but_claims_of_jobs(typed, kubectl):
