@@ -14,7 +14,7 @@ DOWNLOAD_S = 300
 
 
 def definitions(module: str, folder: str) -> Path:
-    """Return the folder of a Go module that holds its CustomResourceDefinitions.
+    """Return a folder of a Go module, such as that of its CustomResourceDefinitions.
 
     Nothing is downloaded unless the tests are required to run.
 

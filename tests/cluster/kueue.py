@@ -1,10 +1,12 @@
-"""Write the image of Kueue's manager as its project ships it: one program that runs as nobody.
+"""Write the image of Kueue's manager as its project ships it, and let its chart name that image.
 
-python3 -m tests.cluster.kueue PROGRAM OUT: from the built program to an OCI archive. Standard library only.
+python3 -m tests.cluster.kueue PROGRAM VALUES OUT: from the built program to an OCI archive, and the chart's
+values.yaml anew. Standard library only.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path, PurePosixPath
 
@@ -14,15 +16,40 @@ from tests.cluster.images import version_of
 REPOSITORY = "registry.k8s.io/kueue/kueue"
 
 
+def version() -> str:
+    """Return the version of Kueue that is built here, such as "v0.19.1"."""
+    return version_of("kueue", "sigs.k8s.io/kueue")
+
+
 def manager(program: Path) -> Image:
     """Return the image; Kueue's chart calls `/manager` in it and refuses to run it as root."""
     return Image(
-        name=f"{REPOSITORY}:{version_of('kueue', 'sigs.k8s.io/kueue')}",
+        name=f"{REPOSITORY}:{version()}",
         entrypoint="/manager",
         files={PurePosixPath("manager"): program},
         user="65532:65532",
     )
 
 
+def released(values: str) -> str:
+    """Return the chart's values.yaml with the image of `manager`, as in the chart of the release.
+
+    The module's own names a staging image with the policy Always, so a node would not use the image that was
+    loaded onto it. The manager's image is the first one below `controllerManager`.
+
+    Raises:
+        LookupError: There is no such image.
+    """
+    for key, value in (("repository", REPOSITORY), ("tag", version()), ("pullPolicy", "IfNotPresent")):
+        first = re.compile(rf"^(controllerManager:\n.*?^ {{6}}{key}: )[^\n]*", re.MULTILINE | re.DOTALL)
+        values, found = first.subn(rf"\g<1>{value}", values)
+        if not found:
+            message = f"Kueue's values.yaml has no {key} of an image below controllerManager."
+            raise LookupError(message)
+    return values
+
+
 if __name__ == "__main__":
-    write_archive(manager(Path(sys.argv[1])), Path(sys.argv[2]))
+    write_archive(manager(Path(sys.argv[1])), Path(sys.argv[3]))
+    chosen = Path(sys.argv[2])
+    chosen.write_text(released(chosen.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Print the folder that holds Kueue, made once from its Go module: `image.tar`, the manager's image under the name that its
-# registry has it by, and `chart`, what `helm install … oci://registry.k8s.io/kueue/charts/kueue` would pull.
+# registry has it by, and `chart`, what `helm install … oci://registry.k8s.io/kueue/charts/kueue` would pull: it names that
+# image, and pulls it only where a node does not have it.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"
@@ -19,7 +20,7 @@ make_kueue() {
   rm -rf "$part"
   mkdir -p "$part"
   cp -r --no-preserve=mode "$source/charts/kueue" "$part/chart"
-  PYTHONPATH=$HERE/../.. PYTHONDONTWRITEBYTECODE=1 python3 -m tests.cluster.kueue "$program" "$part/image.tar"
+  PYTHONPATH=$HERE/../.. PYTHONDONTWRITEBYTECODE=1 python3 -m tests.cluster.kueue "$program" "$part/chart/values.yaml" "$part/image.tar"
   mv "$part" "$target"
 }
 

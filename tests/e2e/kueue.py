@@ -1,7 +1,7 @@
 """Kueue in the cluster, as docs/queues.md tells: its commands are typed, and taken back at the end.
 
-What the page has from a registry comes from Kueue's Go module here (tests/cluster/kueue.sh): the chart as it
-is, and the image under its own name, so that a cluster which reaches the registry can pull it all the same.
+What the page has from a registry comes from Kueue's Go module here (tests/cluster/kueue.sh): the chart, and
+the image under its own name, so that a cluster which reaches the registry can pull it all the same.
 """
 
 import os
@@ -11,8 +11,6 @@ from typing import Any
 
 import yaml
 
-from tests.cluster.images import version_of
-from tests.cluster.kueue import REPOSITORY
 from tests.e2e.cluster import Cluster, Object
 from tests.e2e.namespace import LONG_S, Namespace
 from tests.pages import blocks
@@ -27,17 +25,11 @@ NAMESPACE = "robots"
 TYPED_S = 300
 MADE_S = 120
 
-_IMAGE = "controllerManager.manager.image"
-_SETTINGS = {
-    f"{_IMAGE}.repository": REPOSITORY,
-    f"{_IMAGE}.tag": version_of("kueue", "sigs.k8s.io/kueue"),
-    f"{_IMAGE}.pullPolicy": "IfNotPresent",
-    "controllerManager.manager.resources.requests.cpu": "50m",  # beside a training on two cores
-}
+_BESIDE_A_TRAINING = "controllerManager.manager.resources.requests.cpu=50m"  # on two cores
 _FROM_THE_MODULE = """
 helm() {
   [[ $1 == install ]] || { command helm "$@"; return; }
-  command helm "${@/#oci:*/$CHART}" --set "$SETTINGS"
+  command helm "${@/#oci:*/$CHART}" --set "$SETTING"
 }
 """
 
@@ -77,10 +69,9 @@ class Kueue:
         return self._cluster.kubectl("api-resources", f"--api-group={GROUP}", "--no-headers")
 
     def _type(self, how: str, text: str) -> subprocess.CompletedProcess[str]:
-        settings = ",".join(f"{name}={value}" for name, value in _SETTINGS.items())
         return subprocess.run(
             ["bash", how, _FROM_THE_MODULE + text],
-            cwd=self._folder, env={**os.environ, "CHART": self._chart, "SETTINGS": settings},
+            cwd=self._folder, env={**os.environ, "CHART": self._chart, "SETTING": _BESIDE_A_TRAINING},
             capture_output=True, text=True, timeout=TYPED_S, check=False,
         )  # fmt: skip
 

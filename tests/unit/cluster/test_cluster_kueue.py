@@ -1,0 +1,66 @@
+"""The chart that tests/cluster/kueue.sh hands out runs as it is, with the image beside it."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.chart.definitions import KUEUE, definitions
+from tests.chart.helm import helm
+from tests.cluster.kueue import manager, released
+
+ROOT = Path(__file__).parents[3]
+VALUES = """\
+first: {image: other}
+controllerManager:
+  manager:
+    image:
+      # which
+      repository: example.com/staging/kueue
+      tag: main
+      # when
+      pullPolicy: Always
+    podAnnotations: {}
+viewer:
+  backend:
+    image:
+      repository: example.com/staging/viewer
+      tag: main
+      pullPolicy: Always
+"""
+
+
+def made(folder):
+    """Return the chart of the module, after what kueue.sh does to it."""
+    shutil.copytree(definitions(KUEUE[0], "charts/kueue"), folder / "chart", copy_function=shutil.copyfile)
+    (folder / "kueue").touch()
+    files = (folder / "kueue", folder / "chart/values.yaml", folder / "image.tar")
+    subprocess.run([sys.executable, "-m", "tests.cluster.kueue", *files], cwd=ROOT, timeout=60, check=True)
+    return folder / "chart"
+
+
+def test_the_chart_names_the_image_that_is_made_with_it(tmp_path):
+    """The module's own names a staging image that is always pulled, which no node could do."""
+    objects = yaml.safe_load_all(helm("template", "kueue", str(made(tmp_path))))
+    deployments = [each["spec"]["template"]["spec"] for each in objects if each["kind"] == "Deployment"]
+
+    found = {(each["image"], each["imagePullPolicy"]) for pod in deployments for each in pod["containers"]}
+    assert found == {(manager(tmp_path / "kueue").name, "IfNotPresent")}
+
+
+def test_nothing_else_of_the_values_changes():
+    """Also not the image of another part, and no comment."""
+    before, after = VALUES.splitlines(), released(VALUES).splitlines()
+
+    changed = [new for old, new in zip(before, after, strict=True) if old != new]
+    assert [line.split()[0] for line in changed] == ["repository:", "tag:", "pullPolicy:"]
+    assert after[-3:] == before[-3:]
+
+
+def test_values_without_that_image_are_an_error():
+    """Another release of Kueue may have it elsewhere; its chart would be handed out unchanged."""
+    with pytest.raises(LookupError, match="has no repository of an image below controllerManager"):
+        released("controllerManager: {}\n")
