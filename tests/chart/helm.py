@@ -44,13 +44,12 @@ def helm(*arguments: str, sent: str = "", **environment: str) -> str:
 
 
 def rendered(values: Object | None = None, *options: str) -> str:
-    """Return all objects of the chart with some values, as YAML, without those of `helm test`."""
+    """Return all objects of the chart with some values, as YAML."""
     where = (RELEASE, str(CHART), f"--namespace={NAMESPACE}")
     chosen = yaml.safe_dump(values or {})
-    return helm("template", *where, "--values=-", "--skip-tests", *options, sent=chosen)
+    return helm("template", *where, "--values=-", *options, sent=chosen)
 
 
-def objects(values: Object | None = None, *, tests: bool = False) -> list[Object]:
-    """Return the objects of the chart with some values; with `tests` those of `helm test` too."""
-    text = rendered(values, *(["--skip-tests=false"] if tests else []))
-    return [each for each in yaml.safe_load_all(text) if each]
+def objects(values: Object | None = None) -> list[Object]:
+    """Return all objects of the chart with some values."""
+    return [each for each in yaml.safe_load_all(rendered(values)) if each]

@@ -27,7 +27,8 @@ def text() -> str:
     Raises:
         NoPrograms: Helm is not built.
     """
-    return HEAD + rendered({"crds": {"keep": False}})  # a policy of Helm's, unknown to kubectl
+    without = {"crds": {"keep": False}, "test": {"enabled": False}}  # a policy and a command of Helm's
+    return HEAD + rendered(without)
 
 
 def installed() -> list[dict[str, Any]]:

@@ -49,6 +49,7 @@ OTHERS: dict[str, Any] = {
     "jobs.allowedPodLabels": ["example.com/team"],
     "jobs.allowedPodAnnotations": ["example.com/"],
     "jobs.nodeSelector": LABELS,
+    "test.enabled": False,
     "test.namespace": "elsewhere",
     "test.deadlineSeconds": 60,
     "tensorboard.enabled": True,

@@ -134,7 +134,7 @@ def test_an_upgrade_to_everything_touches_no_pod_and_the_end_leaves_the_job(
     assert "TensorBoard" in page_of(cluster, "palaestra-tensorboard", 6006)
     assert_notebooks_are_served_to_who_has_the_token(cluster)
     assert_the_first_notebook_drives_a_robot(cluster)
-    helm("test", SYSTEM)
+    assert helm("test", SYSTEM).count("TEST SUITE:") == 1
 
     helm("uninstall", SYSTEM, "--wait")
     assert cluster.get("deployments", SYSTEM, OPERATOR) is None

@@ -19,7 +19,7 @@ from tests.e2e.tour import tour
 
 pytestmark = [pytest.mark.looks_back, pytest.mark.timeout(600)]
 
-TRIAL = "palaestra-test"
+TRIAL = "palaestra-trial"
 UNSEEN = {
     # Asked for beside a request, and not written down: with OwnerReferencesPermissionEnforcement, as on
     # OpenShift, who makes an owner wait for what it owns must be allowed to change the owner's finalizers.
@@ -52,7 +52,7 @@ def rights(used, namespace, account):
 def roles(namespace):
     """Return the objects of the chart as the tests have them in a namespace: everywhere, or there alone."""
     values = {} if namespace == SYSTEM else {"watchNamespaces": [namespace]}
-    text = rendered(values, "--skip-tests=false", f"--namespace={namespace}")
+    text = rendered(values, f"--namespace={namespace}")
     return [each for each in yaml.safe_load_all(text) if each]
 
 

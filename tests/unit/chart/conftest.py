@@ -21,8 +21,8 @@ def helm_is_built() -> None:
 
 @pytest.fixture(scope="session")
 def made() -> Callable[[str], list[Object]]:
-    """All objects of a mode, those of `helm test` too."""
-    return cache(lambda mode: objects(MODES[mode], tests=True))
+    """All objects of a mode."""
+    return cache(lambda mode: objects(MODES[mode]))
 
 
 @pytest.fixture

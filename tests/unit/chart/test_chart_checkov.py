@@ -44,7 +44,7 @@ EXPECTED = {"default": {**ALWAYS, **BY_DEFAULT}, "everything": ALWAYS}
 @pytest.fixture(scope="module")
 def found():
     """What it finds, by mode; one run for all, since it takes seconds to begin."""
-    return findings({mode: rendered(MODES[mode], "--skip-tests=false") for mode in EXPECTED})
+    return findings({mode: rendered(MODES[mode]) for mode in EXPECTED})
 
 
 @pytest.mark.parametrize("mode", EXPECTED)

@@ -48,6 +48,16 @@ def test_its_namespace_enforces_the_restricted_standard(made):
     assert labels["pod-security.kubernetes.io/enforce"] == "restricted"
 
 
+def test_nothing_of_helm_test_is_in_it(made):
+    """Nobody without Helm can run it, and its account would hold rights for nothing."""
+    assert {
+        each["metadata"].get("labels", {}).get("app.kubernetes.io/component") for each in made.values()
+    } == {
+        None,
+        "operator",
+    }
+
+
 def test_the_operator_is_that_of_the_release(made):
     """Never `latest`: an upgrade is somebody's decision."""
     [container] = made["Deployment", NAME]["spec"]["template"]["spec"]["containers"]

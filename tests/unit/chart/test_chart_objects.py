@@ -99,6 +99,26 @@ def test_only_the_operator_and_the_trial_hold_a_token(made, mode):
 
 
 @every_mode
+def test_the_trial_is_one_hook(made, mode):
+    """Helm reports each hook as a test suite of its own: one training was five of them."""
+    hooks = [each for each in made(mode) if "helm.sh/hook" in each["metadata"].get("annotations", {})]
+
+    assert [(each["kind"], each["metadata"]["name"]) for each in hooks] == [("Pod", "palaestra-test")]
+
+
+def test_the_account_of_the_trial_can_be_left_out(made):
+    """It holds rights as long as the release is there, and not every platform has that."""
+    everything, without = made("default"), objects({"test": {"enabled": False}})
+
+    left_out = [each for each in everything if each not in without]
+    assert {each["metadata"]["labels"]["app.kubernetes.io/component"] for each in left_out} == {"test"}
+    assert sorted(each["kind"] for each in left_out) == [
+        *("ConfigMap", "Pod", "Role", "RoleBinding", "ServiceAccount")
+    ]
+    assert "palaestra-trial" not in str(without)
+
+
+@every_mode
 def test_no_right_is_a_wildcard_and_none_that_is_bound_reads_secrets(made, mode):
     """What is used is known, verb by verb; Secrets are for a person to open."""
     assert not [right for right in rules(roles(made(mode)).values()) if "*" in "".join(right)]
@@ -111,9 +131,9 @@ def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
     assert not [each for each in made("namespaced") if each["kind"] in CLUSTER_WIDE]
     assert {key for key in roles(made("namespaced")) if key[1] != NAMESPACE} == {
         (name, namespace)
-        for name in ("palaestra-jobs", SECRETS_ROLE, "palaestra-test")
+        for name in ("palaestra-jobs", SECRETS_ROLE, "palaestra-trial")
         for namespace in ("robots", "drones")
-    } - {("palaestra-test", "drones")}
+    } - {("palaestra-trial", "drones")}
 
 
 def test_both_modes_hold_the_same_rights(made):
@@ -169,7 +189,7 @@ def test_every_image_comes_from_the_registry_by_its_digest(made, one):
 
 def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):
     """Also the job of `helm test`, whose pods the operator makes."""
-    job = yaml.safe_load(one("offline", "ConfigMap", "palaestra-test")["data"]["job.yaml"])
+    job = yaml.safe_load(one("offline", "ConfigMap", "palaestra-trial")["data"]["job.yaml"])
 
     assert {len(pod["imagePullSecrets"]) for pod in pods(made("offline")).values()} == {1}
     assert job["spec"]["imagePullSecrets"] == [{"name": "registry"}]
@@ -191,7 +211,7 @@ def test_the_trial_is_a_job_that_the_api_takes(one, mode):
     """It would be refused in the cluster of whoever runs `helm test`."""
     namespace = MODES[mode].get("watchNamespaces", [NAMESPACE])[0]
 
-    text = one(mode, "ConfigMap", "palaestra-test")["data"]["job.yaml"]
+    text = one(mode, "ConfigMap", "palaestra-trial")["data"]["job.yaml"]
 
     job = palaestra.api.load(text, "job.yaml")
     assert job.metadata.namespace == namespace
@@ -314,7 +334,7 @@ def test_every_dashboard_is_mounted_as_it_is(made):
     found = {
         name: (json.loads(text), each["metadata"]["labels"].get("grafana_dashboard"))
         for each in made("monitored")
-        if each["kind"] == "ConfigMap" and each["metadata"]["name"] != "palaestra-test"
+        if each["kind"] == "ConfigMap" and each["metadata"]["name"] != "palaestra-trial"
         for name, text in each["data"].items()
     }
 
