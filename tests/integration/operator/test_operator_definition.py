@@ -19,14 +19,17 @@ DEFINITIONS = Resource(
     api_version="apiextensions.k8s.io/v1", kind="CustomResourceDefinition", plural="customresourcedefinitions"
 )
 OUTDATED = "palaestra_operator_crd_outdated"
+BEFORE = ["Accepted", "Running", "Suspended", "Succeeded", "Failed"]
 
 
 @pytest.fixture
 def older(tmp_path):
-    """A control plane with a definition that lacks one field of a status."""
+    """A control plane whose definition lacks a field of a status, and two types of conditions."""
     definition = json.loads(json.dumps(crd()))
     [version] = definition["spec"]["versions"]
-    del version["schema"]["openAPIV3Schema"]["properties"]["status"]["properties"]["running"]
+    status = version["schema"]["openAPIV3Schema"]["properties"]["status"]["properties"]
+    del status["running"]
+    status["conditions"]["items"]["properties"]["type"]["enum"] = BEFORE
     version["additionalPrinterColumns"] = []
     kinds = tmp_path / "crd.yaml"
     kinds.write_text(yaml.safe_dump(definition))
@@ -53,7 +56,8 @@ def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
     try:
         [said] = eventually(lambda: operator.said("definition outdated"))
 
-        assert said["lacks"] == ["status.running: is missing"]
+        types = "status.conditions[].type: does not know Reconciling, Stalled"
+        assert sorted(said["lacks"]) == [types, "status.running: is missing"]
         assert f"{OUTDATED} 1.0" in operator.ask("/metrics").splitlines()
     finally:
         operator.kill()

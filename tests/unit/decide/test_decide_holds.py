@@ -110,8 +110,10 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
         (reason, message)
     ]
     assert scene.status.phase is Phase.PENDING
-    elsewhere = {each.message for each in scene.status.conditions[1:]}
+    elsewhere = {each.message for each in scene.status.conditions[1:5]}
     assert elsewhere == {"the job is Pending; see the condition Accepted"}
+    [stalled] = scene.status.conditions[5:]
+    assert (stalled.type, stalled.reason, stalled.message) == ("Stalled", reason, message)
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,8 @@ def schema() -> Schema:
         fields[heading] = {"type": "string", "maxLength": 63}
     name = fields["metadata"]["properties"]["name"]  # and may be told about no more than the name
     fields["metadata"] = {"type": "object", "properties": {"name": name}}
-    del fields["status"]["default"]
+    # Without it kstatus would call a job reconciled that no operator has seen: generations begin at 1.
+    fields["status"]["default"] = {"observedGeneration": 0}
     plain: Schema = without_marks(whole)
     return plain
 

@@ -86,6 +86,22 @@ class Reason(StrEnum):
 _RENAMED = {"FaultBudgetSpent": Reason.SIMULATOR_BUDGET_SPENT}
 
 
+# What keeps a job from being planned or resumed until a person acts.
+HELD = frozenset(
+    {
+        Reason.INVALID_SPEC,
+        Reason.POD_METADATA_NOT_ALLOWED,
+        Reason.NO_KUEUE,
+        Reason.WORLD_MISSING,
+        Reason.WORLD_INVALID,
+        Reason.SECRET_MISSING,
+        Reason.CLAIM_MISSING,
+        Reason.CONFIG_MAP_NOT_FOR_JOBS,
+        Reason.SECRET_NOT_FOR_JOBS,
+        Reason.CLAIM_NOT_FOR_JOBS,
+    }
+)
+
 # What a replica waits for while nothing has ended: the cluster tries again, or a person has to act. The
 # metric palaestra_replicas_waiting counts these.
 WAITING = (

@@ -45,13 +45,15 @@ class SimulatorPhase(StrEnum):
 
 
 class ConditionType(StrEnum):
-    """The conditions of a TrainingJob."""
+    """The conditions of a TrainingJob; the last two are present only while they hold."""
 
     ACCEPTED = "Accepted"
     RUNNING = "Running"
     SUSPENDED = "Suspended"
     SUCCEEDED = "Succeeded"
     FAILED = "Failed"
+    RECONCILING = "Reconciling"
+    STALLED = "Stalled"
 
 
 class ConditionStatus(StrEnum):
@@ -66,7 +68,7 @@ class Condition(Reported):
     """One claim about the job, with its reason, as Kubernetes' own conditions."""
 
     type: ConditionType = Field(strict=False)
-    """`Accepted`, `Running`, `Suspended`, `Succeeded` or `Failed`."""
+    """`Accepted`, `Running`, `Suspended`, `Succeeded` or `Failed`; `Reconciling` or `Stalled`."""
 
     status: ConditionStatus = Field(strict=False)
     """`True`, `False` or `Unknown`."""
@@ -276,7 +278,8 @@ class Status(Reported):
         ),
         KNOWN_ONES,
     ] = ()
-    """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason."""
+    """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason; `Reconciling` while
+    the job is on its way to what its spec asks for, `Stalled` when it cannot get there by itself."""
 
     start_time: datetime | None = Field(default=None, strict=False)
     """When the first pod started, by its node's clock; absent: none has."""

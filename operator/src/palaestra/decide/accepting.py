@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from palaestra.api import TrainingJob, validate
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import Phase, Status
-from palaestra.decide.conditions import Claim, Told, claims, conditions
+from palaestra.decide.conditions import Claim, Told, claims, conditions, reconciliation
 from palaestra.decide.decision import Decision
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import happening, of_actions, of_change
@@ -94,7 +94,10 @@ def _has_ttl(raw: Mapping[str, Any]) -> bool:
 
 def _failed(raw: Mapping[str, Any], old: Status, told: Told, now: datetime) -> Status:
     generation = count(part(raw, "metadata"), "generation") or None
-    current = claims(Claim(holds=False, told=told), Phase.FAILED, told)
+    current = {
+        **claims(Claim(holds=False, told=told), Phase.FAILED, told),
+        **reconciliation(Phase.FAILED, told, suspend=False),
+    }
     return old.model_copy(
         update={
             "phase": Phase.FAILED,

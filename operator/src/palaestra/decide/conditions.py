@@ -1,14 +1,18 @@
-"""The five conditions of a TrainingJob, each with a reason whether it holds or not.
+"""The conditions of a TrainingJob.
 
-The subject of a job's reason is the condition of its phase; of a job that is Pending, it is Accepted while
-that does not hold, then Running.
+Five are always there, each with a reason whether it holds or not. The subject of a job's reason is the
+condition of its phase; of a job that is Pending, it is Accepted while that does not hold, then Running.
+
+Two more are there only while they hold; kstatus reads them, the library by which Flux and `helm --wait` wait.
+A job is `Reconciling` while it is on its way to what its spec asks for, and `Stalled` when it cannot get
+there by itself. A job with neither is as its spec asks: it trains, has succeeded, or is suspended.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 
-from palaestra.api.reasons import Reason
+from palaestra.api.reasons import HELD, Reason
 from palaestra.api.status import Condition, ConditionStatus, ConditionType, Phase, Status
 
 _CONDITION_OF = {
@@ -54,8 +58,25 @@ def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
     return {ConditionType.ACCEPTED: accepted, **others}
 
 
+def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
+    """Return `Stalled` or `Reconciling` of a job that is not as its spec asks, nothing of one that is.
+
+    Each has the whole message: it is all that kstatus passes on.
+
+    Args:
+        phase: of the job.
+        why: the job's reason.
+        suspend: whether the spec asks for a suspended job.
+    """
+    if phase is Phase.FAILED or why.reason in HELD:
+        return {ConditionType.STALLED: Claim(holds=True, told=why)}
+    if phase in {Phase.SUCCEEDED, Phase.SUSPENDED if suspend else Phase.RUNNING}:
+        return {}
+    return {ConditionType.RECONCILING: Claim(holds=True, told=why)}
+
+
 def conditions(old: Status, current: Claims, generation: int | None, now: datetime) -> tuple[Condition, ...]:
-    """Return the conditions; the time of one whose status is what it was stays as it was."""
+    """Return the conditions of the current claims; one whose status has not changed keeps its time."""
     before = {each.type: each for each in old.conditions}
     return tuple(
         _condition(kind, claim, before.get(kind), generation, now) for kind, claim in current.items()

@@ -7,7 +7,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.acting import actions
-from palaestra.decide.conditions import Claim, Told, claims, conditions
+from palaestra.decide.conditions import Claim, Told, claims, conditions, reconciliation
 from palaestra.decide.counting import counted
 from palaestra.decide.decision import Decision
 from palaestra.decide.edits import edits
@@ -120,13 +120,16 @@ def _status(
 ) -> Status:
     old = job.status
     where = standing(replicas)
-    accepted = _accepted(job, prepared)
+    current = {
+        **claims(_accepted(job, prepared), where.phase, where.told),
+        **reconciliation(where.phase, where.told, suspend=job.spec.suspend),
+    }
     now, generation = times.now, job.metadata.generation
     return Status(
         observed_generation=old.observed_generation if prepared.closed else seen_generation(job, observed),
         phase=where.phase,
         release=old.release or _release(prepared),
-        conditions=conditions(old, claims(accepted, where.phase, where.told), generation, now),
+        conditions=conditions(old, current, generation, now),
         start_time=started(old, observed),
         completion_time=now if where.phase in TERMINAL else None,
         active_seconds=min(int(times.active_s(old.active_seconds)), MOST_COUNT),

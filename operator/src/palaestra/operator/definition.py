@@ -2,6 +2,7 @@
 
 With `crds.install: false` an administrator applies the definition, and may forget to. Then the API
 server drops new fields of a status without an error. No decision depends on them, but people miss them.
+It refuses a status with a condition of a new type, so such conditions are left out until they are known.
 
 Columns and selectable fields are not compared: without them nothing that is written is lost.
 
@@ -18,11 +19,14 @@ import structlog
 from palaestra.api.crd import schema
 from palaestra.api.job import API_VERSION, KIND
 from palaestra.api.outdated import lacks
+from palaestra.api.status import ConditionType
 from palaestra.cluster import Api, ApiError
+from palaestra.observe.reading import part
 
 READ_S = 5.0
 FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it was applied
 MOST_SHOWN = 20
+_NEW = frozenset({ConditionType.RECONCILING.value, ConditionType.STALLED.value})  # since a5276f3
 
 log = structlog.get_logger(__name__)
 
@@ -37,10 +41,12 @@ class Definition:
     def __init__(self, api: Api) -> None:
         self._api = api.within(READ_S)
         self._found: tuple[str, ...] = ()
+        self._knows_new = False
         self.outdated: bool | None = None
 
     def follow(self, stopping: threading.Event, every_s: float) -> None:
-        """Compare in a thread of its own until nothing is lacking: then nothing more is asked for."""
+        """Compare at once, then in a thread of its own until nothing is lacking; then ask no more."""
+        self._try_look()
         threading.Thread(
             target=self._follow, args=(stopping, every_s), name="definition", daemon=True
         ).start()
@@ -53,6 +59,7 @@ class Definition:
             log.info("definition not read", error=str(error))
             return
         before, self._found = self._found, tuple(_lacking(served.get("properties", {})))
+        self._knows_new = _condition_types(served) >= _NEW
         self.outdated = bool(self._found)
         if self._found and self._found != before:
             log.warning(
@@ -62,19 +69,32 @@ class Definition:
                 remedy="kubectl apply --server-side --filename manifests/crd.yaml of this release",
             )
 
+    def accepted(self, status: dict[str, Any]) -> dict[str, Any]:
+        """Return a status as the definition takes it: a condition of an unknown type is left out."""
+        if self._knows_new:
+            return status
+        known = [each for each in status["conditions"] if each["type"] not in _NEW]
+        return {**status, "conditions": known}
+
     def _follow(self, stopping: threading.Event, every_s: float) -> None:
         pause_s = FIRST_PAUSE_S
-        while not stopping.is_set():
-            try:
-                self.look()
-            except Exception:  # what nobody foresaw in the document must not end the operator
-                log.exception("definition not compared")
-            if self.outdated is False:
-                return
-            stopping.wait(pause_s)
+        while self.outdated is not False and not stopping.wait(pause_s):
+            self._try_look()
             pause_s = min(2 * pause_s, every_s)
+
+    def _try_look(self) -> None:
+        try:
+            self.look()
+        except Exception:  # what nobody foresaw in the document must not end the operator
+            log.exception("definition not compared")
 
 
 def _lacking(served: Mapping[str, Any]) -> list[str]:
     ours = schema()["properties"]
     return [fact for part in ("spec", "status") for fact in lacks(served.get(part, {}), ours[part], part)]
+
+
+def _condition_types(served: Mapping[str, Any]) -> frozenset[str]:
+    """Return the types of conditions that a served schema takes."""
+    way = ("status", "properties", "conditions", "items", "properties", "type")
+    return frozenset(part(served, "properties", *way).get("enum", ()))

@@ -65,7 +65,7 @@ class Operator:
             self._caches,
             Looking(api, self._caches, strangers, denials, self._poller.known),
             Acting(api, writer, strangers, denials),
-            Telling(writer, Recorder(api, instance=identity), metrics.written),
+            Telling(writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted),
             _layout(options),
         )
         self._workers = Workers(

@@ -19,6 +19,7 @@ from palaestra.operator.writing import Writer, difference
 
 Object = Mapping[str, Any]
 Written = Callable[[Object, Object], None]
+Accepted = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,12 +41,14 @@ class Telling:
     Args:
         writer: for the status.
         recorder: for the events.
-        written: is told of each TrainingJob as it was, and of the status that was written.
+        written: is called with each TrainingJob as it was, and with the status that was written.
+        accepted: returns a status as the cluster's definition of TrainingJobs takes it.
     """
 
-    def __init__(self, writer: Writer, recorder: Recorder, written: Written) -> None:
+    def __init__(self, writer: Writer, recorder: Recorder, written: Written, accepted: Accepted) -> None:
         self._writer = writer
         self._count = written
+        self._accepted = accepted
         self._recorder = recorder
         self._lock = threading.Lock()
         self._written: dict[Key, float] = {}
@@ -65,7 +68,8 @@ class Telling:
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
         written = StatusWrite()
         if decision.status is not None:
-            written = self._write(key, raw, fitted(raw, as_data(decision.status)), clock_s)
+            status = self._accepted(as_data(decision.status))
+            written = self._write(key, raw, fitted(raw, status), clock_s)
         for each in decision.events:
             if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
                 self._record(raw, each)

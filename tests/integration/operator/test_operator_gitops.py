@@ -1,0 +1,129 @@
+"""What GitOps tools conclude from a job, with kstatus' own rules: Helm 4 waits by them, as Flux does.
+
+The commands are those of docs/gitops.md.
+"""
+
+import os
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
+from tests.control_plane.programs import programs
+from tests.integration.operator.cluster import world_map, world_of
+from tests.pages import blocks
+from tests.waiting import DEADLINE_S, eventually
+
+PAGE = (Path(__file__).parents[3] / "docs" / "gitops.md").read_text()
+[TYPED] = blocks(PAGE, "sh")
+UPGRADE = TYPED.splitlines()[-1]
+TYPED_S = 60
+
+
+@pytest.fixture
+def type_in(control_plane, place, tmp_path):
+    """Type commands where the namespace of the test is the current one; return the code and all output."""
+    environment = {
+        "KUBECONFIG": str(control_plane.kubeconfig),
+        "HELM_NAMESPACE": place.name,
+        "PATH": f"{programs(('helm',))}:{os.environ['PATH']}",
+        "HOME": str(tmp_path),
+    }
+
+    def run(text):
+        done = subprocess.run(
+            ["bash", "-euc", text],
+            cwd=tmp_path,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=TYPED_S,
+            check=False,
+        )
+        return done.returncode, done.stdout
+
+    return run
+
+
+@pytest.fixture
+def values(tmp_path, type_in):
+    """`values(spec)`: write the chart of the page with another spec of the job."""
+    type_in(TYPED.rpartition("helm upgrade")[0])
+
+    def write(**spec):
+        (tmp_path / "corridor" / "values.yaml").write_text(f"job: {spec}\n")
+
+    return write
+
+
+def only_job(place):
+    """Return the name of the only TrainingJob of a namespace, once there is one."""
+    [job] = eventually(lambda: place.all(TRAINING_JOBS))
+    return job["metadata"]["name"]
+
+
+def test_helm_waits_until_the_job_trains(place, start, type_in):
+    """The commands of the page as they stand, typed by somebody else while a kubelet works."""
+    start()
+    with ThreadPoolExecutor(1) as threads:
+        typed = threads.submit(type_in, TYPED)
+        name = only_job(place)
+        [pod] = place.pods(name)
+
+        assert not typed.done()
+
+        place.run(pod)
+        code, output = typed.result(DEADLINE_S)
+
+    assert (code, place.status(name)["phase"]) == (0, "Running"), output
+    assert name.startswith("corridor-")
+
+
+def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in, values):
+    """It ended in a tenth of a second, and the release was deployed."""
+    start()
+    values(**world_of("nowhere"))
+
+    code, output = type_in(UPGRADE)
+
+    assert code == 1
+    assert "status: Failed" in output
+    assert "there is no ConfigMap nowhere here; create it with the label palaestra.dev/for-jobs" in output
+
+    place.create(CONFIG_MAPS, {**world_map(), "metadata": {**world_map()["metadata"], "name": "nowhere"}})
+    place.run(place.pods(only_job(place))[0])
+    place.until("Running", only_job(place))
+
+    assert type_in(UPGRADE)[0] == 0
+
+
+def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
+    """An operator that is away would make every release a success."""
+    values(trainer={"steps": 100})
+
+    code, output = type_in(UPGRADE.replace("15m", "3s"))
+
+    assert code == 1
+    assert (
+        "status: InProgress, message: TrainingJob generation is 1, but latest observed generation is 0"
+        in output
+    )
+
+
+def test_helm_replaces_a_job_whose_spec_changed(place, start, type_in, values):
+    """A spec cannot be changed, so the name has a hash of it; the old job goes."""
+    start()
+    values(suspend=True, trainer={"steps": 100})
+    assert type_in(UPGRADE)[0] == 0
+    first = only_job(place)
+
+    values(suspend=True, trainer={"steps": 200})
+    code, output = type_in(UPGRADE)
+
+    assert code == 0, output
+    eventually(lambda: len(place.all(TRAINING_JOBS)) == 1)
+    assert only_job(place) != first
+    assert place.status(only_job(place))["phase"] == "Suspended"

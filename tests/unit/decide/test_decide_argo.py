@@ -1,0 +1,66 @@
+"""The health check for Argo CD in docs/gitops.md, run as it stands by the Lua that Argo CD speaks."""
+
+from pathlib import Path
+
+import pytest
+from lupa import lua51
+
+from tests.pages import blocks
+
+[CHECK] = blocks((Path(__file__).parents[3] / "docs" / "gitops.md").read_text(), "lua")
+
+
+@pytest.fixture
+def health():
+    """`health(scene)`: return status and message that Argo CD shows of a scene's job."""
+    lua = lua51.LuaRuntime(unpack_returned_tuples=True)
+    check = lua.eval(f"function(obj)\n{CHECK}\nend")
+
+    def of(scene):
+        answer = check(lua.table_from(scene.raw, recursive=True))
+        return answer["status"], answer["message"]
+
+    return of
+
+
+def test_a_job_that_no_operator_has_seen_is_progressing(make_scene, health):
+    """Otherwise each new job would be healthy for a moment, and a sync wave would go on."""
+    scene = make_scene()
+
+    assert health(scene) == ("Progressing", "the operator has not seen this generation yet")
+
+    scene.raw["status"] = {"observedGeneration": 0}
+
+    assert health(scene)[0] == "Progressing"
+
+
+def test_a_job_that_starts_is_progressing_with_its_reason(accepted, health):
+    """The page of the application shows the message."""
+    scene = accepted()
+    scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
+    scene.settle()
+
+    assert health(scene) == ("Progressing", scene.replica().message)
+
+
+def test_a_job_that_lacks_something_is_degraded_with_the_remedy(make_scene, health):
+    """Nobody has to look at the TrainingJob for it."""
+    scene = make_scene(storage={"existingClaim": "runs"})
+    scene.settle()
+
+    assert health(scene) == ("Degraded", scene.replica().message)
+
+
+def test_a_job_that_trains_is_healthy(training, health):
+    """As for `helm --wait`."""
+    scene, _ = training()
+
+    assert health(scene) == ("Healthy", "Running")
+
+
+def test_a_job_that_its_spec_suspends_is_suspended(make_scene, health):
+    """Argo CD has a health of its own for it, and a sync wave waits no longer."""
+    scene = make_scene(suspend=True)
+    scene.settle()
+
+    assert health(scene)[0] == "Suspended"

@@ -1,0 +1,124 @@
+"""`Reconciling` and `Stalled`: what kstatus reads, and so what `helm --wait`, Flux and Argo CD wait for."""
+
+from palaestra.api.reasons import Reason
+from palaestra.api.status import ConditionStatus, Phase
+from palaestra.decide import Refused, reject
+
+NO_WORLD = [
+    {"name": "collect", "role": "Collect", "world": {"configMap": {"name": "worlds", "key": "hall.wbt"}}},
+    {"name": "evaluate", "role": "Evaluate"},
+]
+
+
+def gaps(status):
+    """Return reason and message of `Reconciling` and `Stalled`, by type; each must hold."""
+    found = {each.type.value: each for each in status.conditions[5:]}
+    assert all(each.status is ConditionStatus.TRUE for each in found.values())
+    return {kind: (each.reason, each.message) for kind, each in found.items()}
+
+
+def test_a_job_that_trains_is_as_its_spec_asks(training):
+    """A job runs for hours: nobody wants `helm --wait` to last until its end, and for a Job it does not."""
+    scene, _ = training()
+
+    assert gaps(scene.status) == {}
+
+
+def test_a_job_that_has_succeeded_is_as_its_spec_asks(training):
+    """It stays in the repository after its end."""
+    scene, pod = training()
+    scene.end(pod, 0)
+    scene.end_job("Complete")
+    scene.settle()
+
+    assert scene.status.phase is Phase.SUCCEEDED
+    assert gaps(scene.status) == {}
+
+
+def test_a_job_whose_pod_cannot_start_is_on_its_way(accepted):
+    """An image is often pushed a moment later, and the cluster tries again by itself."""
+    scene = accepted()
+    scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
+    scene.settle()
+
+    assert gaps(scene.status) == {"Reconciling": ("ImagePull", scene.replica().message)}
+
+
+def test_a_job_that_lacks_a_world_is_stalled_until_the_world_is_there(make_scene):
+    """`helm install --wait` ended in a tenth of a second, and the release counted as deployed."""
+    scene = make_scene(simulators=NO_WORLD)
+    scene.settle()
+
+    assert gaps(scene.status) == {"Stalled": ("WorldMissing", scene.replica().message)}
+
+    world = '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'
+    opened = {"name": "worlds", "labels": {"palaestra.dev/for-jobs": "true"}}
+    scene.there["ConfigMap", "worlds"] = {"metadata": opened, "data": {"hall.wbt": world}}
+    scene.settle()
+
+    assert gaps(scene.status).keys() == {"Reconciling"}
+
+
+def test_a_job_that_failed_is_stalled_with_the_whole_reason(training, last_word):
+    """The message is all that Helm and Flux print."""
+    scene, pod = training()
+    scene.end(pod, 81, last_word(reason="Diverged: NaN"))
+    scene.end_job("Failed", 0, "PodFailurePolicy")
+    scene.settle()
+
+    [failed] = [each for each in scene.status.conditions if each.type.value == "Failed"]
+    assert scene.status.phase is Phase.FAILED
+    assert gaps(scene.status) == {"Stalled": (failed.reason, failed.message)}
+
+
+def test_a_job_that_was_refused_is_stalled(make_scene):
+    """A spec does not change, so nothing mends it."""
+    scene = make_scene()
+
+    status = reject(scene.raw, Refused(Reason.INVALID_SPEC, "spec.seed: too large"), scene.now).status
+
+    assert status is not None
+    assert gaps(status) == {"Stalled": ("InvalidSpec", "spec.seed: too large")}
+
+
+def test_a_job_that_is_to_be_suspended_is_as_its_spec_asks_once_its_pod_is_gone(training):
+    """A release with `suspend: true` is complete, but not before the checkpoint is written."""
+    scene, pod = training()
+    scene.raw["spec"]["suspend"] = True
+    scene.raw["metadata"]["generation"] = 2
+    scene.step()
+
+    assert gaps(scene.status).keys() == {"Reconciling"}
+
+    scene.delete(pod)
+    scene.settle()
+
+    assert gaps(scene.status)["Reconciling"][0] == "Suspending"
+
+    scene.objects["pods"].clear()
+    scene.settle()
+
+    assert scene.status.phase is Phase.SUSPENDED
+    assert gaps(scene.status) == {}
+
+
+def test_a_job_that_waits_in_a_queue_is_on_its_way(make_scene):
+    """Its author asked for a training; the queue gives it a place sooner or later."""
+    scene = make_scene(scheduling={"queueName": "trainings"})
+    scene.kueue = True
+    scene.settle()
+
+    assert gaps(scene.status).keys() == {"Reconciling"}
+    assert gaps(scene.status)["Reconciling"][0] == "Queued"
+
+
+def test_a_condition_that_goes_on_keeps_its_time(accepted):
+    """Flux says since when."""
+    scene = accepted()
+    scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
+    scene.settle()
+    before = scene.status.conditions[5].last_transition_time
+
+    scene.settle(30)
+
+    assert scene.status.conditions[5].last_transition_time == before
