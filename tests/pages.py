@@ -10,6 +10,12 @@ def fenced(page: str) -> list[tuple[str, str]]:
     return FENCED.findall(page)
 
 
+def chapters(page: str) -> list[tuple[str, str]]:
+    """Return heading and text of every chapter of a page, down to the next heading of its level."""
+    _, *found = re.split(r"^## ", page, flags=re.MULTILINE)
+    return [(heading, text) for heading, _, text in (each.partition("\n") for each in found)]
+
+
 def blocks(page: str, kind: str) -> list[str]:
     """Return the blocks behind whose fence `kind` stands and nothing else."""
     return [text for found, text in fenced(page) if found == kind]

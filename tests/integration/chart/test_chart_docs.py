@@ -1,9 +1,7 @@
 """docs/install.md can be typed as it stands, from top to bottom."""
 
 import json
-import os
 import re
-import subprocess
 
 import pytest
 import yaml
@@ -13,6 +11,7 @@ from tests.chart.helm import NAMESPACE, ROOT
 from tests.control_plane.programs import programs
 from tests.integration.chart.conftest import DEFINITION
 from tests.pages import blocks
+from tests.terminal import Terminal
 
 PAGE = (ROOT / "docs" / "install.md").read_text()
 BLOCKS = blocks(PAGE, "sh")
@@ -36,21 +35,11 @@ def typed(cluster, kubectl, tmp_path):
         kubectl("delete", "namespace", name, "--ignore-not-found", "--wait")
     for name in ("charts", "manifests"):
         (tmp_path / name).symlink_to(ROOT / name)
-    path = f"{programs(('helm',))}:{cluster.binaries}:{os.environ['PATH']}"
-    environment = {"KUBECONFIG": str(cluster.kubeconfig), "PATH": path, "HOME": str(tmp_path)}
+    path = f"{programs(('helm',))}:{cluster.binaries}"
+    terminal = Terminal(tmp_path, path=path, before=NO_NODES, KUBECONFIG=str(cluster.kubeconfig))
 
     def type_in(text):
-        done = subprocess.run(
-            ["bash", "-euc", NO_NODES + text],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=TYPED_S,
-            check=False,
-        )
-        assert done.returncode == 0, f"{text}\n{done.stdout}{done.stderr}"
-        return done.stdout + done.stderr
+        return terminal.type_in(text, TYPED_S)
 
     yield type_in
     type_in(AWAY)

@@ -3,8 +3,6 @@
 The commands are those of docs/gitops.md.
 """
 
-import os
-import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from tests.control_plane.programs import programs
 from tests.integration.operator.cluster import world_map, world_of
 from tests.pages import blocks
+from tests.terminal import Terminal
 from tests.waiting import DEADLINE_S, eventually
 
 PAGE = (Path(__file__).parents[3] / "docs" / "gitops.md").read_text()
@@ -25,27 +24,9 @@ TYPED_S = 60
 @pytest.fixture
 def type_in(control_plane, place, tmp_path):
     """Type commands where the namespace of the test is the current one; return the code and all output."""
-    environment = {
-        "KUBECONFIG": str(control_plane.kubeconfig),
-        "HELM_NAMESPACE": place.name,
-        "PATH": f"{programs(('helm',))}:{os.environ['PATH']}",
-        "HOME": str(tmp_path),
-    }
-
-    def run(text):
-        done = subprocess.run(
-            ["bash", "-euc", text],
-            cwd=tmp_path,
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=TYPED_S,
-            check=False,
-        )
-        return done.returncode, done.stdout
-
-    return run
+    where = {"KUBECONFIG": str(control_plane.kubeconfig), "HELM_NAMESPACE": place.name}
+    terminal = Terminal(tmp_path, path=programs(("helm",)), **where)
+    return lambda text: terminal.try_(text, TYPED_S)
 
 
 @pytest.fixture

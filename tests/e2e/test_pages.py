@@ -1,0 +1,140 @@
+"""docs/install.md and docs/tools.md on the real cluster: every command as it stands, from top to bottom.
+
+docs/queues.md is typed by tests/e2e/test_kueue.py, which needs its cluster for longer.
+"""
+
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.chart.definitions import PROMETHEUS, definitions
+from tests.chart.helm import ROOT
+from tests.e2e.jobs import make_job
+from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace
+from tests.pages import blocks, chapters
+from tests.terminal import Terminal
+
+TYPED_S = 400  # `helm test` trains, and a namespace goes with its pods
+READY_S = 180
+SESSION_S = 800  # a tiny training, with a pause
+RUNS = "from urllib.request import urlopen; print(urlopen('http://127.0.0.1:6006/data/runs').read())"
+INSTALL = (ROOT / "docs" / "install.md").read_text()
+TOOLS = (ROOT / "docs" / "tools.md").read_text()
+KINDS_OF_PROMETHEUS = ("podmonitors", "servicemonitors", "prometheusrules")
+LAB = "lab"  # the namespace of the runs that TensorBoard shows
+TENSORBOARD, NOTEBOOKS = "palaestra-tensorboard", "palaestra-jupyter"
+# The Deployments that run once the commands of a chapter of install.md were typed, with their replicas.
+PROMISED = {
+    "Install": {OPERATOR: 1},
+    "More than one operator": {OPERATOR: 2},
+    "Monitoring": {OPERATOR: 2},
+    "Locked down": {OPERATOR: 2},
+    "What pods may carry": {OPERATOR: 2},
+    "TensorBoard and notebooks": {OPERATOR: 2, TENSORBOARD: 1, NOTEBOOKS: 1},
+    "Upgrade": {OPERATOR: 1},
+    "Uninstall": {},
+    "In some namespaces only": {},
+    "For the people who train": {},
+    "Without Helm": {OPERATOR: 2},
+}
+
+
+@pytest.fixture
+def terminal(tmp_path):
+    """A checkout of the release, with its programs on the PATH."""
+    for name in ("charts", "manifests"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    return Terminal(tmp_path, path=Path(sys.executable).parent)
+
+
+@pytest.fixture
+def untouched(cluster, terminal):
+    """The cluster without Palaestra and with what the page expects of it; all is put back at the end."""
+    folder = definitions(*PROMETHEUS)
+    files = " ".join(f"--filename={folder}/monitoring.coreos.com_{each}.yaml" for each in KINDS_OF_PROMETHEUS)
+    terminal.type_in("kubectl delete --filename manifests/install.yaml", TYPED_S)
+    terminal.type_in(f"kubectl apply --server-side {files}", TYPED_S)
+    yield
+    terminal.try_(f"helm uninstall palaestra --namespace {SYSTEM} --ignore-not-found", TYPED_S)
+    terminal.try_(f"kubectl delete --ignore-not-found namespace robots drones {LAB} {SYSTEM}", TYPED_S)
+    roles = "manifests/examples/platform/roles.yaml"
+    terminal.try_(f"kubectl delete --ignore-not-found --filename {roles}", TYPED_S)
+    terminal.type_in(f"kubectl delete --ignore-not-found {files}", TYPED_S)
+    terminal.type_in("kubectl apply --server-side --filename manifests/install.yaml", TYPED_S)
+    cluster.rolled_out(SYSTEM, OPERATOR)
+
+
+def running(cluster):
+    """Return the Deployments of the release, each with the replicas that are ready."""
+    for each, namespace in deployments(cluster):
+        cluster.rolled_out(namespace, each["metadata"]["name"])
+    found = [each for each, _ in deployments(cluster)]
+    return {each["metadata"]["name"]: each["status"].get("readyReplicas", 0) for each in found}
+
+
+def deployments(cluster):
+    """Return the Deployments that the page makes, with their namespaces."""
+    return [(each, place) for place in (SYSTEM, LAB) for each in cluster.select("deployments", place)]
+
+
+@pytest.mark.changes_the_operator
+@pytest.mark.timeout(1800)
+@pytest.mark.usefixtures("untouched")
+def test_every_command_of_the_installation_works_and_its_pods_run(terminal, cluster):
+    """A command that works alone can fail behind others: values stay, and pods find no image or volume."""
+    seen = {}
+    for heading, text in chapters(INSTALL):
+        commands = blocks(text, "sh")
+        for block in commands:
+            terminal.type_in(block, TYPED_S)
+        if commands:
+            seen[heading] = running(cluster)
+        if TENSORBOARD in seen.get(heading, ()):
+            assert_a_run_is_shown_by_the_name_of_its_job(Namespace(cluster, LAB, there=True))
+
+    assert seen == PROMISED
+
+
+def assert_a_run_is_shown_by_the_name_of_its_job(lab):
+    """A job with the `storage` of the page trains, and TensorBoard names its run as the page says."""
+    [storage] = [yaml.safe_load(block)["spec"]["storage"] for block in blocks(INSTALL, "yaml")]
+    uid = lab.apply(make_job("shown", storage=storage))["metadata"]["uid"]
+    assert lab.wait_for_end("shown", LONG_S) == "Succeeded"
+
+    name, where = f"shown-{uid[:8]}/0", ("--namespace", LAB, f"deploy/{TENSORBOARD}")
+    lab.wait(lambda: name in lab.cluster.kubectl("exec", *where, "--", "python3", "-c", RUNS))
+
+
+@pytest.fixture
+def at_home(terminal, namespace, tmp_path):
+    """The terminal of somebody whose kubeconfig names the namespace of the test."""
+    terminal.type_in("kubectl config view --raw --flatten >config", READY_S)
+    mine = Terminal(tmp_path, path=Path(sys.executable).parent, KUBECONFIG=str(tmp_path / "config"))
+    mine.type_in(f"kubectl config set-context --current --namespace={namespace.name}", READY_S)
+    return mine
+
+
+@pytest.mark.timeout(900)
+def test_every_command_of_the_tools_works(at_home, namespace, tmp_path):
+    """From a namespace without a job to a policy on this machine, and a job that is gone."""
+    [session] = blocks(TOOLS, "sh")
+
+    printed = at_home.type_in(session, SESSION_S)
+
+    assert (tmp_path / "fetched/tiny/0/model.zip").is_file()
+    assert "restarts" in printed
+    assert namespace.select("trainingjobs") == []
+
+
+@pytest.mark.timeout(900)
+def test_the_script_of_the_tools_trains(at_home, namespace, tmp_path):
+    """The same from Python, with the job of the examples."""
+    [script] = blocks(TOOLS, "python with-a-cluster")
+    (tmp_path / "train.py").write_text(script)
+
+    printed = at_home.type_in("python train.py", SESSION_S)
+
+    assert "Succeeded 2000 " in printed
+    assert namespace.select("trainingjobs") == []
