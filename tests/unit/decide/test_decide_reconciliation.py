@@ -122,3 +122,35 @@ def test_a_condition_that_goes_on_keeps_its_time(accepted):
     scene.settle(30)
 
     assert scene.status.conditions[5].last_transition_time == before
+
+
+def test_a_job_in_a_queue_is_on_its_way_whatever_its_spec_says_of_a_suspension(training):
+    """A queue of a whole namespace does not heed `suspend`: the job starts once Kueue admits it."""
+    scene, _ = training(suspend=False)
+    scene.raw["spec"]["suspend"] = True
+    scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
+    scene.settle()
+
+    why = scene.replica().message
+    assert "spec.suspend is not heeded" in why
+    assert gaps(scene.status) == {"Reconciling": ("Training", why)}
+
+    scene.job()["spec"]["suspend"] = True
+    scene.objects["pods"].clear()
+    scene.settle()
+
+    assert gaps(scene.status)["Reconciling"][0] == "Queued"
+
+
+def test_a_job_that_failed_before_the_condition_was_known_gets_it(training, last_word):
+    """Its failure is as final as any; without the condition it would count as complete for ever."""
+    scene, pod = training()
+    scene.end(pod, 81, last_word(reason="Diverged: NaN"))
+    scene.end_job("Failed", 0, "PodFailurePolicy")
+    scene.settle()
+    whole = scene.raw["status"]["conditions"]
+    scene.raw["status"]["conditions"] = whole[:5]
+
+    scene.settle()
+
+    assert scene.raw["status"]["conditions"] == whole

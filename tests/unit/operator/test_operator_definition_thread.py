@@ -26,7 +26,7 @@ def test_a_document_that_nobody_foresaw_does_not_end_the_operator(monkeypatch):
     broken = []
     monkeypatch.setattr(threading, "excepthook", broken.append)
     server, stopping = Server(), threading.Event()
-    definition = Definition(server)
+    definition = Definition(server, lambda: None)
 
     definition.follow(stopping, 60.0)
     assert server.asked.wait(5)

@@ -37,7 +37,7 @@ def notes():
 @pytest.fixture
 def tell(notes, monkeypatch):
     """`tell(step=11, clock_s=30)`: tell a step, and return the seconds until it is written."""
-    telling = Telling(notes, None, lambda *_: None, lambda status: status)
+    telling = Telling(notes, None, lambda *_: None, lambda _, status: status)
     raw = {"metadata": {"namespace": "default", "name": "job", "resourceVersion": "1"}, "status": OLD}
 
     def tell(step, clock_s):

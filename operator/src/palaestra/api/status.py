@@ -258,7 +258,7 @@ class Status(Reported):
     """What the operator tells about a TrainingJob; never written by its author."""
 
     observed_generation: Count | None = None
-    """Generation of the spec that this status speaks of; absent: not seen yet."""
+    """Generation of the spec that this status speaks of; 0 or absent: no operator has seen the job yet."""
 
     phase: Phase | None = Field(default=None, strict=False)
     """The job in one word; absent: not seen yet."""

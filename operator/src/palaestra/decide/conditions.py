@@ -61,7 +61,8 @@ def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
 def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
     """Return `Stalled` or `Reconciling` of a job that is not as its spec asks, nothing of one that is.
 
-    Each has the whole message: it is all that kstatus passes on.
+    Each has the whole message: it is all that kstatus passes on. A job in a queue waits for its turn,
+    whatever its spec says of a suspension: a queue does not heed that.
 
     Args:
         phase: of the job.
@@ -70,9 +71,22 @@ def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
     """
     if phase is Phase.FAILED or why.reason in HELD:
         return {ConditionType.STALLED: Claim(holds=True, told=why)}
-    if phase in {Phase.SUCCEEDED, Phase.SUSPENDED if suspend else Phase.RUNNING}:
+    wanted = Phase.SUSPENDED if suspend else Phase.RUNNING
+    if phase is Phase.SUCCEEDED or (phase is wanted and why.reason is not Reason.QUEUED):
         return {}
     return {ConditionType.RECONCILING: Claim(holds=True, told=why)}
+
+
+def kept(ended: Status) -> tuple[Condition, ...]:
+    """Return the conditions of a job that has ended: those that it has, with `Stalled` if it failed.
+
+    One that failed under an earlier release has no `Stalled`, nor has one whose end was written before the
+    definition in the cluster was known to take it.
+    """
+    failed = condition(ended, ConditionType.FAILED)
+    if ended.phase is not Phase.FAILED or failed is None or condition(ended, ConditionType.STALLED):
+        return ended.conditions
+    return (*ended.conditions, failed.model_copy(update={"type": ConditionType.STALLED}))
 
 
 def conditions(old: Status, current: Claims, generation: int | None, now: datetime) -> tuple[Condition, ...]:

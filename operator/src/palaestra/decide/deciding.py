@@ -7,7 +7,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.acting import actions
-from palaestra.decide.conditions import Claim, Told, claims, conditions, reconciliation
+from palaestra.decide.conditions import Claim, Claims, Told, claims, conditions, kept, reconciliation
 from palaestra.decide.counting import counted
 from palaestra.decide.decision import Decision
 from palaestra.decide.edits import edits
@@ -18,8 +18,8 @@ from palaestra.decide.moments import first_of, seconds_to, whole
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.remembering import late_word
 from palaestra.decide.replicas import Decided, decided
-from palaestra.decide.situation import Situation
-from palaestra.decide.summary import active, columns, standing, started
+from palaestra.decide.situation import Situation, Verdict
+from palaestra.decide.summary import active, as_first, columns, standing, started
 from palaestra.decide.suspending import seen_generation
 from palaestra.decide.times import Record, Times
 from palaestra.observe.reading import MOST_COUNT
@@ -38,8 +38,12 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
     times = replace(times, now=now)
     each = tuple(_replica(job, seen, prepared, times) for seen in observed.replicas)
     if job.status.phase in TERMINAL:
-        kept = {"observed_generation": job.metadata.generation, "replicas": _kept(job, each)}
-        status = job.status.model_copy(update=kept)
+        updates = {
+            "observed_generation": job.metadata.generation,
+            "conditions": kept(job.status),
+            "replicas": _kept(job, each),
+        }
+        status = job.status.model_copy(update=updates)
     else:
         status = _status(job, observed, prepared, tuple(it.status for it in each), times)
     expiry = expires(status, job.spec.ttl_seconds_after_finished)
@@ -122,7 +126,7 @@ def _status(
     where = standing(replicas)
     current = {
         **claims(_accepted(job, prepared), where.phase, where.told),
-        **reconciliation(where.phase, where.told, suspend=job.spec.suspend),
+        **_reconciliation(job, where, replicas),
     }
     now, generation = times.now, job.metadata.generation
     return Status(
@@ -137,6 +141,13 @@ def _status(
         replicas=tuple(replicas),
         **columns(job, replicas),
     )
+
+
+def _reconciliation(job: TrainingJob, where: Verdict, replicas: Sequence[ReplicaStatus]) -> Claims:
+    """Return how far the job is from its spec; a replica says why it trains though `suspend` is set."""
+    unheeded = where.phase is Phase.RUNNING and job.spec.suspend
+    why = as_first(replicas, Phase.RUNNING).told if unheeded else where.told
+    return reconciliation(where.phase, why, suspend=job.spec.suspend)
 
 
 def _waits(observed: Observed, prepared: Prepared) -> bool:

@@ -22,8 +22,8 @@ def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
         what = f"{phases[Phase.RUNNING]} of {len(replicas)} replicas train"
         return Verdict(phase=Phase.RUNNING, told=Told(reason=Reason.TRAINING, message=what))
     if phases[Phase.SUSPENDED] and not phases[Phase.PENDING]:
-        return _as_first(replicas, Phase.SUSPENDED)
-    return _as_first(replicas, Phase.PENDING)
+        return as_first(replicas, Phase.SUSPENDED)
+    return as_first(replicas, Phase.PENDING)
 
 
 def active(phase: Phase, replicas: Sequence[ReplicaStatus]) -> bool:
@@ -73,7 +73,7 @@ def _ended(replicas: Sequence[ReplicaStatus]) -> Verdict:
     return Verdict(phase=Phase.FAILED, told=told)
 
 
-def _as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> Verdict:
+def as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> Verdict:
     """Return the word of the first replica that stands so."""
     first = next(each for each in replicas if each.phase is phase)
     of = f"replica {first.index}: " if len(replicas) > 1 else ""

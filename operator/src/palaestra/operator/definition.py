@@ -2,7 +2,8 @@
 
 With `crds.install: false` an administrator applies the definition, and may forget to. Then the API
 server drops new fields of a status without an error. No decision depends on them, but people miss them.
-It refuses a status with a condition of a new type, so such conditions are left out until they are known.
+It refuses a status with a condition of a new type, so such conditions are left out until the definition is
+known to take them; those that a status has already stay.
 
 Columns and selectable fields are not compared: without them nothing that is written is lost.
 
@@ -11,7 +12,7 @@ no right to read CustomResourceDefinitions. It does its work also where the docu
 """
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import structlog
@@ -21,7 +22,7 @@ from palaestra.api.job import API_VERSION, KIND
 from palaestra.api.outdated import lacks
 from palaestra.api.status import ConditionType
 from palaestra.cluster import Api, ApiError
-from palaestra.observe.reading import part
+from palaestra.observe.reading import part, parts, text
 
 READ_S = 5.0
 FIRST_PAUSE_S = 10.0  # a definition is published some seconds after it was applied
@@ -34,12 +35,17 @@ log = structlog.get_logger(__name__)
 class Definition:
     """The definition of TrainingJobs in a cluster, compared with this release's.
 
+    Args:
+        api: the cluster.
+        changed: is called when the definition begins to take more of a status.
+
     Attributes:
         outdated: whether it lacks something; None: it could not be read yet.
     """
 
-    def __init__(self, api: Api) -> None:
+    def __init__(self, api: Api, changed: Callable[[], None]) -> None:
         self._api = api.within(READ_S)
+        self._changed = changed
         self._found: tuple[str, ...] = ()
         self._knows_new = False
         self.outdated: bool | None = None
@@ -59,8 +65,10 @@ class Definition:
             log.info("definition not read", error=str(error))
             return
         before, self._found = self._found, tuple(_lacking(served.get("properties", {})))
-        self._knows_new = _condition_types(served) >= _NEW
+        knew, self._knows_new = self._knows_new, _condition_types(served) >= _NEW
         self.outdated = bool(self._found)
+        if self._knows_new and not knew:
+            self._changed()
         if self._found and self._found != before:
             log.warning(
                 "definition outdated",
@@ -69,12 +77,17 @@ class Definition:
                 remedy="kubectl apply --server-side --filename manifests/crd.yaml of this release",
             )
 
-    def accepted(self, status: dict[str, Any]) -> dict[str, Any]:
-        """Return a status as the definition takes it: a condition of an unknown type is left out."""
+    def accepted(self, stored: Any, status: dict[str, Any]) -> dict[str, Any]:
+        """Return a status as the definition takes it: a condition of an unknown type is left out.
+
+        While the definition could not be read, it takes the types that the `stored` status has.
+        """
         if self._knows_new:
             return status
-        known = [each for each in status["conditions"] if each["type"] not in _NEW]
-        return {**status, "conditions": known}
+        there = {text(each, "type") for each in parts(stored, "conditions")}
+        refused = _NEW if self.outdated else _NEW - there
+        kept = [each for each in status["conditions"] if each["type"] not in refused]
+        return {**status, "conditions": kept}
 
     def _follow(self, stopping: threading.Event, every_s: float) -> None:
         pause_s = FIRST_PAUSE_S

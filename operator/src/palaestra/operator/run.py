@@ -55,7 +55,7 @@ class Operator:
         api.on_request = metrics.request
         self._queue: WorkQueue[Key] = WorkQueue(waited=metrics.waited)
         self._caches = Caches(api, options.namespaces, self._changed)
-        self._definition = Definition(api)
+        self._definition = Definition(api, self._look_at_all)
         self._poller = Poller(self._trainers, self._queue.add)
         identity = f"{socket.gethostname()}_{uuid.uuid4().hex[:8]}"
         self._leadership = Leadership(api, options.operator_namespace, NAME, identity)

@@ -19,7 +19,7 @@ from palaestra.operator.writing import Writer, difference
 
 Object = Mapping[str, Any]
 Written = Callable[[Object, Object], None]
-Accepted = Callable[[dict[str, Any]], dict[str, Any]]
+Accepted = Callable[[Any, dict[str, Any]], dict[str, Any]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Telling:
         writer: for the status.
         recorder: for the events.
         written: is called with each TrainingJob as it was, and with the status that was written.
-        accepted: returns a status as the cluster's definition of TrainingJobs takes it.
+        accepted: returns a status as the cluster's definition of TrainingJobs takes it, given the stored one.
     """
 
     def __init__(self, writer: Writer, recorder: Recorder, written: Written, accepted: Accepted) -> None:
@@ -68,7 +68,7 @@ class Telling:
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
         written = StatusWrite()
         if decision.status is not None:
-            status = self._accepted(as_data(decision.status))
+            status = self._accepted(raw.get("status"), as_data(decision.status))
             written = self._write(key, raw, fitted(raw, status), clock_s)
         for each in decision.events:
             if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
