@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+import yaml
 
 from palaestra.cluster.resources import CONFIG_MAPS, TRAINING_JOBS
 from tests.control_plane.programs import programs
@@ -31,11 +32,12 @@ def type_in(control_plane, place, tmp_path):
 
 @pytest.fixture
 def values(tmp_path, type_in):
-    """`values(spec)`: write the chart of the page with another spec of the job."""
+    """`values(spec, suspend=True)`: write the chart of the page, with other values."""
     type_in(TYPED.rpartition("helm upgrade")[0])
 
-    def write(**spec):
-        (tmp_path / "corridor" / "values.yaml").write_text(f"job: {spec}\n")
+    def write(spec, **changeable):
+        content = yaml.safe_dump({"job": spec, "changeable": changeable})
+        (tmp_path / "corridor" / "values.yaml").write_text(content)
 
     return write
 
@@ -66,7 +68,7 @@ def test_helm_waits_until_the_job_trains(place, start, type_in):
 def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in, values):
     """It ended in a tenth of a second, and the release was deployed."""
     start()
-    values(**world_of("nowhere"))
+    values(world_of("nowhere"))
 
     code, output = type_in(UPGRADE)
 
@@ -83,7 +85,7 @@ def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in
 
 def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
     """An operator that is away would make every release a success."""
-    values(trainer={"steps": 100})
+    values({"trainer": {"steps": 100}})
 
     code, output = type_in(UPGRADE.replace("15m", "3s"))
 
@@ -94,17 +96,27 @@ def test_helm_waits_for_a_job_that_no_operator_has_seen(type_in, values):
     )
 
 
-def test_helm_replaces_a_job_whose_spec_changed(place, start, type_in, values):
-    """A spec cannot be changed, so the name has a hash of it; the old job goes."""
+def test_helm_replaces_a_job_whose_spec_changed_and_keeps_one_that_is_resumed(place, start, type_in, values):
+    """A spec cannot be changed, so the name has a hash of it, but not of what can be changed."""
     start()
-    values(suspend=True, trainer={"steps": 100})
+    values({"trainer": {"steps": 100}}, suspend=True)
     assert type_in(UPGRADE)[0] == 0
     first = only_job(place)
 
-    values(suspend=True, trainer={"steps": 200})
+    values({"trainer": {"steps": 200}}, suspend=True)
     code, output = type_in(UPGRADE)
 
     assert code == 0, output
     eventually(lambda: len(place.all(TRAINING_JOBS)) == 1)
-    assert only_job(place) != first
-    assert place.status(only_job(place))["phase"] == "Suspended"
+    second = only_job(place)
+    assert second != first
+    assert place.status(second)["phase"] == "Suspended"
+
+    values({"trainer": {"steps": 200}}, suspend=False)
+    with ThreadPoolExecutor(1) as threads:
+        typed = threads.submit(type_in, UPGRADE)
+        place.run(place.pods(second)[0])
+        code, output = typed.result(DEADLINE_S)
+
+    assert (code, place.status(second)["phase"]) == (0, "Running"), output
+    assert only_job(place) == second
