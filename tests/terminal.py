@@ -1,7 +1,9 @@
 """A person's terminal: shell commands of a page of the documentation, typed as they stand."""
 
 import os
+import signal
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 
 
@@ -23,18 +25,26 @@ class Terminal:
             self._environment["PATH"] = f"{path}:{os.environ['PATH']}"
 
     def try_(self, text: str, within_s: float) -> tuple[int, str]:
-        """Type commands, up to the first that fails; return the exit code and all that they print."""
-        done = subprocess.run(
+        """Type commands, up to the first that fails; return the exit code and all that they print.
+
+        Raises:
+            subprocess.TimeoutExpired: they took longer than `within_s`, and were killed.
+        """
+        with subprocess.Popen(
             ["bash", "-euc", self._before + text],
             cwd=self._folder,
             env=self._environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=within_s,
-            check=False,
-        )
-        return done.returncode, done.stdout
+            start_new_session=True,
+        ) as shell:
+            try:
+                printed, _ = shell.communicate(timeout=within_s)
+            finally:  # a program that takes too long would go on without its shell
+                with suppress(ProcessLookupError):
+                    os.killpg(shell.pid, signal.SIGKILL)
+        return shell.returncode, printed
 
     def type_in(self, text: str, within_s: float) -> str:
         """Type commands, which must succeed; return all that they print."""
