@@ -12,7 +12,7 @@ from palaestra.doctor import Verdict
 from palaestra.doctor.finding import right, wrong
 from palaestra.doctor.installation import judged_images
 from palaestra.doctor.platform import FIRST, difference, judged_pod, judged_version, release, trial_pod
-from palaestra.doctor.rights import OPERATOR
+from palaestra.doctor.rights import OPERATOR, OPERATOR_WITH_KUEUE
 
 ROOT = Path(__file__).parents[3]
 
@@ -124,7 +124,10 @@ def test_the_operators_rights_are_those_of_an_installation():
         for verb in rule["verbs"]
     }
 
-    assert {(each.group, each.resource, verb) for each in OPERATOR for verb in each.verbs} == granted
+    checked = {
+        (each.group, each.resource, verb) for each in OPERATOR + OPERATOR_WITH_KUEUE for verb in each.verbs
+    }
+    assert checked == granted
 
 
 def test_a_finding_is_a_line_and_its_remedy_another():

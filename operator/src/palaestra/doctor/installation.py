@@ -8,13 +8,14 @@ from palaestra.client.errors import TookTooLong
 from palaestra.client.following import changes
 from palaestra.cluster import ApiError, Forbidden, NotFound
 from palaestra.cluster.api import Object
-from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS
+from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS, WORKLOADS
 from palaestra.doctor.finding import Finding, Site, right, unknown, warning, wrong
-from palaestra.doctor.rights import OPERATOR, Account, allowed
+from palaestra.doctor.rights import OPERATOR, OPERATOR_WITH_KUEUE, Account, missing
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
 from palaestra.plan.network_policy import OPERATOR_LABEL
 
+ROLES = "install the roles of this release, for this namespace too"
 LOGS = "`kubectl logs -n {namespace} deploy/{name}` says why"
 TRAINER_IMAGE = "--trainer-image="
 STUB_IMAGE = "--stub-image="
@@ -92,23 +93,23 @@ def leads(site: Site) -> Iterator[Finding]:
 
 
 def operator_rights(site: Site) -> Iterator[Finding]:
-    """Tell what the operator's account may not do in the namespace of the person who asks."""
+    """Report what the operator's account may not do in the namespace of the person who asks.
+
+    The rights for Kueue are checked where the cluster serves the Workloads that the operator reads.
+    """
     what, deployment = "operator's rights", _deployment(site)
     name = deployment["spec"]["template"]["spec"]["serviceAccountName"] if deployment else NAME
     account = Account(namespace=site.operator_namespace, name=name)
-    missing = [
-        said
-        for each in OPERATOR
-        for said, attributes in each.asked(site.namespace)
-        if not allowed(site, attributes, account=account)
-    ]
-    if missing:
-        yield wrong(
-            what,
-            f"service account {name} may not {', '.join(missing)} in {site.namespace}",
-            "install the roles of this release, for this namespace too",
-        )
-    else:
+    denied = missing(site, OPERATOR, account=account)
+    has_kueue = site.api.serves(WORKLOADS.api_version)
+    unread = missing(site, OPERATOR_WITH_KUEUE, account=account) if has_kueue else []
+    if denied:
+        fact = f"service account {name} may not {', '.join(denied)} in {site.namespace}"
+        yield wrong(what, fact, ROLES)
+    if unread:
+        fact = f"service account {name} may not {', '.join(unread)} in {site.namespace}"
+        yield warning(what, f"{fact}; a queued job does not say why Kueue does not admit it", ROLES)
+    if not denied and not unread:
         yield right(what, f"suffice in {site.namespace}")
 
 
