@@ -9,7 +9,9 @@ from palaestra.decide.conditions import Told
 from palaestra.decide.situation import Finding, Situation, found, told
 from palaestra.decide.suspending import ended_by_suspension, unheeded
 
-UNASKED = "; why that takes long was not asked, as too many others wait; `kubectl describe` shows it"
+UNASKED = "; why that takes long was not asked, as too many others wait"
+DESCRIBE = "; `kubectl describe` shows it"
+DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # no other object has Kueue's words
 
 
 def held(it: Situation) -> Finding | None:
@@ -39,7 +41,7 @@ def suspended(it: Situation) -> Finding | None:
 def _with_words(it: Situation, why: Told) -> str:
     """Return the message of `why`; an operator that was restarted keeps Kueue's words until it has asked."""
     if it.seen.unasked:
-        return why.message + UNASKED
+        return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = it.old.message or "", why.message.removesuffix(AGAIN)
     waited = it.old.reason == why.reason == Reason.QUEUED and before.startswith(f"{plain}: ")
     return before if waited and it.seen.unadmitted is None else why.message
@@ -73,7 +75,7 @@ def starts(it: Situation) -> Finding | None:
         what = "its pod is about to be created"
     else:
         what = "its last pod has ended" if it.seen.pod.ended else "its containers start"
-    return found(Reason.STARTING, what=what + (UNASKED if it.seen.unasked else ""))
+    return found(Reason.STARTING, what=what + (UNASKED + DESCRIBE if it.seen.unasked else ""))
 
 
 def runs(it: Situation) -> bool:
