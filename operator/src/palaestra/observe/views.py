@@ -53,7 +53,7 @@ class Objects:
             a Job that was found to have one of our names belongs among `jobs`, whoever owns it.
         events: FailedCreate events about those Jobs, and warnings about pods that wait for volumes.
         unadmitted: by a Job's uid why Kueue has not admitted it, where that was asked for.
-        unasked: uids of Jobs and pods about which nothing was asked, though they lack something.
+        unasked: uids of Jobs and pods that lack something, and about which the operator sends no request.
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
         denied: what the API server said when it last refused an object of a replica; None: an object of
             the whole job. Absent: nothing is refused.
@@ -287,7 +287,8 @@ class ReplicaObserved:
         unmounted: why the newest pod's volumes are not there, in the cluster's words; "": they are, or
             nobody said so.
         unadmitted: why Kueue has not admitted the Job; "": it has, or gives no reason; None: not asked yet.
-        unasked: its pod, the pod's volumes or Kueue's admission are not there, and nobody was asked why.
+        unasked: its pod, the pod's volumes or Kueue's admission are missing, and the operator sends no
+            request about it.
         switcher: the field manager that set the Job's `spec.suspend`, where it is not as the operator set it;
             "": it is, or the manager is unknown.
     """

@@ -29,7 +29,7 @@ class Answers(Generic[Item, Fact]):
 
     Attributes:
         facts: the last answer about each; an object without one is absent.
-        unasked: those about which nobody is asked, as there are too many.
+        unasked: objects for which there is no room; the operator sends no request about them.
         again_s: when to look again; None: nothing is lacking.
     """
 
@@ -96,7 +96,7 @@ class Asking(Memory[Item, _Lack[Fact]]):
 
 
 class _Turns:
-    """Who may ask when: a bucket of one token, and a queue of moments for those that find it empty."""
+    """Limits the rate: one token, and a queue of moments for objects that must wait."""
 
     def __init__(self, now: float) -> None:
         self._lock = threading.Lock()
