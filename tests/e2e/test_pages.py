@@ -140,7 +140,7 @@ def test_every_command_of_the_tools_works(at_home, namespace, tmp_path):
     printed = at_home.type_in(session, SESSION_S)
 
     assert (tmp_path / "fetched/minimal/0/model.zip").is_file()
-    assert "reason='resumed at step " in printed
+    assert "suspension 1" in printed
     assert namespace.select("trainingjobs") == []
 
 

@@ -151,7 +151,7 @@ def test_a_job_of_another_controller_is_left_alone(place, start):
     place.pods("ours")
 
     assert place.children("theirs") == {}
-    assert place.status("theirs") == {}
+    assert place.status("theirs")["observedGeneration"] == 0
 
 
 def test_a_world_that_is_missing_is_told_and_the_job_starts_when_it_is_there(place, start):
