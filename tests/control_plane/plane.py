@@ -104,15 +104,19 @@ class ControlPlane:
         )
 
     def await_kinds(self, *kinds: str) -> None:
-        """Return when CustomResourceDefinitions, named as for kubectl, are served.
+        """Return when CustomResourceDefinitions, named as for kubectl, are established and in discovery.
 
-        kubectl gives up at once on one that has no condition yet; so it is asked again.
+        kubectl gives up at once on one that has no condition yet, and keeps for hours a discovery without
+        it, which `kubectl get CATEGORY` trusts; `kubectl api-resources` reads discovery anew.
 
         Raises:
             TooLate: one of them is not within 30 s.
         """
         wait = ("wait", "--for=condition=Established", "--timeout=10s", *kinds)
         eventually(lambda: self.kubectl(*wait).returncode == 0)
+        listed = self.kubectl("get", "--output=name", *kinds).stdout.split()
+        names = {each.partition("/")[2] for each in listed}
+        eventually(lambda: names <= set(self.kubectl("api-resources", "--output=name").stdout.split()))
 
     def kubeconfig_of(self, user: str, group: str = "") -> Path:
         """Write a kubeconfig for a user with a certificate and return its path."""
