@@ -37,3 +37,13 @@ def definitions(module: str, folder: str) -> Path:
     if "Dir" not in answer:
         raise NoPrograms(f"{module} is not downloaded; get it with: go mod download {module}")
     return Path(answer["Dir"]) / folder
+
+
+def kinds_of_prometheus() -> list[str]:
+    """Return kubectl's options for the definitions of the kinds that the chart uses of Prometheus' Operator.
+
+    Raises:
+        NoPrograms: Go, or the module, is not there.
+    """
+    folder, kinds = definitions(*PROMETHEUS), ("podmonitors", "servicemonitors", "prometheusrules")
+    return [f"--filename={folder}/monitoring.coreos.com_{each}.yaml" for each in kinds]

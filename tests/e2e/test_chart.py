@@ -11,7 +11,7 @@ import subprocess
 
 import pytest
 
-from tests.chart.definitions import PROMETHEUS, definitions
+from tests.chart.definitions import kinds_of_prometheus
 from tests.chart.helm import CHART, ROOT
 from tests.chart.modes import MODES, merged
 from tests.e2e.jobs import WAIT, make_claim
@@ -24,7 +24,6 @@ pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 
 WITHIN_S = 600  # for `helm test`, which pulls nothing here
 RELEASE = "palaestra"
-KINDS_OF_PROMETHEUS = ("podmonitors", "servicemonitors", "prometheusrules")
 NOTEBOOKS = "notebooks"
 TOKEN = "sesame"  # of the notebook server
 # What needs nothing that this cluster lacks: a registry.
@@ -89,8 +88,7 @@ def taken_over(cluster, earlier_chart):
 @pytest.fixture
 def surroundings(cluster):
     """What the chart asks of a cluster for everything that it can bring: Prometheus' kinds, runs, a token."""
-    folder = definitions(*PROMETHEUS)
-    files = [f"--filename={folder / f'monitoring.coreos.com_{each}.yaml'}" for each in KINDS_OF_PROMETHEUS]
+    files = kinds_of_prometheus()
     cluster.kubectl("apply", "--server-side", *files)
     cluster.create("persistentvolumeclaims", make_claim("runs", namespace=SYSTEM))
     secret = {"metadata": {"name": NOTEBOOKS, "namespace": SYSTEM}, "stringData": {"token": TOKEN}}

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.chart.definitions import PROMETHEUS, definitions
+from tests.chart.definitions import kinds_of_prometheus
 from tests.chart.helm import ROOT
 from tests.e2e.jobs import make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace
@@ -25,7 +25,6 @@ SESSION_S = 800  # a small training, with a pause
 RUNS = "from urllib.request import urlopen; print(urlopen('http://127.0.0.1:6006/data/runs').read())"
 INSTALL = (ROOT / "docs" / "install.md").read_text()
 TOOLS = (ROOT / "docs" / "tools.md").read_text()
-KINDS_OF_PROMETHEUS = ("podmonitors", "servicemonitors", "prometheusrules")
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
 NAMESPACES = (LAB, "robots", "drones")  # of the page, besides that of the operator
 TENSORBOARD, NOTEBOOKS = "palaestra-tensorboard", "palaestra-jupyter"
@@ -60,8 +59,7 @@ def untouched(cluster, terminal):
         (pytest.skip if os.environ.get("PALAESTRA_CLUSTER") == "existing" else pytest.fail)(
             f"this cluster has the namespaces {there} already"
         )
-    folder = definitions(*PROMETHEUS)
-    kinds = " ".join(f"--filename={folder}/monitoring.coreos.com_{each}.yaml" for each in KINDS_OF_PROMETHEUS)
+    kinds = " ".join(kinds_of_prometheus())
     undo = (
         f"helm uninstall palaestra --namespace {SYSTEM} --ignore-not-found",
         f"kubectl delete --ignore-not-found namespace {SYSTEM} {' '.join(NAMESPACES)}",
@@ -123,7 +121,7 @@ def assert_a_run_is_shown_by_the_name_of_its_job(lab):
 
 @pytest.fixture
 def at_home(terminal, cluster, namespace, tmp_path):
-    """The terminal of somebody whose kubeconfig names the namespace of the test; the operator is up."""
+    """A terminal whose kubeconfig names the namespace of the test; the operator is up."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     terminal.type_in("kubectl config view --raw --flatten >config", READY_S)
     mine = Terminal(tmp_path, path=Path(sys.executable).parent, KUBECONFIG=str(tmp_path / "config"))

@@ -49,7 +49,7 @@ def only_job(place):
 
 
 def test_helm_waits_until_the_job_trains(place, start, type_in):
-    """The commands of the page as they stand, typed by somebody else while a kubelet works."""
+    """The commands of the page work as they stand, while a kubelet starts the pod."""
     start()
     with ThreadPoolExecutor(1) as threads:
         typed = threads.submit(type_in, TYPED)

@@ -134,7 +134,7 @@ def test_a_job_of_which_kueue_makes_no_workload_says_what_to_check(place, start)
 
 @pytest.mark.usefixtures("kueue")
 def test_a_job_that_is_admitted_is_asked_about_no_more(place, start, control_plane):
-    """With nothing in a queue, the operator at rest asks nobody."""
+    """With nothing in a queue, the operator at rest sends no request."""
     start()
     job_in_queue(place)
     eventually(lambda: lists(control_plane, place), 60)

@@ -70,7 +70,7 @@ def replace_pod(place):
 
 
 def wait_in_queue(place):
-    """Give a suspended Job a queue, as Kueue does by a namespace's default; nobody admits it."""
+    """Give a suspended Job a queue, as Kueue does by a namespace's default; it is never admitted."""
     place.train("queued", suspend=True)
     eventually(lambda: place.get(JOBS, "queued-0"))
     place.api.merge(JOBS, place.name, "queued-0", {"metadata": {"labels": {QUEUE_LABEL: "default"}}})

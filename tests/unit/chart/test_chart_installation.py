@@ -49,7 +49,7 @@ def test_its_namespace_enforces_the_restricted_standard(made):
 
 
 def test_nothing_of_helm_test_is_in_it(made):
-    """Nobody without Helm can run it, and its account would hold rights for nothing."""
+    """Only Helm can run it, so without Helm its account would hold rights that nothing uses."""
     assert {
         each["metadata"].get("labels", {}).get("app.kubernetes.io/component") for each in made.values()
     } == {

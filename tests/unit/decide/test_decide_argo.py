@@ -44,7 +44,7 @@ def test_a_job_that_starts_is_progressing_with_its_reason(accepted, health):
 
 
 def test_a_job_that_lacks_something_is_degraded_with_the_remedy(make_scene, health):
-    """Nobody has to look at the TrainingJob for it."""
+    """The page of the application shows it without a look at the TrainingJob."""
     scene = make_scene(storage={"existingClaim": "runs"})
     scene.settle()
 

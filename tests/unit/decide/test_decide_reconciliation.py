@@ -18,7 +18,7 @@ def gaps(status):
 
 
 def test_a_job_that_trains_is_as_its_spec_asks(training):
-    """A job runs for hours: nobody wants `helm --wait` to last until its end, and for a Job it does not."""
+    """A job runs for hours: `helm --wait` returns before its end, as it does for a Job."""
     scene, _ = training()
 
     assert gaps(scene.status) == {}

@@ -80,7 +80,7 @@ def queued(words):
     ],
 )
 def test_amounts_that_change_with_each_job_of_the_queue_are_written_as_progress(words, wait_s):
-    """What is short is news; how much of it changes whenever another job comes or goes."""
+    """A new shortage is news; its amount changes whenever another job comes or goes."""
     old = queued("cpu in flavor any-machine, 425m more needed")
 
     assert write_in_s(old, queued(words), 5) == wait_s

@@ -77,7 +77,7 @@ def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
     return {ConditionType.RECONCILING: Claim(holds=True, told=why)}
 
 
-def kept(ended: Status) -> tuple[Condition, ...]:
+def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
     """Return the conditions of a job that has ended: those that it has, with `Stalled` if it failed.
 
     One that failed under an earlier release has no `Stalled`, nor has one whose end was written before the

@@ -7,7 +7,15 @@ from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.acting import actions
-from palaestra.decide.conditions import Claim, Claims, Told, claims, conditions, kept, reconciliation
+from palaestra.decide.conditions import (
+    Claim,
+    Claims,
+    Told,
+    claims,
+    conditions,
+    conditions_of_ended,
+    reconciliation,
+)
 from palaestra.decide.counting import counted
 from palaestra.decide.decision import Decision
 from palaestra.decide.edits import edits
@@ -40,7 +48,7 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
     if job.status.phase in TERMINAL:
         updates = {
             "observed_generation": job.metadata.generation,
-            "conditions": kept(job.status),
+            "conditions": conditions_of_ended(job.status),
             "replicas": _kept(job, each),
         }
         status = job.status.model_copy(update=updates)

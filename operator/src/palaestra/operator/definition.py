@@ -98,7 +98,7 @@ class Definition:
     def _try_look(self) -> None:
         try:
             self.look()
-        except Exception:  # what nobody foresaw in the document must not end the operator
+        except Exception:  # a document of an unforeseen shape must not end the operator
             log.exception("definition not compared")
 
 

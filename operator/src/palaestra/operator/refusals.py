@@ -57,7 +57,7 @@ def podless(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
 
 
 def is_suspended(job: Object) -> bool:
-    """Return whether a Job makes no pods until somebody resumes it."""
+    """Return whether a Job is suspended, so that it makes no pods."""
     return (job.get("spec") or {}).get("suspend") is True
 
 
