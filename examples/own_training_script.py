@@ -1,7 +1,7 @@
 """A training loop of your own: `trainer: {command: [python, own_training_script.py]}`.
 
 It runs where the built-in loop would: the simulators of the TrainingJob are there, and every
-environment that is made takes the next one, collecting ones first. A fault is not mended here.
+environment that is made takes one that has its role. A fault is not mended here.
 SIGTERM ends it after the step that is under way, with the model saved and an exit code that asks
 to be started again; started again, it goes on from there.
 """
@@ -30,10 +30,10 @@ interrupted = threading.Event()
 signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
 
 
-def make() -> gymnasium.Env:
-    """Make an environment in the next simulator."""
+def make(role: str = "Collect") -> gymnasium.Env:
+    """Make an environment in a simulator with this role that no other environment has."""
     task = job.environment
-    return Monitor(gymnasium.make(task.id, reward=task.reward, **task.options))
+    return Monitor(gymnasium.make(task.id, role=role, reward=task.reward, **task.options))
 
 
 envs = DummyVecEnv([make] * len(job.with_role("Collect")))
@@ -49,5 +49,5 @@ model.save(saved)
 if interrupted.is_set():
     sys.exit(75)  # interrupted, start me again
 if job.with_role("Evaluate"):
-    mean_return, _ = evaluate_policy(model, make(), n_eval_episodes=job.evaluation.episodes)
+    mean_return, _ = evaluate_policy(model, make("Evaluate"), n_eval_episodes=job.evaluation.episodes)
     print(f"mean return {mean_return:.2f} over {job.evaluation.episodes} episodes")

@@ -70,6 +70,10 @@ class FakeSimulator:
         """Note it."""
         self.log.append("stop")
 
+    def close(self) -> None:
+        """Note it."""
+        self.log.append("close")
+
     def restart(self) -> None:
         """Live again."""
         self.log.append("restart")

@@ -10,28 +10,33 @@ from pathlib import Path
 import pytest
 from stable_baselines3 import PPO
 
-from palaestra_trainer.configuration import load
-from palaestra_trainer.environments import configured
+from palaestra_trainer.simulators import connect
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 
 
 @pytest.fixture
 def script(write_job, fakes, tmp_path, monkeypatch):
-    """Run the script in two simulators and one to evaluate in; return those that it left over."""
+    """Run the script in two simulators and one to evaluate in; return the names of those that it started."""
     before = signal.getsignal(signal.SIGTERM)
     job = write_job(collectors=2, steps=100)
     (tmp_path / "run").mkdir()
     monkeypatch.setenv("PALAESTRA_CONFIG", str(job))
     monkeypatch.setenv("PALAESTRA_RUN", str(tmp_path / "run"))
 
-    def run(on_start=lambda: None):
-        members = fakes.make_members(load(job))
-        members[0].start = on_start
-        handed_out = iter(members)
-        monkeypatch.setattr(configured, "configured_simulators", lambda: handed_out)
+    def run(attempt, on_start=lambda: None):
+        started = []
+
+        def made(configuration):
+            [member] = fakes.make_members(configuration)
+            member.start = lambda: (started.append(member.name), on_start())
+            return [member]
+
+        (tmp_path / attempt).mkdir()
+        monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / attempt))
+        monkeypatch.setattr(connect, "connect", made)
         runpy.run_path(str(SCRIPT), run_name="__main__")
-        return list(handed_out)
+        return started
 
     yield run
     signal.signal(signal.SIGTERM, before)
@@ -40,21 +45,21 @@ def script(write_job, fakes, tmp_path, monkeypatch):
 @pytest.mark.filterwarnings("ignore:.*not wrapped.*")
 def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_path, capsys):
     """It needs nothing but gymnasium, Stable-Baselines3 and the two variables."""
-    left = script()
+    started = script("first")
 
     assert PPO.load(tmp_path / "run" / "model.zip").num_timesteps == 1024
     assert "mean return" in capsys.readouterr().out
-    assert left == []
+    assert started == ["collect-0", "collect-1", "evaluate-0"]
 
 
 @pytest.mark.filterwarnings("ignore:.*not wrapped.*")
 def test_a_script_that_is_interrupted_goes_on_from_its_model(script, tmp_path, capsys):
     """Its exit code asks to be started again; that would be a lie if everything were lost."""
     with pytest.raises(SystemExit) as ended:
-        script(on_start=lambda: os.kill(os.getpid(), signal.SIGTERM))
+        script("first", on_start=lambda: os.kill(os.getpid(), signal.SIGTERM))
     first = PPO.load(tmp_path / "run" / "model.zip").num_timesteps
 
-    script()
+    script("second")
 
     assert ended.value.code == 75
     assert 0 < first < 1024

@@ -12,8 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import palaestra_trainer.environments
-from palaestra_trainer.configuration import parse
-from palaestra_trainer.environments import MoveToTargetEnv, configured
+from palaestra_trainer.environments import MoveToTargetEnv
 from palaestra_trainer.environments.move_to_target import make
 from palaestra_trainer.environments.observation import PARTS
 from palaestra_trainer.errors import ConfigurationError
@@ -106,55 +105,6 @@ def test_a_wrong_option_is_told_before_a_simulator_is_asked_for():
 def test_without_robot_or_configuration_the_error_says_so(monkeypatch):
     """The way out is in the message: the variable that names the configuration."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
-    configured.configured_simulators.cache_clear()
 
     with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG"):
         gymnasium.make(NAME)
-
-
-class _Startable:
-    """A simulator that only tells whether it was started."""
-
-    def __init__(self) -> None:
-        self.robot, self.scene = fake_arena()
-        self.started = False
-
-    def start(self) -> None:
-        self.started = True
-
-
-def test_each_environment_takes_the_next_simulator_and_starts_it():
-    """Two environments in one simulator would move each other's robot."""
-    simulators = [_Startable(), _Startable()]
-    waiting = iter(simulators)
-
-    robot, scene = configured.take(waiting)
-
-    assert (robot, scene) == (simulators[0].robot, simulators[0].scene)
-    assert [it.started for it in simulators] == [True, False]
-
-
-def test_simulators_that_collect_are_handed_out_first():
-    """A script makes environments to train in before one to evaluate in, however the job is written."""
-    roles = ["Evaluate", "Collect", "Evaluate", "Collect"]
-    configuration = parse(
-        {
-            "job": "mixed",
-            "environment": {"id": NAME},
-            "steps": 1,
-            "simulators": [
-                {"name": f"s-{index}", "group": "s", "index": index, "role": role}
-                for index, role in enumerate(roles)
-            ],
-        }
-    )
-
-    ordered = configured.collecting_first(configuration)
-
-    assert [it.name for it in ordered.simulators] == ["s-1", "s-3", "s-0", "s-2"]
-
-
-def test_more_environments_than_simulators_are_refused():
-    """The remedy is the job's or the script's: more of the one, or fewer of the other."""
-    with pytest.raises(ConfigurationError, match="add some, or make fewer"):
-        configured.take(iter([]))

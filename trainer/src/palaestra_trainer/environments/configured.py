@@ -1,73 +1,61 @@
-"""The simulators that PALAESTRA_CONFIG names, handed out one for each environment that asks."""
+"""The simulators that PALAESTRA_CONFIG names, one for each environment that asks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from functools import cache
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
 
-from palaestra_trainer.configuration import Configuration, load
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.configuration import Configuration, Role, load
+from palaestra_trainer.environments.claims import claim
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
 
-class Startable(Protocol):
-    """A simulator, as far as an environment has to know one."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Configured:
+    """A simulator that is started and this process's own until it is given back.
 
-    @property
-    def robot(self) -> RobotinoAbc:
-        """What is driven in it."""
-        ...
+    Attributes:
+        name: as in the configuration.
+        robot: what is driven in it.
+        scene: where its episodes are arranged.
+        release: drops the connections and lets another environment, of any process, have the simulator, which
+            keeps running; safe to repeat, and without effect in a process that was forked.
+    """
 
-    @property
-    def scene(self) -> Scene:
-        """Where its episodes are arranged."""
-        ...
-
-    def start(self) -> None:
-        """Start it; `SimulatorFault` if it doesn't come up."""
-        ...
+    name: str
+    robot: RobotinoAbc
+    scene: Scene
+    release: Callable[[], None]
 
 
-def next_simulator() -> tuple[RobotinoAbc, Scene]:
-    """Return robot and scene of the next configured simulator, started.
+def configured_simulator(role: Role) -> Configured:
+    """Return a simulator with this role that no other environment has, started.
 
     Raises:
-        ConfigurationError: there is no configuration, or all its simulators are taken.
+        ConfigurationError: there is no configuration, or each simulator with this role has an environment.
         SimulatorFault: the simulator does not start.
     """
-    return take(configured_simulators())
-
-
-def take(simulators: Iterator[Startable]) -> tuple[RobotinoAbc, Scene]:
-    """Return robot and scene of the next of these simulators, started.
-
-    Raises:
-        ConfigurationError: none is left.
-        SimulatorFault: it does not start.
-    """
-    simulator = next(simulators, None)
-    if simulator is None:
-        raise ConfigurationError(
-            "PALAESTRA_CONFIG: each of its simulators has an environment; add some, or make fewer"
-        )
-    simulator.start()
-    return simulator.robot, simulator.scene
-
-
-@cache
-def configured_simulators() -> Iterator[Startable]:
-    """Return what is left of the simulators in PALAESTRA_CONFIG, the same iterator to everyone.
-
-    Those that collect come first, so that whoever trains before evaluating gets each in its role.
-    """
-    # Only here do environments meet ROS, and only when nobody gave them a robot.
+    # Only here do environments meet ROS, and only where no robot was passed.
     from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
 
-    return iter(connect(collecting_first(load())))
+    configuration = load()
+    claimed = claim(configuration, role)
+    try:
+        [simulator] = connect(_alone(configuration, claimed.simulator.name))
+        simulator.start()
+    except BaseException:
+        claimed.release()
+        raise
+
+    def release() -> None:
+        if claimed.held:
+            simulator.close()
+            claimed.release()
+
+    return Configured(name=simulator.name, robot=simulator.robot, scene=simulator.scene, release=release)
 
 
-def collecting_first(configuration: Configuration) -> Configuration:
-    """Return the same configuration with its simulators by role, in the file's order within each."""
-    ordered = configuration.with_role("Collect") + configuration.with_role("Evaluate")
-    return configuration.model_copy(update={"simulators": ordered})
+def _alone(configuration: Configuration, name: str) -> Configuration:
+    """Return the configuration with this simulator only; a copy, since validation wants a collector."""
+    chosen = tuple(simulator for simulator in configuration.simulators if simulator.name == name)
+    return configuration.model_copy(update={"simulators": chosen})

@@ -16,10 +16,11 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from palaestra_trainer.configuration import Role
 from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
 from palaestra_trainer.environments.arena import Point, chosen_task
-from palaestra_trainer.environments.configured import next_simulator
+from palaestra_trainer.environments.configured import configured_simulator
 from palaestra_trainer.environments.observation import Situation
 from palaestra_trainer.environments.options import Options, parse
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
@@ -116,20 +117,29 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     weighted), `extra_steps` (control periods that a late sensor made necessary).
 
     `render()` is not implemented: it raises NotImplementedError. `close()` leaves the simulator
-    running: its pod ends it, or else whoever started it.
+    running: its pod ends it, or the program that started it. A simulator of PALAESTRA_CONFIG is free
+    for another environment then.
 
     Args:
         robot: what is driven.
         scene: where episodes are arranged.
         options: what is observed, done and rewarded.
+        on_close: called by `close`.
     """
 
-    def __init__(self, robot: RobotinoAbc, scene: Scene, options: Options | None = None) -> None:
+    def __init__(
+        self,
+        robot: RobotinoAbc,
+        scene: Scene,
+        options: Options | None = None,
+        on_close: Callable[[], None] | None = None,
+    ) -> None:
         self.options = options or Options()
         self.observation_space = self._numbers = observation.space(self.options.observe)
         self.action_space = action_space(self.options)
         self._robot = robot
         self._scene = scene
+        self._on_close = on_close
         self._situation: Situation | None = None
         self._target: Point = (0.0, 0.0)
         self._steps = 0
@@ -191,6 +201,11 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         truncated = outcome is Outcome.TIME_UP
         return self._numbers_of(after), sum(terms.values()), outcome.terminal, truncated, info
 
+    def close(self) -> None:
+        """Give back the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        if self._on_close is not None:
+            self._on_close()
+
     def _look(self, velocity: Twist) -> Situation:
         return Situation(
             distances_m=self._robot.distances(),
@@ -215,7 +230,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 def make(
     robot: RobotinoAbc | None = None,
     scene: Scene | None = None,
-    simulator: Callable[[], tuple[RobotinoAbc, Scene]] = next_simulator,
+    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
+    role: Role = "Collect",
     **options: Any,
 ) -> MoveToTargetEnv:
     """Return the environment that `gymnasium.make("MoveToTargetEnv-v0", ...)` asks for.
@@ -223,20 +239,24 @@ def make(
     Args:
         robot: what is driven, together with its `scene`.
         scene: where episodes are arranged.
-        simulator: called for robot and scene when none are given; by default the next
-            simulator of PALAESTRA_CONFIG, and `palaestra_trainer.testing.fake_arena`
-            needs none. `make_vec` calls it once for each environment.
+        simulator: called for robot and scene when none are given, once for each environment of `make_vec`;
+            `palaestra_trainer.testing.fake_arena` needs no simulator.
+        role: without `robot` and `simulator`, the environment takes the first simulator of PALAESTRA_CONFIG
+            with this role that no other environment has, in any process.
         options: see `Options`; names of movements and parts are text.
 
     Raises:
-        ConfigurationError: an option is wrong, or there is no simulator to be had.
+        ConfigurationError: an option is wrong, or no simulator with this role is left.
     """
     chosen = parse(options)
     if (robot is None) != (scene is None):
         raise ConfigurationError("robot, scene: one came without the other; give both or neither")
-    if robot is None or scene is None:
-        robot, scene = simulator()
-    return MoveToTargetEnv(robot, scene, chosen)
+    if robot is not None and scene is not None:
+        return MoveToTargetEnv(robot, scene, chosen)
+    if simulator is not None:
+        return MoveToTargetEnv(*simulator(), chosen)
+    taken = configured_simulator(role)
+    return MoveToTargetEnv(taken.robot, taken.scene, chosen, taken.release)
 
 
 def _transition(before: Situation, after: Situation, outcome: Outcome) -> Transition:

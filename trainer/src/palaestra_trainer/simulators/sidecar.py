@@ -29,8 +29,11 @@ class Sidecar:
 
     Every method raises SimulatorDead when the sidecar is gone and SimulatorHung when it does not answer.
 
-    Args:
+    Attributes:
         address: e.g. http://127.0.0.1:7100
+
+    Args:
+        address: kept as the attribute.
         name: the simulator's name, for messages.
         above: what stands before the paths of this simulator.
     """
@@ -38,13 +41,13 @@ class Sidecar:
     def __init__(self, address: str, name: str, above: str = "") -> None:
         parts = urlsplit(address)
         self._host, self._port = str(parts.hostname), parts.port
-        self._address = address
+        self.address = address
         self._name = name
         self._above = above
 
     def standby(self) -> Sidecar:
         """Return the second simulator of the same sidecar, which has one if it was started with --standby."""
-        return Sidecar(self._address, self._name, STANDBY)
+        return Sidecar(self.address, self._name, STANDBY)
 
     def state(self) -> SimulatorState:
         """Return what the sidecar says of its simulator."""

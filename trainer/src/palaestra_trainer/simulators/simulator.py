@@ -120,6 +120,11 @@ class Simulator:
         self.robot.close()
         self.webots.stop()
 
+    def close(self) -> None:
+        """Drop all connections; the simulator goes on running."""
+        self.robot.close()
+        self.webots.close()
+
     def abandon(self) -> None:
         """Let a start or restart that is under way in another thread fail soon, by killing the simulator."""
         self._abandoned.set()

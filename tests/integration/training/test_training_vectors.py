@@ -1,0 +1,104 @@
+"""The vector environments of gymnasium and Stable-Baselines3, in the simulators of a job: real stubs."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+
+import gymnasium
+import numpy as np
+import pytest
+import yaml
+from stable_baselines3.common.vec_env import SubprocVecEnv
+
+import palaestra_trainer.environments  # noqa: F401 - registers the environment
+from palaestra_trainer.simulators.process import ProcessLauncher
+
+TASK = "palaestra_trainer.environments:MoveToTargetEnv-v0"
+ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate"}
+
+
+@pytest.fixture
+def simulators(master, tmp_path, monkeypatch):
+    """Sidecars of a job with two collecting simulators and one that evaluates; PALAESTRA_CONFIG names it."""
+    del master
+    launchers = {
+        name: ProcessLauncher(
+            "arena",
+            names=(
+                "--job=vectors",
+                f"--uid={tmp_path}",
+                f"--group={name[:-2]}",
+                f"--index={name[-1]}",
+                f"--work={tmp_path / name}",
+            ),
+        )
+        for name in ROLES
+    }
+    job = {
+        "job": "vectors",
+        "environment": {"id": "MoveToTargetEnv-v0"},
+        "steps": 100,
+        "simulators": [
+            {"name": n, "group": n[:-2], "index": int(n[-1]), "role": role, "control": launchers[n].address}
+            for n, role in ROLES.items()
+        ],
+    }
+    (tmp_path / "training.yaml").write_text(yaml.safe_dump(job))
+    monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "training.yaml"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    yield launchers
+    for launcher in launchers.values():
+        launcher.close()
+
+
+def running(simulators):
+    """Return the names of the simulators that were started."""
+    return [name for name, launcher in simulators.items() if launcher.ready()]
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_each_worker_of_gymnasium_drives_a_simulator_of_its_own(simulators, method):
+    """Workers in one simulator would move each other's robot, with plausible numbers and no error."""
+    envs = gymnasium.make_vec(TASK, num_envs=2, vectorization_mode="async", vector_kwargs={"context": method})
+    try:
+        assert_apart(envs)
+        assert running(simulators) == ["collect-0", "collect-1"]
+    finally:
+        envs.close()
+
+
+def assert_apart(envs):
+    """One drives forward while the other one stands: each sees its own way only."""
+    _, infos = envs.reset(seed=[1, 2])
+    assert infos["start"].shape[0] == 2
+    distances = []
+    for _ in range(4):
+        observations, *_ = envs.step(np.array([1, 0]))
+        distances.append(np.asarray(observations)[:, 10:13])  # the velocity
+    moving, standing = np.abs(np.asarray(distances)).sum(axis=(0, 2))
+    assert moving > 1.0
+    assert standing < 0.1
+
+
+def test_each_worker_of_stable_baselines3_drives_a_simulator_of_its_own(simulators):
+    """SubprocVecEnv starts its workers from a server process, which is the third method."""
+    make = partial(make_environment, {name: os.environ[name] for name in ("PALAESTRA_CONFIG", "ROS_LOG_DIR")})
+    envs = SubprocVecEnv([make] * 2, start_method="forkserver")
+    try:
+        envs.seed(1)
+        envs.reset()
+        seen = [envs.step(np.array([1, 0]))[0][:, 10:13] for _ in range(4)]
+        moving, standing = np.abs(np.asarray(seen)).sum(axis=(0, 2))
+        assert moving > 1.0
+        assert standing < 0.1
+        assert running(simulators) == ["collect-0", "collect-1"]
+    finally:
+        envs.close()
+
+
+def make_environment(variables):
+    """Return the environment of the job; the server has the variables of the test that started it."""
+    os.environ.update(variables)
+    return gymnasium.make(TASK)

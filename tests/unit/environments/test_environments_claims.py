@@ -1,0 +1,135 @@
+"""Each simulator has one environment, in one process: the claims of PALAESTRA_CONFIG."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from concurrent.futures import ProcessPoolExecutor
+
+import pytest
+
+from palaestra_trainer.configuration import parse
+from palaestra_trainer.environments.claims import claim
+from palaestra_trainer.errors import ConfigurationError
+
+LONG_S = 60
+
+
+def make_configuration(*roles):
+    """Return a configuration whose simulators s-0, s-1, … have these roles."""
+    simulators = [
+        {"name": f"s-{index}", "group": "s", "index": index, "role": role, "control": f"127.0.0.1:710{index}"}
+        for index, role in enumerate(roles)
+    ]
+    return parse({"job": "claims", "environment": {"id": "Task-v0"}, "steps": 1, "simulators": simulators})
+
+
+@pytest.fixture(autouse=True)
+def scratch(tmp_path, monkeypatch):
+    """The container's scratch folder is the test's own."""
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def take():
+    """Claim a simulator and return its name; all claims are released when the test ends."""
+    claims = []
+
+    def next_name(configuration, role="Collect"):
+        claims.append(claim(configuration, role))
+        return claims[-1].simulator.name
+
+    yield next_name
+    for each in claims:
+        each.release()
+
+
+def test_each_environment_has_a_simulator_of_its_own(take):
+    """Two environments in one simulator would drive each other's robot, with plausible numbers."""
+    configuration = make_configuration("Collect", "Collect")
+
+    assert [take(configuration), take(configuration)] == ["s-0", "s-1"]
+
+
+def test_a_collecting_environment_never_takes_an_evaluating_simulator(take):
+    """What an evaluation measures must not depend on training that goes on in its simulator."""
+    configuration = make_configuration("Evaluate", "Collect")
+
+    assert take(configuration) == "s-1"
+    with pytest.raises(ConfigurationError, match="1 of 2 simulators have role Collect"):
+        take(configuration)
+    assert take(configuration, "Evaluate") == "s-0"
+
+
+def test_a_released_simulator_can_be_claimed_again():
+    """AsyncVectorEnv makes an environment to read its spaces, and closes it before the workers start."""
+    configuration = make_configuration("Collect")
+    first = claim(configuration, "Collect")
+
+    first.release()
+    first.release()
+
+    second = claim(configuration, "Collect")
+    assert second.simulator.name == "s-0"
+    second.release()
+
+
+def _claim_and_name(configuration):
+    try:
+        return claim(configuration, "Collect").simulator.name
+    except ConfigurationError:
+        return None
+
+
+def _claim_and_die(configuration):
+    claim(configuration, "Collect")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_worker_processes_have_simulators_of_their_own(take, method):
+    """Each method by which libraries start their workers; a forked one must not share its parent's claim."""
+    configuration = make_configuration("Collect", "Collect")
+    mine = take(configuration)
+
+    with ProcessPoolExecutor(1, multiprocessing.get_context(method)) as worker:
+        theirs = worker.submit(_claim_and_name, configuration).result(LONG_S)
+        assert (mine, theirs) == ("s-0", "s-1")
+        with pytest.raises(ConfigurationError, match="each of them has an environment"):
+            take(configuration)
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_a_forked_worker_does_not_release_its_parents_claim():
+    """It inherits the parent's environment objects, and may close them as it ends."""
+    configuration = make_configuration("Collect")
+    mine = claim(configuration, "Collect")
+
+    with ProcessPoolExecutor(1, multiprocessing.get_context("fork")) as worker:
+        worker.submit(mine.release).result(LONG_S)
+        assert worker.submit(_claim_and_name, configuration).result(LONG_S) is None
+
+    assert mine.held
+    mine.release()
+
+
+def test_a_killed_process_leaves_no_claim(take):
+    """The kernel frees the lock, so an attempt that follows finds every simulator."""
+    configuration = make_configuration("Collect")
+    killed = multiprocessing.get_context("spawn").Process(target=_claim_and_die, args=(configuration,))
+    killed.start()
+    killed.join(LONG_S)
+
+    assert killed.exitcode == -signal.SIGKILL
+    assert take(configuration) == "s-0"
+
+
+def test_a_scratch_folder_that_cannot_be_written_is_named(monkeypatch, scratch):
+    """The message has the file and the remedy."""
+    monkeypatch.setenv("ROS_LOG_DIR", str(scratch / "missing"))
+
+    with pytest.raises(ConfigurationError, match=r"missing/palaestra-claim.*ROS_LOG_DIR"):
+        claim(make_configuration("Collect"), "Collect")
