@@ -20,6 +20,7 @@ import gymnasium
 import palaestra_trainer.environments  # noqa: F401 - registers MoveToTargetEnv-v0
 from palaestra_trainer import training
 from palaestra_trainer.configuration import Configuration, load
+from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.logs import configure_logs
 from palaestra_trainer.run_directory import RunDirectory
@@ -46,9 +47,7 @@ class FakeSimulator:
         self._hangs = 0 in deaths
         self._abandoned = threading.Event()
         self.robot, self.scene = fake_arena(deaths)
-        task = configuration.environment
-        made = gymnasium.make(task.id, robot=self.robot, scene=self.scene, reward=task.reward, **task.options)
-        self.env = CountedResets(made)
+        self.env = CountedResets(make_environment(configuration.environment, self.robot, self.scene))
 
     @property
     def resets(self) -> int:

@@ -39,6 +39,7 @@ Positive = Annotated[int, Field(ge=1)]
 Role = Literal["Collect", "Evaluate"]
 Reward = Literal["Dense", "Sparse"]
 Device = Literal["cpu", "cuda"]
+DEFAULT_REWARD: Reward = "Dense"
 
 
 class _Section(BaseModel):
@@ -62,7 +63,7 @@ class Environment(_Section):
     """
 
     id: str
-    reward: Reward = "Dense"
+    reward: Reward = DEFAULT_REWARD
     options: dict[str, Any] = Field(default_factory=dict)
 
 

@@ -6,15 +6,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any
-
-import gymnasium
 
 import palaestra_trainer.environments  # noqa: F401 - importing registers what ships
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration, load
+from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import care_of
 from palaestra_trainer.simulators.member import Member
@@ -88,22 +86,5 @@ def _process(configuration: Configuration, entry: SimulatorConfiguration, run: P
 
 
 def _simulator(configuration: Configuration, entry: SimulatorConfiguration, sidecar: Sidecar) -> Simulator:
-    environment = configuration.environment
-
-    def make(robot: RobotinoAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
-        try:
-            return gymnasium.make(
-                environment.id,
-                disable_env_checker=True,  # it was checked when it was written; this one is stepped
-                robot=robot,
-                scene=scene,
-                reward=environment.reward,
-                **environment.options,
-            )
-        except (gymnasium.error.Error, ImportError) as error:
-            raise ConfigurationError(
-                f"environment.id: {environment.id} cannot be made ({error}); name one that is registered, "
-                "or module:name of one that its module registers"
-            ) from error
-
+    make = partial(make_environment, configuration.environment)
     return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle)

@@ -1,0 +1,77 @@
+"""Runs in an environment of the author's own, on fakes."""
+
+from __future__ import annotations
+
+import textwrap
+
+import gymnasium
+import pytest
+
+HALL = """
+    import gymnasium
+    import numpy as np
+
+
+    class Hall(gymnasium.Env):
+        observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+        action_space = gymnasium.spaces.Discrete(2)
+        SEEN = np.zeros(2, np.float32)
+
+        def __init__(self, {arguments}):
+            self.steps = 0
+
+        def reset(self, *, seed=None, options=None):
+            super().reset(seed=seed)
+            self.steps = 0
+            return {seen}, {{}}
+
+        def step(self, action):
+            self.steps += 1
+            return {seen}, 1.0, self.steps == 5, False, {{"is_success": True}}
+
+
+    gymnasium.register(id="Hall-v0", entry_point=Hall)
+"""
+PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}
+
+
+@pytest.fixture
+def train(write_job, play, tmp_path, monkeypatch):
+    """Train in a hall whose class the test writes; return exit code and log."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def run(arguments="robot, scene", seen="self.SEEN", number=0, **changes):
+        module = f"hall_{tmp_path.name}_{number}".replace("-", "_")
+        (tmp_path / f"{module}.py").write_text(textwrap.dedent(HALL).format(arguments=arguments, seen=seen))
+        environment = {"id": f"{module}:Hall-v0"}
+        return play(write_job(environment=environment, steps=64, algorithm=PPO, **changes))
+
+    yield run
+    gymnasium.registry.pop("Hall-v0", None)
+
+
+def test_an_own_environment_without_reward_trains(train):
+    """What ships has this argument; nothing says that another one must."""
+    code, log = train()
+
+    assert code == 0, log
+
+
+@pytest.mark.parametrize(
+    ("arguments", "seen", "fact"),
+    [
+        ("size=1", "self.SEEN", "accepts neither robot nor scene"),
+        ("robot, scene", "np.zeros(3, np.float32)", "shape (3,), not (2,)"),
+        ("robot, scene", "np.zeros(2)", "dtype float64, not float32"),
+        ("robot, scene", "self.SEEN + 2", "2.0 at [0], not within -1.0 and 1.0"),
+    ],
+    ids=["signature", "shape", "dtype", "range"],
+)
+def test_a_wrong_environment_ends_the_run_with_2(train, arguments, seen, fact):
+    """Trying again cannot help, and one line says more than four tracebacks."""
+    code, log = train(arguments, seen)
+
+    assert code == 2, log
+    assert fact in log
+    assert "ConfigurationWrong" in log
+    assert "Traceback" not in log

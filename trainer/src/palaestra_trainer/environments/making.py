@@ -1,0 +1,132 @@
+"""From a job's environment to the environment itself, whichever class it is.
+
+An environment gets what its signature accepts of robot, scene and reward. What does not fit is found here,
+before a simulator starts.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import gymnasium
+from gymnasium.envs.registration import (
+    EnvSpec,
+    find_highest_version,
+    get_env_id,
+    load_env_creator,
+    parse_env_id,
+)
+
+from palaestra_trainer.configuration import DEFAULT_REWARD, Environment, nearest
+from palaestra_trainer.environments.checking import held
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import RobotinoAbc, Scene
+
+_OF_MAKE = ("max_episode_steps",)  # gymnasium.make takes it itself
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+def make_environment(wanted: Environment, robot: RobotinoAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
+    """Return the environment of a job, which drives `robot` in `scene`; its first reset and step are checked.
+
+    Raises:
+        ConfigurationError: it is not registered, or its signature does not fit the job.
+    """
+    arguments = _checked(wanted, {"robot": robot, "scene": scene})
+    try:
+        # `held` checks instead of gymnasium's wrapper: warnings would not end the run.
+        env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
+    except ConfigurationError:
+        raise
+    except (AssertionError, TypeError, ValueError) as error:
+        raise ConfigurationError(
+            f"environment.id: {wanted.id} cannot be made ({error}); mend it, or change environment.options"
+        ) from error
+    return held(env, wanted.id)
+
+
+def keywords(wanted: Environment) -> dict[str, Any]:
+    """Return the keyword arguments that a job gives its environment, beside robot and scene.
+
+    Raises:
+        ConfigurationError: it is not registered, or its signature does not fit the job.
+    """
+    given = _checked(wanted, dict.fromkeys(("robot", "scene")))
+    return {name: value for name, value in given.items() if name not in {"robot", "scene"}}
+
+
+def _checked(wanted: Environment, simulated: Mapping[str, Any]) -> dict[str, Any]:
+    spec = _spec(wanted.id)
+    signature = inspect.signature(_creator(wanted.id, spec))
+    offered = {**simulated, "reward": wanted.reward}
+    accepted = {name: value for name, value in offered.items() if _accepts(signature, name)}
+    arguments = {**accepted, **wanted.options}
+    if mistakes := list(_mistakes(wanted, signature, {**spec.kwargs, **arguments})):
+        raise ConfigurationError("\n".join(mistakes))
+    return arguments
+
+
+def _mistakes(wanted: Environment, signature: inspect.Signature, given: Mapping[str, Any]) -> Iterator[str]:
+    if not {"robot", "scene"} & given.keys():
+        yield (
+            f"environment.id: {wanted.id} accepts neither robot nor scene, so no simulator would be used; "
+            "give it one of these arguments, or **kwargs"
+        )
+    if wanted.reward != DEFAULT_REWARD and "reward" not in given:
+        yield f"environment.reward: {wanted.id} has no argument reward; remove it, or add the argument"
+    known = list(_named(signature))
+    for name in wanted.options:
+        if name not in _OF_MAKE and not _accepts(signature, name):
+            yield f"environment.options.{name}: {wanted.id} has no such argument; {nearest(name, known)}"
+    for name in _required(signature):
+        if name not in given:
+            yield f"environment.options.{name}: {wanted.id} needs this argument; add it, or give it a default"
+
+
+def _spec(name: str) -> EnvSpec:
+    """Return what is registered under a name as `gymnasium.make` takes it."""
+    module, _, registered = name.rpartition(":")
+    try:
+        if module:
+            importlib.import_module(module)
+        space, plain, version = parse_env_id(registered)
+        return gymnasium.spec(get_env_id(space, plain, version or find_highest_version(space, plain)))
+    except (gymnasium.error.Error, ImportError) as error:
+        raise ConfigurationError(
+            f"environment.id: {name} cannot be made ({error}); name one that is registered, "
+            "or module:name of one that its module registers"
+        ) from error
+
+
+def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
+    """Return what makes the environment: a class or a function."""
+    try:
+        creator = (
+            load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
+        )
+    except (AttributeError, ImportError) as error:
+        raise ConfigurationError(
+            f"environment.id: the entry point {spec.entry_point} of {name} is not there ({error}); "
+            "correct its registration"
+        ) from error
+    if creator is None:
+        raise ConfigurationError(f"environment.id: {name} is registered without entry_point; give it one")
+    return creator
+
+
+def _accepts(signature: inspect.Signature, name: str) -> bool:
+    anything = any(it.kind is inspect.Parameter.VAR_KEYWORD for it in signature.parameters.values())
+    return anything or name in _named(signature)
+
+
+def _named(signature: inspect.Signature) -> Iterable[str]:
+    return [name for name, parameter in signature.parameters.items() if parameter.kind in _NAMED]
+
+
+def _required(signature: inspect.Signature) -> Iterator[str]:
+    for name in _named(signature):
+        if signature.parameters[name].default is inspect.Parameter.empty:
+            yield name
