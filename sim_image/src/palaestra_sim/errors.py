@@ -2,10 +2,13 @@
 
     SimError
     ├── WorldError (ValueError)          the .wbt file is wrong: retrying cannot help
+    │   └── WorldRefusedError            several things in it are wrong; it has all of them
     └── UnknownWorldError (LookupError)  no shipped world has that name: retrying cannot help
 
 A message names the place, the fact and the remedy.
 """
+
+from collections.abc import Iterable
 
 
 class SimError(Exception):
@@ -33,6 +36,50 @@ class WorldError(SimError, ValueError):
 
     def __str__(self) -> str:
         return f"{self.world}:{self.line}:{self.column}: {self.fact}; {self.remedy}"
+
+
+class WorldRefusedError(WorldError):
+    """Several things of a world are wrong; the message has one line for each kind, with all its places.
+
+    Attributes:
+        errors: one for each place, in the order of the file. The other attributes are those of the first.
+    """
+
+    def __init__(self, errors: tuple[WorldError, ...]) -> None:
+        first = errors[0]
+        super().__init__(first.world, first.line, first.column, first.fact, first.remedy)
+        self.args = (errors,)  # what a copy is made from
+        self.errors = errors
+
+    @property
+    def summary(self) -> str:
+        """One line for where only one is shown."""
+        return f"{self.world}: {len(self.errors)} places are refused, the first is {self.errors[0]}"
+
+    def __str__(self) -> str:
+        kinds: dict[tuple[str, str], list[WorldError]] = {}
+        for error in self.errors:
+            kinds.setdefault((error.fact, error.remedy), []).append(error)
+        return "\n".join(_in_one_line(errors) for errors in kinds.values())
+
+
+def refusal(errors: Iterable[WorldError]) -> WorldError | None:
+    """Return one error that stands for all of a world; None if there are none."""
+    by_text = {str(error): error for error in errors}  # a node that is used twice is refused once
+    found = sorted(by_text.values(), key=lambda error: (error.line, error.column))
+    if len(found) > 1:
+        return WorldRefusedError(tuple(found))
+    return found[0] if found else None
+
+
+def _in_one_line(errors: list[WorldError]) -> str:
+    """Return one line for errors that differ in their places only."""
+    first = errors[0]
+    if len(errors) == 1:
+        return str(first)
+    lines = ", ".join(map(str, dict.fromkeys(error.line for error in errors)))
+    fact = f"{first.fact} ({len(errors)} places, in lines {lines})"
+    return str(WorldError(first.world, first.line, first.column, fact, first.remedy))
 
 
 class UnknownWorldError(SimError, LookupError):

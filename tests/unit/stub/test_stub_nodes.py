@@ -257,3 +257,18 @@ def test_a_used_node_is_a_node_of_its_own(robot, find):
 
     assert used not in (0, find("WALL_0_BOX"))
     assert robot.get("supervisor/node/get_type_name", node=used) == "Box"
+
+
+@pytest.mark.parametrize("question", ["get_position", "get_orientation"])
+def test_the_pose_of_what_hangs_on_a_joint_is_refused(ros, start, world, simple_robot, question):
+    """It would turn in Webots, and stands still in the stub."""
+    wheel = "HingeJoint { endPoint Solid { children [ DEF SPOKE Pose { } ] }"
+    start(world(robot=simple_robot.replace("HingeJoint {", wheel, 1)))
+    robot = ros.node("robotino")
+    spoke = robot.get("supervisor/get_from_def", name="SPOKE")
+    field = robot.get("supervisor/node/get_field", node=spoke, fieldName="rotation")
+
+    with pytest.raises(ServiceFailed, match="a Pose on a joint stands still in the stub"):
+        robot.call(f"supervisor/node/{question}", node=spoke)
+    with pytest.raises(ServiceFailed, match="a Pose on a joint stands still in the stub"):
+        robot.call("supervisor/field/get_rotation", field=field)

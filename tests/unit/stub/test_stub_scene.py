@@ -1,10 +1,11 @@
 """Worlds: what is read from them, and what is refused, by line and column."""
 
 import math
+import pickle
 
 import pytest
 
-from palaestra_sim.errors import WorldError
+from palaestra_sim.errors import WorldError, WorldRefusedError
 from palaestra_sim.stub.scene import read_scene
 from palaestra_sim.stub.simulation import Simulation
 from palaestra_sim.world import builtin, parse
@@ -199,13 +200,40 @@ BAD_ROBOTS = {
     ),
     "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
     "a brake": (("PositionSensor {", "Brake { } PositionSensor {"), "the stub simulates no Brake"),
+    "a battery": (("supervisor TRUE", "supervisor TRUE battery [ 9 10 1 ]"), "a Robot with a battery"),
+    "wheels of other names": (
+        ('"wheel1_joint"', '"left wheel motor"'),
+        (
+            "the motors wheel0_joint, left wheel motor, wheel2_joint drive nothing:"
+            " the stub's robots drive by wheel0_joint, wheel1_joint, wheel2_joint"
+        ),
+    ),
+    "a sensor on a wheel": (
+        ("HingeJoint {", 'HingeJoint { endPoint Solid { children [ DistanceSensor { name "s" } ] }'),
+        "a DistanceSensor on a joint, with which it would move",
+    ),
+    "an arm": (
+        ("DEF IR", "HingeJoint { endPoint Solid { boundingObject Box { } } } DEF IR"),
+        "a Solid with a boundingObject on a joint, with which it would move",
+    ),
+    "an arm of two joints": (
+        (
+            "DEF IR",
+            "HingeJoint { endPoint Solid { children [ HingeJoint { device PositionSensor { } } ] } } DEF IR",
+        ),
+        "a HingeJoint with devices on another joint",
+    ),
+    "joint stops": (
+        ("HingeJoint {", "HingeJoint { jointParameters HingeJointParameters { minStop -1 maxStop 1 }"),
+        "a joint with stops, which the stub would turn past",
+    ),
 }
 
 
 @pytest.mark.parametrize(("change", "fact"), BAD_ROBOTS.values(), ids=BAD_ROBOTS.keys())
 def test_a_robot_that_cannot_be_simulated_is_refused(world, simple_robot, change, fact):
     """With the part that is the reason."""
-    source = world(robot=simple_robot.replace(*change))
+    source = world(robot=simple_robot.replace(*change, 1 if "HingeJoint" in change[0] else -1))
     assert source != world()
 
     with pytest.raises(WorldError, match=fact):
@@ -270,6 +298,63 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
 
     assert len(values) > 3
     assert all(value % 0.25 == 0.0 for value in values)
+
+
+def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_all_places(world):
+    """A person mends a world once, not in as many rounds as it has refusals."""
+    robot = """Robot { name "r" battery [ 1 1 1 ] controller "ros"
+      children [ Camera { } Lidar { } ] }"""
+    ball = "Solid { physics Physics { }\nboundingObject Sphere { } }"
+    objects = f"Floor {{ }}\nTree {{ }}\nTree {{ }}\n{ball}\nTree {{ }}"
+    with pytest.raises(WorldRefusedError) as caught:
+        scene_of(world(objects, robot))
+
+    elsewhere = "remove it, or run this world with driver webots"
+    assert str(caught.value).splitlines() == [
+        f"my.wbt:3:1: the stub simulates no Floor; {elsewhere}",
+        f"my.wbt:4:1: the stub simulates no Tree (3 places, in lines 4, 5, 8); {elsewhere}",
+        (
+            "my.wbt:6:1: a Solid with physics moves when it is pushed, which the stub does not simulate;"
+            " remove physics, or run this world with driver webots"
+        ),
+        f"my.wbt:7:16: the stub simulates no Sphere as a boundingObject; {elsewhere}",
+        "my.wbt:9:1: a Robot with a battery, which would never run down; remove battery",
+        "my.wbt:9:1: controllerArgs without --name=; generate the world",
+        "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only when it is asked to; add it",
+        f"my.wbt:10:18: the stub simulates no Camera on a robot; {elsewhere}",
+        f"my.wbt:10:29: the stub simulates no Lidar on a robot; {elsewhere}",
+    ]
+    assert caught.value.line == 3
+    assert len(caught.value.errors) == 11
+
+
+def test_a_refusal_of_several_things_survives_a_copy(world):
+    """A process pool needs one."""
+    with pytest.raises(WorldRefusedError) as caught:
+        scene_of(world("Floor { }\nTree { }"))
+
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_a_shape_that_is_used_twice_is_refused_once(world):
+    """It stands in one place of the file."""
+    objects = """Solid { boundingObject DEF BALL Sphere { } }
+      Solid { boundingObject USE BALL }"""
+
+    with pytest.raises(WorldError) as caught:
+        scene_of(world(objects))
+
+    assert not isinstance(caught.value, WorldRefusedError)
+
+
+def test_a_wheel_may_have_an_outline_and_free_rollers(world, simple_robot):
+    """It touches only the floor, and the floor of the stub is flat."""
+    roller = "HingeJoint { endPoint Solid { boundingObject Cylinder { } } }"
+    wheel = f"endPoint DEF WHEEL Solid {{ children [ {roller} ] boundingObject Cylinder {{ radius 0.06 }} }}"
+
+    scene = scene_of(world(robot=simple_robot.replace("HingeJoint {", f"HingeJoint {{ {wheel}", 1)))
+
+    assert scene.robots[0].body.radius == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize("step", ["0.5", "32.5", "0", "-32"])

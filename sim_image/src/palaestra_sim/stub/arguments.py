@@ -30,17 +30,17 @@ class Arguments:
 def read_arguments(reading: Reading, node: Node) -> Arguments:
     """Return the arguments of a robot whose controller is "ros".
 
-    Raises:
-        WorldError: without `--name` two robots collide, without `--synchronize` nobody controls the steps.
+    Refused: without `--name` two robots collide, without `--synchronize` no client controls the steps.
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]
     if not names:
-        raise reading.error(node, "controllerArgs without --name=", "generate the world")
+        reading.refuse(node, "controllerArgs without --name=", "generate the world")
     if "--synchronize" not in texts:
         fact = "controllerArgs without --synchronize: the stub steps only when it is asked to"
-        raise reading.error(node, fact, "add it")
+        reading.refuse(node, fact, "add it")
     for text in texts:
         if text in _REFUSED:
-            raise reading.error(node, f"the stub knows no {text}")
-    return Arguments(name=names[-1], clock="--clock" in texts, auto_publish="--auto-publish" in texts)
+            reading.refuse(node, f"the stub knows no {text}")
+    name = names[-1] if names else ""
+    return Arguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)

@@ -1,10 +1,10 @@
 """Fields of nodes: typed values that a supervisor reads and writes.
 
-A written value is what the next read answers at once, and what the simulation sees when the next basic step
-begins. `translation` and `rotation` move things, `customData` reaches the robot; other values are kept and
-read back, without effect on the physics.
+The next read answers a written value at once; the simulation sees it when the next basic step begins.
+`translation` and `rotation` move things, `customData` reaches the robot, and what is drawn only has no
+effect in Webots either. Every other write is refused: it would be read back, and change nothing (`effects`).
 
-As in Webots a write is never told to have failed: what the field cannot hold leaves it as it was.
+As in Webots, a value that the field cannot hold is ignored without an error.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from palaestra_sim.errors import SimError
 from palaestra_sim.stub.catalogue import WIDTH, FieldKind, FieldType
+from palaestra_sim.stub.effects import require_effect, require_true_value
 from palaestra_sim.stub.geometry import AxisAngle
 from palaestra_sim.world import Node, Value
 
@@ -40,6 +41,7 @@ class Field:
         self.node = node
         self.name = name
         self.kind = kind
+        self._tree = tree
         self._simulation = tree.simulation
         self._values = _initial(node, name, kind)
         self._writes = 0  # written, not yet seen by the simulation
@@ -56,7 +58,9 @@ class Field:
 
         Raises:
             NoValueError: the field holds another type, or nothing at that index.
+            UnsimulatedError: Webots would change the value as a joint moves.
         """
+        require_true_value(self.node, self.name)
         values = self._current()
         at = index if self.kind.multiple else 0
         if type_ is not self.kind.type or not -len(values) <= at < len(values):
@@ -64,35 +68,53 @@ class Field:
         return values[at]
 
     def set(self, type_: FieldType, index: int, value: Any) -> None:
-        """Write a value: visible at once, in effect from the next basic step on."""
+        """Write a value: visible at once, in effect from the next basic step on.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
         at = index if self.kind.multiple else 0
         if type_ is not self.kind.type or not _acceptable(type_, value):
             return
         values = list(self._current())
         if not -len(values) <= at < len(values):
             return
+        self._require_effect()
         values[at] = value
         self._values = values
         self._writes += 1
         self._simulation.before_next_step(self._take_effect)
 
     def insert(self, type_: FieldType, index: int, value: Any) -> bool:
-        """Insert a value before `index`, -1 for the end; False when that cannot be."""
+        """Insert a value before `index`, -1 for the end; False when that cannot be.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
         size = len(self._values)
         fits = self.kind.multiple and type_ is self.kind.type and -size - 1 <= index <= size
         if not fits or not _acceptable(type_, value):
             return False
+        self._require_effect()
         self._values.insert(index if index >= 0 else size + 1 + index, value)
         return True
 
     def remove(self, index: int) -> bool:
-        """Remove the value at `index`; False when there is none, or when it must stay."""
+        """Remove the value at `index`; False when there is none, or when it must stay.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
         size = len(self._values)
         removable = self.kind.multiple and self.kind.type is not FieldType.NODE
         if not removable or not -size <= index < size:
             return False
+        self._require_effect()
         del self._values[index]
         return True
+
+    def _require_effect(self) -> None:
+        require_effect(self.node, self.name, outline=self._tree.is_outline(self.node))
 
     def _current(self) -> list[Any]:
         """Return the values: as written last, else as the simulation has them."""

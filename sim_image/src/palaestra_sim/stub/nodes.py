@@ -39,6 +39,7 @@ class SceneNode:
         parent: None for the root.
         place: where it stands, None for nodes without a place, such as appearances.
         robot: the robot that it is; None for all other nodes.
+        jointed: whether it hangs on a joint, which does not move it here.
     """
 
     def __init__(self, tree: SceneTree, source: Node | None, parent: SceneNode | None) -> None:
@@ -50,6 +51,7 @@ class SceneNode:
         self.def_name = (source.def_name if source is not None else None) or ""
         self.place: Place | None = None
         self.robot: Robot | None = None
+        self.jointed = False
         self.inside: dict[str, list[SceneNode]] = {}
         self._tree = tree
         self._fields: dict[str, Field] = {}
@@ -107,7 +109,10 @@ class SceneTree:
         self._reading = Reading(simulation.world, "world")
         self._robots = {it.parts.node.span[0]: it for it in simulation.robots}
         self.root = self._new_node(None, None)
-        self.root.inside["children"] = [self._grow(node, self.root) for node in simulation.world.nodes]
+        self.root.inside["children"] = [
+            self._grow(node, self.root, jointed=False) for node in simulation.world.nodes
+        ]
+        self._outlines = frozenset(self._first_bytes_of_outlines())
 
     @property
     def count(self) -> int:
@@ -172,15 +177,26 @@ class SceneTree:
         self.nodes.append(node)
         return node
 
-    def _grow(self, written: Node, parent: SceneNode) -> SceneNode:
+    def is_outline(self, node: SceneNode) -> bool:
+        """Say whether a node is part of a boundingObject, here or where it is `USE`d."""
+        return node.source is not None and node.source.span[0] in self._outlines
+
+    def _first_bytes_of_outlines(self) -> Iterator[int]:
+        for node in self.nodes:
+            for outline in node.inside.get("boundingObject", ()):
+                yield from (it.source.span[0] for it in (outline, *outline.descendants()) if it.source)
+
+    def _grow(self, written: Node, parent: SceneNode, *, jointed: bool) -> SceneNode:
         """Return the node for `written`; one that is `USE`d is a node of its own, as in Webots."""
         source = self._reading.resolve(written)
         node = self._new_node(source, parent)
+        node.jointed = jointed
         if source is written:
             node.place = self.simulation.place_of(source.span[0])
             node.robot = self._robots.get(source.span[0])
         for name in source.fields:
             inner = source.nodes(name)
             if inner:
-                node.inside[name] = [self._grow(it, node) for it in inner]
+                on_joint = jointed or name == "endPoint"
+                node.inside[name] = [self._grow(it, node, jointed=on_joint) for it in inner]
         return node

@@ -3,19 +3,25 @@
 A robot with a boundingObject is a round one on three omnidirectional wheels, whose motors are named as in the
 Robotino 3; one without is a supervisor that only watches. The outline that runs into things is the widest
 cylinder, body or bumper: without physics of its own, a bumper is part of the robot in Webots too.
+
+Joints turn their motors' shafts and move nothing. So only a wheel, which touches nothing but the floor, may
+hang on one, or what is drawn only; a sensor or an outline that would have to move is refused.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, Literal
 
+from palaestra_sim.stub.arguments import Arguments, read_arguments
 from palaestra_sim.stub.devices import (
     DISTANCE_SENSOR_TYPES,
     Devices,
     DistanceSensor,
+    DistanceSensorType,
     PositionSensor,
     TouchSensor,
 )
@@ -31,7 +37,11 @@ from palaestra_sim.world import Node
 _CENTRED_M: Final = 1e-3
 _LEVEL: Final = 1e-3
 _INERT: Final = frozenset(("Shape", "DirectionalLight", "PointLight", "SpotLight"))
-_FRAMES: Final = frozenset(("Pose", "Transform", "Solid", "DistanceSensor", "TouchSensor"))
+_SENSORS: Final = frozenset(("DistanceSensor", "TouchSensor"))
+_FRAMES: Final = frozenset(("Pose", "Transform", "Solid")) | _SENSORS
+_FIXED_REMEDY: Final = "fix it to the robot, or run this world with driver webots"
+
+Joint = Literal["wheel", "other"]  # what a part hangs on
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -42,6 +52,7 @@ class RobotParts:
         body: None when nothing can run into it.
         heights: z of the lower and upper end of the body, in the robot's frame.
         ray_heights: z of the lowest and highest ray, in the robot's frame.
+        arguments: its controllerArgs; None when its controller is not "ros".
     """
 
     node: Node
@@ -51,14 +62,11 @@ class RobotParts:
     body: Body | None
     heights: tuple[float, float] = (0.0, 0.0)
     ray_heights: tuple[float, float] = (0.0, 0.0)
+    arguments: Arguments | None = None
 
 
 def read_robot(reading: Reading, node: Node, parent: Place | None, places: dict[int, Place]) -> RobotParts:
-    """Return the robot at `node`, and enter the frames of its parts in `places`.
-
-    Raises:
-        WorldError: it has a shape or a device that the stub cannot simulate.
-    """
+    """Return the robot at `node`, and enter the frames of its parts in `places`."""
     return _RobotReader(reading, node, parent, places).read()
 
 
@@ -78,6 +86,8 @@ class _RobotReader:
     def read(self) -> RobotParts:
         """Return the robot."""
         reading, node = self._reading, self._node
+        if "battery" in node.fields and node.fields["battery"].items:
+            reading.refuse(node, "a Robot with a battery, which would never run down", "remove battery")
         shapes = list(bounding_shapes(reading, node, self._frame))
         self._read_children(node, self._frame)
         shapes += [shape for _, of_bumper in self._bumpers for shape in of_bumper]
@@ -100,6 +110,7 @@ class _RobotReader:
             body=body,
             heights=_span([z for shape in shapes for z in shape.heights()]),
             ray_heights=_span(self._ray_heights),
+            arguments=read_arguments(reading, node) if node.text("controller") == "ros" else None,
         )
 
     def _body(self, shapes: list[Shape]) -> Body | None:
@@ -107,11 +118,14 @@ class _RobotReader:
             x, y, _ = shape.pose.position
             if shape.kind != "cylinder" or not shape.upright or math.hypot(x, y) > _CENTRED_M:
                 fact = "the stub's robots are upright cylinders, centred on the robot's origin"
-                raise self._reading.error(shape.node, fact)
+                self._reading.refuse(shape.node, fact)
         motors = self._devices.motors
         wheels = [motors[name] for name in WHEELS if name in motors]
         if not shapes and not wheels:
             return None
+        if motors and len(wheels) < len(WHEELS):
+            fact = f"the motors {_listed(motors)} drive nothing: the stub's robots drive by {_listed(WHEELS)}"
+            self._reading.refuse(self._node, fact, "name its wheels so, or run this world with driver webots")
         radius_m = max((shape.size[0] / 2.0 for shape in shapes), default=0.0)
         return Body(radius_m, wheels if len(wheels) == len(WHEELS) else ())
 
@@ -121,38 +135,47 @@ class _RobotReader:
         if body is None:
             return Place(self._parent, translation, rotation)
         if self._parent is not None:
-            raise reading.error(node, "a robot inside another node", "put it at the top level")
+            reading.refuse(node, "a robot inside another node", "put it at the top level")
         if not reading.pose(node).upright:
-            raise reading.error(node, "a robot that does not stand upright", "turn it about z only")
+            reading.refuse(node, "a robot that does not stand upright", "turn it about z only")
         return RobotPlace(translation, rotation, body)
 
-    def _read_children(self, node: Node, place: Place) -> None:
+    def _read_children(self, node: Node, place: Place, joint: Joint | None = None) -> None:
         for child in self._reading.children(node):
-            self._read_part(child, place)
+            self._read_part(child, place, joint)
 
-    def _read_part(self, node: Node, place: Place) -> None:
+    def _read_part(self, node: Node, place: Place, joint: Joint | None) -> None:
         kind = node.type_name
-        if kind in _INERT:
-            return
         if kind == "HingeJoint":
-            self._read_joint(node, place)
-            return
-        if kind == "Group":
-            self._read_children(node, place)
-            return
-        if kind not in _FRAMES:
-            raise self._reading.error(node, f"the stub simulates no {kind} on a robot")
+            self._read_joint(node, place, joint)
+        elif kind == "Group":
+            self._read_children(node, place, joint)
+        elif joint is not None and kind in _SENSORS:
+            self._reading.refuse(node, f"a {kind} on a joint, with which it would move", _FIXED_REMEDY)
+        elif kind in _FRAMES:
+            self._read_frame(node, place, joint)
+        elif kind not in _INERT:
+            self._reading.refuse(node, f"the stub simulates no {kind} on a robot")
+
+    def _read_frame(self, node: Node, place: Place, joint: Joint | None) -> None:
+        kind = node.type_name
+        if joint == "other" and node.nodes("boundingObject"):
+            fact = f"a {kind} with a boundingObject on a joint, with which it would move"
+            self._reading.refuse(node, fact, _FIXED_REMEDY)
         inner = Place(place, self._reading.translation(node), self._reading.rotation(node))
         self._parts.append((node, inner))
         if kind == "DistanceSensor":
             self._read_distance_sensor(node, inner)
         elif kind == "TouchSensor":
             self._read_touch_sensor(node, inner)
-        self._read_children(node, inner)
+        self._read_children(node, inner, joint)
 
-    def _read_joint(self, node: Node, place: Place) -> None:
-        """Take the motor and the sensor of a joint; what turns (the wheel) touches only the floor."""
+    def _read_joint(self, node: Node, place: Place, joint: Joint | None) -> None:
+        """Take the motor and the sensor of a joint; its shaft turns, and what hangs on it stays."""
         motor: Motor | None = None
+        if joint is not None and node.nodes("device"):
+            self._reading.refuse(node, "a HingeJoint with devices on another joint", _FIXED_REMEDY)
+        self._refuse_stops(node)
         for device in self._reading.children(node, "device"):
             if device.type_name == "RotationalMotor":
                 motor = Motor(self._motor_spec(device))
@@ -162,9 +185,17 @@ class _RobotReader:
             if device.type_name == "PositionSensor":
                 self._read_position_sensor(device, motor)
             elif device.type_name != "RotationalMotor":
-                raise self._reading.error(device, f"the stub simulates no {device.type_name}")
+                self._reading.refuse(device, f"the stub simulates no {device.type_name}")
+        wheel = joint == "wheel" or (motor is not None and motor.spec.name in WHEELS)
         for end in self._reading.children(node, "endPoint"):
-            self._read_part(end, place)
+            self._read_part(end, place, "wheel" if wheel else "other")
+
+    def _refuse_stops(self, node: Node) -> None:
+        for parameters in self._reading.children(node, "jointParameters"):
+            stops = [self._reading.number(parameters, field, 0.0) for field in ("minStop", "maxStop")]
+            if stops[0] != stops[1]:
+                remedy = "remove minStop and maxStop, or run this world with driver webots"
+                self._reading.refuse(parameters, "a joint with stops, which the stub would turn past", remedy)
 
     def _motor_spec(self, node: Node) -> MotorSpec:
         number = self._reading.number
@@ -194,18 +225,18 @@ class _RobotReader:
         name = node.text("name") or "distance sensor"
         type_name = node.text("type") or "generic"
         if type_name not in DISTANCE_SENSOR_TYPES:
-            raise reading.error(node, f"no distance sensor is of type {type_name!r}")
+            reading.refuse(node, f"no distance sensor is of type {type_name!r}")
         if reading.number(node, "numberOfRays", 1.0) != 1.0:
-            raise reading.error(node, "a distance sensor of several rays")
+            reading.refuse(node, "a distance sensor of several rays")
         if reading.number(node, "resolution", -1.0) != -1.0:
-            raise reading.error(node, "a distance sensor with a resolution")
+            reading.refuse(node, "a distance sensor with a resolution")
         self._enter(node, name)
         pose = place.world_pose
         self._devices.sensors[name] = DistanceSensor(
             name=name,
             ray=self._ray(node, pose),
             table=lookup_table(*self._rows(node)),
-            type=DISTANCE_SENSOR_TYPES[type_name],
+            type=DISTANCE_SENSOR_TYPES.get(type_name, DistanceSensorType.GENERIC),
             aperture_rad=reading.number(node, "aperture", 1.5708),
             model=node.text("model") or "",
         )
@@ -214,8 +245,8 @@ class _RobotReader:
     def _ray(self, node: Node, pose: Pose) -> tuple[float, float, float, float]:
         dx, dy, dz = turn(pose.rotation, (1.0, 0.0, 0.0))
         if abs(dz) > _LEVEL:
-            raise self._reading.error(node, "a distance sensor that looks up or down")
-        length = math.hypot(dx, dy)
+            self._reading.refuse(node, "a distance sensor that looks up or down")
+        length = math.hypot(dx, dy) or 1.0
         return pose.position[0], pose.position[1], dx / length, dy / length
 
     def _rows(self, node: Node) -> list[Row]:
@@ -225,17 +256,19 @@ class _RobotReader:
             return [(0.0, 0.0, 0.0), (0.1, 1000.0, 0.0)]
         if numbers is None or len(numbers) % 3:
             fact = "lookupTable is not rows of three numbers"
-            raise self._reading.error(node, fact, "write distance, value, noise")
+            self._reading.refuse(node, fact, "write distance, value, noise")
+            return []
         rows = list(zip(numbers[0::3], numbers[1::3], numbers[2::3], strict=True))
         if any(after[0] <= before[0] for before, after in pairwise(rows)):
             fact = "the distances of lookupTable do not grow"
-            raise self._reading.error(node, fact, "sort its rows")
+            self._reading.refuse(node, fact, "sort its rows")
+            return []
         return rows
 
     def _read_touch_sensor(self, node: Node, place: Place) -> None:
         name = node.text("name") or "touch sensor"
         if (node.text("type") or "bumper") != "bumper":
-            raise self._reading.error(node, "a touch sensor that measures force")
+            self._reading.refuse(node, "a touch sensor that measures force")
         self._enter(node, name)
         sensor = TouchSensor(name=name, body=None, model=node.text("model") or "")
         self._devices.sensors[name] = sensor
@@ -243,8 +276,12 @@ class _RobotReader:
 
     def _enter(self, node: Node, name: str) -> None:
         if name in self._devices.order:
-            raise self._reading.error(node, f"a second device {name!r}", "give it its own name")
+            self._reading.refuse(node, f"a second device {name!r}", "give it its own name")
         self._devices.order.append(name)
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names)
 
 
 def _span(values: list[float]) -> tuple[float, float]:

@@ -58,14 +58,15 @@ def read_scene(world: World, name: str = "world") -> Scene:
     """Return the contents of a world.
 
     Raises:
-        WorldError: it holds something that the stub cannot simulate.
+        WorldError: it holds things that the stub cannot simulate; the error has all of them.
     """
     reading = Reading(world, name)
     scene = Scene()
-    for node in world.nodes:
+    for node in reading.resolved(world.nodes):
         if node.type_name == "WorldInfo":
             _read_world_info(reading, node, scene)
-        _read(reading, reading.resolve(node), None, scene)
+        _read(reading, node, None, scene)
+    reading.conclude()
     return scene
 
 
@@ -73,7 +74,7 @@ def _read_world_info(reading: Reading, node: Node, scene: Scene) -> None:
     step_ms = reading.number(node, "basicTimeStep", 32.0)
     if step_ms < 1.0 or step_ms != int(step_ms):
         fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
-        raise reading.error(node, fact, "the controller counts whole ones; write one")
+        reading.refuse(node, fact, "the controller counts whole ones; write one")
     scene.basic_step_ms = int(step_ms)
     scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
 
@@ -93,7 +94,7 @@ def _read(reading: Reading, node: Node, parent: Place | None, scene: Scene) -> N
             _read_solid(reading, node, place, scene)
         _read_children(reading, node, place, scene)
     else:
-        raise reading.error(node, f"the stub simulates no {kind}")
+        reading.refuse(node, f"the stub simulates no {kind}")
 
 
 def _read_children(reading: Reading, node: Node, parent: Place | None, scene: Scene) -> None:
@@ -104,8 +105,8 @@ def _read_children(reading: Reading, node: Node, parent: Place | None, scene: Sc
 def _read_solid(reading: Reading, node: Node, place: Place, scene: Scene) -> None:
     if node.nodes("physics"):
         fact = "a Solid with physics moves when it is pushed, which the stub does not simulate"
-        raise reading.error(node, fact, "remove physics, or run this world with driver webots")
+        reading.refuse(node, fact, "remove physics, or run this world with driver webots")
     for shape in bounding_shapes(reading, node, place):
         if not shape.upright:
-            raise reading.error(shape.node, f"a {shape.node.type_name} that does not stand upright")
+            reading.refuse(shape.node, f"a {shape.node.type_name} that does not stand upright")
         scene.solids.append(shape)

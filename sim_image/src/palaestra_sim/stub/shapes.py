@@ -54,11 +54,7 @@ class Shape:
 
 
 def bounding_shapes(reading: Reading, owner: Node, place: Place) -> Iterator[Shape]:
-    """Yield the shapes of a node's boundingObject.
-
-    Raises:
-        WorldError: there is one that the stub cannot simulate.
-    """
+    """Yield the shapes of a node's boundingObject that the stub can simulate; the others are refused."""
     for node in reading.children(owner, "boundingObject"):
         yield from _shapes(reading, node, place, Pose())
 
@@ -74,7 +70,7 @@ def _shapes(reading: Reading, node: Node, place: Place, frame: Pose) -> Iterator
             yield Shape(kind="cylinder", size=size, local=frame, place=place, node=node)
         case "Plane":
             if not place.world_pose.after(frame).upright:
-                raise reading.error(node, "a Plane that is no floor")
+                reading.refuse(node, "a Plane that is no floor")
         case "Shape":
             for inner in reading.children(node, "geometry"):
                 yield from _shapes(reading, inner, place, frame)
@@ -83,4 +79,4 @@ def _shapes(reading: Reading, node: Node, place: Place, frame: Pose) -> Iterator
             for inner in reading.children(node):
                 yield from _shapes(reading, inner, place, inside)
         case other:
-            raise reading.error(node, f"the stub simulates no {other} as a boundingObject")
+            reading.refuse(node, f"the stub simulates no {other} as a boundingObject")

@@ -11,11 +11,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.stub.arguments import Arguments, read_arguments
+from palaestra_sim.stub.arguments import Arguments
 from palaestra_sim.stub.controller import Controller
 from palaestra_sim.stub.nodes import SceneTree
 from palaestra_sim.stub.options import StubOptions
-from palaestra_sim.stub.reading import Reading
 from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.seam import Node
 from palaestra_sim.stub.simulation import Mode, Simulation
@@ -157,12 +156,8 @@ class Simulator:
 def _read(world_path: Path, mode: Mode) -> tuple[Simulation, dict[Robot, Arguments]]:
     """Return a world that is ready to run, with the arguments of its robots."""
     simulation = Simulation.load(world_path.read_bytes(), world_path.name, mode)
-    reading = Reading(simulation.world, world_path.name)
-    return simulation, {
-        robot: read_arguments(reading, robot.parts.node)
-        for robot in simulation.robots
-        if robot.parts.node.text("controller") == "ros"
-    }
+    arguments = {robot: robot.parts.arguments for robot in simulation.robots}
+    return simulation, {robot: given for robot, given in arguments.items() if given is not None}
 
 
 def _ignore(_status: int) -> None:

@@ -1,6 +1,7 @@
 """Services under `supervisor/field/`: read and write typed values by handle.
 
-Writes answer success 1 whatever becomes of them, as the controller does. Reads of the wrong type
+Writes of what a field cannot hold answer success 1, as the controller does; writes that would have no effect
+in the stub alone fail with a sentence that says so. Reads of the wrong type
 answer 0 or "" where libController has such a value, and fail where it has a null pointer (vectors,
 rotations, colours), which crashes the real controller.
 """

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from palaestra_sim.stub.effects import require_true_value
 from palaestra_sim.stub.geometry import Pose, to_quaternion, transposed
 from palaestra_sim.stub.nodes import SceneNode
 from palaestra_sim.stub.places import Place
@@ -199,6 +200,7 @@ def _pose(node: SceneNode) -> Pose:
 
 def _place(node: SceneNode) -> Place:
     """Return the place of a node; in Webots a node without one crashes the controller."""
+    require_true_value(node, "translation")
     if node.place is None:
         raise ServiceFailed(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
     return node.place

@@ -12,6 +12,7 @@ from palaestra_sim.stub.devices import (
     Sensor,
     TouchSensor,
 )
+from palaestra_sim.stub.effects import UnsimulatedError
 from palaestra_sim.stub.seam import Fields, Handler, Node, Publisher, Service, topic_name
 
 _TOUCH_TABLE = [0.0, 0.0, 0.0, 5000.0, 50000.0, 0.0]  # the default of TouchSensor.lookupTable
@@ -25,7 +26,7 @@ class Feed:
     controller; its messages and the first's come mixed. 0 takes them all back.
 
     Attributes:
-        topic: below the robot's name; "" for a pseudo device that has nothing to tell.
+        topic: below the robot's name; "" for the joystick, which the stub has not.
         sensor: anything with a `value`; None when there is never one.
         publishers: by period in ms.
     """
@@ -34,7 +35,7 @@ class Feed:
     type_name: str
     template: Fields
     sensor: Any
-    publishers: dict[int, Publisher | None] = field(default_factory=dict)
+    publishers: dict[int, Publisher] = field(default_factory=dict)
 
     @property
     def period_ms(self) -> int:
@@ -42,19 +43,22 @@ class Feed:
         return min(self.publishers, default=0)
 
     def enable(self, node: Node, period_ms: int, step_ms: int) -> bool:
-        """Publish every `period_ms`, a multiple of the controller's step; 0 stops. False: refused."""
+        """Publish every `period_ms`, a multiple of the controller's step; 0 stops. False: refused.
+
+        Raises:
+            UnsimulatedError: it is a device that never says anything.
+        """
         if period_ms == 0:
             for publisher in self.publishers.values():
-                if publisher is not None:
-                    node.withdraw(publisher)
+                node.withdraw(publisher)
             self.publishers.clear()
             return True
+        if not self.topic:
+            raise UnsimulatedError("the stub has no joystick; use driver webots, or publish it yourself")
         if period_ms % step_ms:
             return False
         if period_ms not in self.publishers:
-            self.publishers[period_ms] = (
-                node.advertise(self.topic, self.type_name, template=self.template) if self.topic else None
-            )
+            self.publishers[period_ms] = node.advertise(self.topic, self.type_name, template=self.template)
         return True
 
     def publish(self, elapsed_ms: int) -> None:
@@ -63,7 +67,7 @@ class Feed:
         if sensor is None:
             return
         for period_ms, publisher in self.publishers.items():
-            if elapsed_ms % period_ms == 0 and publisher is not None:
+            if elapsed_ms % period_ms == 0:
                 publisher.send_value(sensor.value)
 
 

@@ -1,0 +1,93 @@
+"""Which fields matter: a write that would be read back and change nothing is refused.
+
+Webots would give it an effect, so a client that randomizes a world would train in one that stays the same.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from palaestra_sim.errors import SimError
+
+if TYPE_CHECKING:
+    from palaestra_sim.stub.nodes import SceneNode
+
+# Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
+_ACTING: Final = frozenset(
+    (
+        "ContactProperties",
+        "DistanceSensor",
+        "Group",
+        "HingeJoint",
+        "HingeJointParameters",
+        "Physics",
+        "Pose",
+        "PositionSensor",
+        "Robot",
+        "RotationalMotor",
+        "Solid",
+        "TouchSensor",
+        "Transform",
+        "WorldInfo",
+    )
+)
+_FOR_PEOPLE: Final = frozenset(("description", "info", "model", "recognitionColors", "title"))
+_PLACING: Final = frozenset(("translation", "rotation"))
+_SENSORS: Final = frozenset(("DistanceSensor", "TouchSensor"))
+
+
+class UnsimulatedError(SimError, NotImplementedError):
+    """What is asked for works in Webots, and not here."""
+
+
+def require_effect(node: SceneNode, field: str, *, outline: bool) -> None:
+    """Return if a write of a node's field does what it does in Webots.
+
+    Args:
+        node: whose field it is.
+        field: the name.
+        outline: whether the node is part of a boundingObject.
+
+    Raises:
+        UnsimulatedError: it would have no effect.
+    """
+    if outline or not (_is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)):
+        part = " of a boundingObject" if outline else ""
+        raise UnsimulatedError(
+            f"the stub cannot change {node.type_name}.{field}{part} while it runs;"
+            " write it into the world file, or use driver webots"
+        )
+
+
+def require_true_value(node: SceneNode, field: str) -> None:
+    """Return unless Webots would change a field as a joint moves.
+
+    Raises:
+        UnsimulatedError: it would.
+    """
+    if node.jointed and field in _PLACING:
+        raise UnsimulatedError(
+            f"a {node.type_name} on a joint stands still in the stub; read the joint's PositionSensor"
+        )
+
+
+def _is_drawn_only(node: SceneNode, field: str) -> bool:
+    return node.type_name not in _ACTING or field in _FOR_PEOPLE
+
+
+def _reaches_robot(node: SceneNode, field: str) -> bool:
+    return node.robot is not None and field == "customData"
+
+
+def _moves(node: SceneNode, field: str) -> bool:
+    """Say whether a node is moved by its place; rays and outlines of a robot keep theirs."""
+    if field not in _PLACING or node.place is None or node.jointed:
+        return False
+    if node.robot is not None or not _on_robot(node):
+        return True
+    return not any(it.type_name in _SENSORS for it in (node, *node.descendants()))
+
+
+def _on_robot(node: SceneNode) -> bool:
+    parent = node.parent
+    return parent is not None and (parent.robot is not None or _on_robot(parent))
