@@ -11,6 +11,9 @@ from palaestra_sim.world import RunIdentity, WorldError, WorldRobot, generate, r
 
 Make = Callable[[str], bytes]
 
+COMPLETE = '\nRobot { name "robotino" controller "ros" controllerArgs ["--name=NAME" "--synchronize"] }'
+"""A robot to which nothing has to be done but to give it its name."""
+
 
 @pytest.fixture
 def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
@@ -247,7 +250,52 @@ def test_a_robot_without_a_name_is_called_robot(world: Make, identity: RunIdenti
 )
 def test_other_controllers_are_left_alone(generated: Callable[..., str], text: str) -> None:
     """They don't speak ROS, so their arguments are their own affair."""
-    assert generated(text, clock=False) == text
+    assert generated(text + COMPLETE, clock=False) == text + COMPLETE
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "Solid { }",
+            'my.wbt:1:1: the world has no robot; add one with controller "ros" and supervisor TRUE',
+        ),
+        (
+            'Solid { }\nRobot { name "khepera" controller "braitenberg" } EPuck { controller "" } Robot { }',
+            (
+                'my.wbt:3:1: no robot has the controller "ros": there are'
+                ' "khepera" (controller "braitenberg"), "EPuck" (controller "<generic>"),'
+                ' "robot" (controller "<generic>");'
+                ' set controller "ros" on those to be trained, and supervisor TRUE on one'
+            ),
+        ),
+    ],
+)
+def test_a_world_without_a_robot_that_speaks_ros_is_refused_with_the_controllers_that_there_are(
+    refusal: Callable[..., str], text: str, message: str
+) -> None:
+    """A run of it would find no robot, whatever else it says."""
+    assert refusal(text) == message
+
+
+def test_all_refusals_of_a_world_come_at_once(refusal: Callable[..., str]) -> None:
+    """In the order of the file, one line for each kind."""
+    text = 'EXTERNPROTO "a.proto"\n' + robot("controllerArgs 5") + "\n" + robot("") + "\n" + robot("")
+
+    assert [line.partition(";")[0] for line in refusal(text).splitlines()] == [
+        'my.wbt:2:13: "a.proto" is relative to the file of the world, and this one has none',
+        "my.wbt:3:57: 5 in controllerArgs is not a string",
+        'my.wbt:4:1: a second robot is called "robotino" (2 places, in lines 4, 5)',
+    ]
+
+
+def test_a_byte_order_mark_is_accepted_and_kept(identity: RunIdentity) -> None:
+    """Some editors write it; what is in front of the header is nothing to a reader."""
+    source = b"\xef\xbb\xbf#VRML_SIM R2023b utf8\n" + COMPLETE.encode()
+
+    made = generate(source, identity, clock=False)
+
+    assert made == source.replace(b"NAME", ros_name(identity, "robotino").encode())
 
 
 def test_robots_are_described_as_the_world_has_them(world: Make) -> None:
@@ -324,12 +372,13 @@ def test_a_world_that_no_simulator_can_have_is_refused(
     refusal: Callable[..., str], text: str, message: str
 ) -> None:
     """With its place, the fact and the remedy."""
-    assert refusal(text).startswith(message)
+    with_robot = text if "controller" in text else text + COMPLETE
+    assert refusal(with_robot).startswith(message)
 
 
 def test_using_what_holds_no_robot_is_fine(generated: Callable[..., str]) -> None:
     """Shapes are used again all the time."""
-    text = "Solid { children DEF BODY Shape { } boundingObject USE BODY }"
+    text = "Solid { children DEF BODY Shape { } boundingObject USE BODY }" + COMPLETE
 
     assert generated(text) == text
 
@@ -349,16 +398,16 @@ def test_addresses_that_lead_somewhere_from_everywhere_are_fine(
     generated: Callable[..., str], text: str
 ) -> None:
     """And so is what only looks like an address."""
-    assert generated(text) == text
+    assert generated(text + COMPLETE) == text + COMPLETE
 
 
 def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
     world: Make, identity: RunIdentity, refusal: Callable[..., str]
 ) -> None:
     """But nothing else is allowed to it."""
-    text = 'EXTERNPROTO "../Lamp.proto" Mesh { url "a.obj" }'
+    text = 'EXTERNPROTO "../Lamp.proto" Mesh { url "a.obj" }' + COMPLETE
 
     made = generate(world(text), identity, clock=False, relative_addresses=True)
 
-    assert made == world(text)
+    assert made == world(text.replace("NAME", ros_name(identity, "robotino")))
     assert "a second robot" in refusal(text + robot("") * 2, relative_addresses=True)

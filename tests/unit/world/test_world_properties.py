@@ -63,8 +63,9 @@ TREES = st.recursive(
 
 @st.composite
 def worlds(draw: st.DrawFn) -> bytes:
-    """Draw a world whose robots have different names."""
-    tokens = chain(*draw(st.lists(TREES, max_size=3)))
+    """Draw a world whose robots have different names; at least one speaks ROS."""
+    lamp = st.just(["Lamp", "{", "}"])
+    tokens = chain(*draw(st.lists(TREES, max_size=3)), draw(ros_robots(lamp)))
     pieces = [draw(st.sampled_from(["#VRML_SIM R2023b utf8\n", "#VRML_SIM V8.6.2 utf8 \r\n"]))]
     for number, token in enumerate(tokens):
         pieces += [f'"robot {number}"' if token == "?" else token, draw(GAPS)]

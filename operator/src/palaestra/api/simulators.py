@@ -60,8 +60,8 @@ class ConfigMapKey(ApiModel):
 class World(ApiModel):
     """Where the source world comes from: exactly one of the four.
 
-    Every simulator runs its own copy of it, in which the robots have ROS names of their own and
-    nothing else is changed.
+    Every simulator runs its own copy of it. Only the `controllerArgs` of robots whose controller is
+    `ros` change: `--name=` is set, `--synchronize` is added, and `--clock` stays in one simulator at most.
     """
 
     inline: Annotated[str, Field(min_length=1, max_length=200_000)] | None = None

@@ -21,8 +21,9 @@ Reads the TrainingJob in FILE and writes the Kubernetes objects that it needs to
 YAML. Outside a cluster the job has no uid yet: zeros stand in its place.
 """
 WORLD = """\
-Reads the world in FILE and writes it to standard output as one simulator of a job gets it: its robots
-have ROS names of their own and nothing else is changed.
+Reads the world in FILE and writes it to standard output as one simulator of a job gets it. Only the
+controllerArgs of robots whose controller is "ros" change: --name= is set, --synchronize is added, and
+--clock is removed unless the option --clock keeps the first one.
 """
 CRD = "Writes the CustomResourceDefinition of TrainingJobs to standard output, as YAML."
 

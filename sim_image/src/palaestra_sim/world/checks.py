@@ -1,14 +1,15 @@
 """The worlds that can be read, but of which no simulator's world can be made.
 
-Each check looks for one thing and points at it. The order is the order in which a person would
-want to hear of them. No check depends on the simulator: a world that passes once passes for all.
+Each check looks for one thing and points at each place of it; one error has them all, in the order of the
+file. No check depends on the simulator: a world that passes once passes for all.
 """
 
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
-from palaestra_sim.errors import WorldError
+from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.world.reader import parse
 from palaestra_sim.world.robots import robot_name, ros_robots
 from palaestra_sim.world.source import Source
@@ -29,10 +30,25 @@ class Candidate:
     robots: Sequence[Node]
 
 
-Check = Callable[[Candidate], WorldError | None]
+Check = Callable[[Candidate], Iterator[WorldError]]
 
 
-def robot_used_twice(candidate: Candidate) -> WorldError | None:
+def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
+    """A world in which no controller is "ros" has nothing that a trainer could reach."""
+    if candidate.robots:
+        return
+    others = [node for node in candidate.world.walk() if _is_robot(node)]
+    if not others:
+        fact = "the world has no robot"
+        yield candidate.source.error(0, fact, 'add one with controller "ros" and supervisor TRUE')
+        return
+    told = ", ".join(f'"{robot_name(robot)}" (controller "{_controller(robot)}")' for robot in others)
+    fact = f'no robot has the controller "ros": there are {told}'
+    remedy = 'set controller "ros" on those to be trained, and supervisor TRUE on one'
+    yield candidate.source.error(others[0].span[0], fact, remedy)
+
+
+def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
     """A `USE` stands for the same robot once more, with the same ROS name.
 
     Any DEF of that name counts, though a `USE` means the last one before it: such a world is
@@ -48,50 +64,54 @@ def robot_used_twice(candidate: Candidate) -> WorldError | None:
         if node.uses in containers:
             robot = robot_name(containers[node.uses])
             fact = f'USE {node.uses} repeats the robot "{robot}" and its ROS name'
-            return candidate.source.error(node.span[0], fact, "write the node out, with its own name")
-    return None
+            yield candidate.source.error(node.span[0], fact, "write the node out, with its own name")
 
 
-def robots_of_one_name(candidate: Candidate) -> WorldError | None:
+def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
     """Clients find a robot by its Robot.name, and its ROS name is made of it."""
     seen = set()
     for robot in candidate.robots:
         name = robot_name(robot)
         if name in seen:
             fact = f'a second robot is called "{name}"'
-            return candidate.source.error(robot.span[0], fact, "give it a name of its own")
+            yield candidate.source.error(robot.span[0], fact, "give it a name of its own")
         seen.add(name)
-    return None
 
 
-def arguments_that_are_no_strings(candidate: Candidate) -> WorldError | None:
+def arguments_that_are_no_strings(candidate: Candidate) -> Iterator[WorldError]:
     """Arguments are strings; anything else was meant for another field."""
     for value in _argument_values(candidate):
         for token in candidate.world.inside(value):
             if token.kind != "string" and token.text not in (b"[", b"]"):
                 fact = f"{token.text.decode()} in controllerArgs is not a string"
-                return candidate.source.error(token.start, fact, 'write a list like ["--clock"]')
-    return None
+                yield candidate.source.error(token.start, fact, 'write a list like ["--clock"]')
 
 
-def renamed_behind_its_name(candidate: Candidate) -> WorldError | None:
+def renamed_behind_its_name(candidate: Candidate) -> Iterator[WorldError]:
     """A ROS remapping such as `__name:=x` would overrule the name that is written for the robot."""
     for value in _argument_values(candidate):
         for token in _strings(candidate.world, value):
             if _ROS_REMAPPING.match(unquoted(token)):
                 fact = f"{token.text.decode()} overrules the generated ROS name"
-                return candidate.source.error(token.start, fact, "remove it")
-    return None
+                yield candidate.source.error(token.start, fact, "remove it")
 
 
-def relative_address(candidate: Candidate) -> WorldError | None:
+def relative_address(candidate: Candidate) -> Iterator[WorldError]:
     """A world that is not a file has no folder that an address could start from."""
     for token in _addresses(candidate.world):
         if not _ABSOLUTE.match(unquoted(token)):
             fact = f"{token.text.decode()} is relative to the file of the world, and this one has none"
             remedy = "begin it with webots:// or https://, or give the world as a file"
-            return candidate.source.error(token.start, fact, remedy)
-    return None
+            yield candidate.source.error(token.start, fact, remedy)
+
+
+def _is_robot(node: Node) -> bool:
+    return node.type_name == "Robot" or "controller" in node.fields
+
+
+def _controller(robot: Node) -> str:
+    """Return the controller of a robot; without one, a Robot has "<generic>" in Webots."""
+    return robot.text("controller") or "<generic>"
 
 
 def _argument_values(candidate: Candidate) -> Iterator[Value]:
@@ -122,6 +142,7 @@ def _strings(world: World, value: Value) -> Iterator[Token]:
 
 
 CHECKS: tuple[Check, ...] = (
+    no_robot_speaks_ros,
     robot_used_twice,
     robots_of_one_name,
     arguments_that_are_no_strings,
@@ -141,9 +162,9 @@ def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidat
     """
     world = parse(source, name)
     found = Candidate(source=Source(data=source, name=name), world=world, robots=ros_robots(world))
-    for each in CHECKS if relative_addresses else CHECKS_WITHOUT_FILE:
-        if error := each(found):
-            raise error
+    checks = CHECKS if relative_addresses else CHECKS_WITHOUT_FILE
+    if error := refusal(chain.from_iterable(check(found) for check in checks)):
+        raise error
     return found
 
 
@@ -154,7 +175,8 @@ def check(source: bytes, name: str = "world", *, relative_addresses: bool = Fals
     that it names, so they need no full address.
 
     Raises:
-        WorldError: the world can't be read, repeats a robot or a robot's name, has arguments that
-            are no strings or overrule its name, or has a relative address where none may be.
+        WorldError: the world can't be read, has no robot whose controller is "ros", repeats a robot or a
+            robot's name, has arguments that are no strings or overrule its name, or has a relative
+            address where none may be.
     """
     candidate(source, name, relative_addresses=relative_addresses)

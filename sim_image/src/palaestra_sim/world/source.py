@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from palaestra_sim.errors import WorldError
 
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors begin a file in UTF-8 with it
 _HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
 
 
@@ -18,6 +19,11 @@ class Source:
 
     data: bytes
     name: str
+
+    @property
+    def begin(self) -> int:
+        """Where the first line begins: behind a byte-order mark, if there is one."""
+        return len(_BYTE_ORDER_MARK) if self.data.startswith(_BYTE_ORDER_MARK) else 0
 
     def header(self) -> str:
         """Return the first line, such as `#VRML_SIM R2023b utf8`.
@@ -31,7 +37,7 @@ class Source:
             byte = self.data[error.start]
             fact = f"byte 0x{byte:02x} is not UTF-8"
             raise self.error(error.start, fact, "save the world as UTF-8") from None
-        match = _HEADER.match(self.data)
+        match = _HEADER.match(self.data, self.begin)
         if match is None:
             fact = "the first line is not the header of a Webots world"
             raise self.error(0, fact, "make it #VRML_SIM R2023b utf8")

@@ -43,7 +43,7 @@ def tokenize(source: Source) -> tuple[Token, ...]:
         WorldError: a string is never closed, a number is none, or a character is not allowed.
     """
     tokens = []
-    for match in _TOKEN.finditer(source.data):
+    for match in _TOKEN.finditer(source.data, source.begin):
         kind = match.lastgroup
         if kind == "gap":
             continue
