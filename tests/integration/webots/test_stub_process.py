@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import xmlrpc.client
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,23 @@ def test_a_world_that_is_none_is_told_with_line_and_column(master, tmp_path):
     assert "broken.wbt:3:" in result.stderr
 
 
+def test_a_world_with_several_refusals_is_told_in_whole_and_summed_up_in_the_last_line(master, tmp_path):
+    """A sidecar reports the last line, and a person reads the rest."""
+    del master
+    world = tmp_path / "forest.wbt"
+    world.write_text("#VRML_SIM R2023b utf8\nFloor { }\nTree { }\nTree { }\n")
+
+    result = subprocess.run([STUB, world], capture_output=True, text=True, timeout=20, check=False)
+    *refusals, last = result.stderr.splitlines()
+
+    assert result.returncode == 2
+    assert [line.partition(";")[0] for line in refusals] == [
+        "forest.wbt:2:1: the stub simulates no Floor",
+        "forest.wbt:3:1: the stub simulates no Tree (2 places, in lines 3, 4)",
+    ]
+    assert last.startswith("palaestra-stub: forest.wbt: 3 places are refused, the first is forest.wbt:2:1: ")
+
+
 def test_a_second_one_of_the_same_name_takes_the_name(stub):
     """By the rules of ROS 1: the older node is asked to go, its simulation runs on."""
     older = stub()
@@ -94,6 +112,21 @@ def test_a_second_one_of_the_same_name_takes_the_name(stub):
 
     line = older.stderr.readline()
 
-    assert "another node took the name process_test" in line
+    assert "the node process_test was shut down" in line
+    assert "new node registered with same name" in line
     assert get_time(ask=True).value == 0.0
     get_time.close()
+
+
+def test_a_node_that_rosnode_kill_ends_is_reported_as_shut_down(master, stub):
+    """No other node has its name then. `rosnode kill` sends this request to the node."""
+    process = stub()
+    ready(process)
+    with xmlrpc.client.ServerProxy(master) as ask_master:
+        _, _, address = ask_master.lookupNode("/test", "/process_test")
+    with xmlrpc.client.ServerProxy(address) as node:
+        node.shutdown("/rosnode", "user request")
+
+    line = process.stderr.readline()
+
+    assert "the node process_test was shut down (user request); its robot has no controller any more" in line

@@ -12,7 +12,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from palaestra_sim.errors import SimError
+from palaestra_sim.errors import SimError, WorldRefusedError
 from palaestra_sim.stub import faults
 from palaestra_sim.stub.options import StubOptions
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
@@ -45,6 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO, format="palaestra-stub: %(message)s", stream=sys.stderr)
     try:
         return _Process(options).run()
+    except WorldRefusedError as error:
+        # A sidecar reports the last line alone.
+        sys.stderr.write(f"{error}\npalaestra-stub: {error.summary}\n")
     except SimError as error:
         sys.stderr.write(f"palaestra-stub: {error}\n")
     except MasterUnreachable as error:
@@ -134,13 +137,13 @@ class _Process:
 
     def _make_node(self, name: str) -> RosNode:
         node = self._new_node(name)
-        node.on_end(lambda: self._lose(name))
+        node.on_end(lambda reason: self._lose(name, reason))
         self._nodes[name] = node
         return node
 
-    def _lose(self, name: str) -> None:
-        """End one controller, because another node took its name; the simulation goes on without it."""
-        log.warning("another node took the name %s; its robot has no controller any more", name)
+    def _lose(self, name: str, reason: str) -> None:
+        """End one controller whose node was shut down; the simulation goes on without it."""
+        log.warning("the node %s was shut down (%s); its robot has no controller any more", name, reason)
         controller = self._simulator.controllers.pop(name, None)
         if controller is not None:
             controller.close()

@@ -44,7 +44,7 @@ class RosNode:
         self.blocked: Callable[[], bool] = lambda: False
         self.current_call: object | None = None
         self._loop = loop
-        self._ended: Callable[[], None] = self.abandon
+        self._ended: Callable[[str], None] = lambda _reason: self.abandon()
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, Topic] = {}
@@ -155,12 +155,15 @@ class RosNode:
         """
         self._master.call("getPid")
 
-    def on_end(self, callback: Callable[[], None]) -> None:
-        """Set what happens when the master asks this node to end, because a newer one has its name."""
+    def on_end(self, callback: Callable[[str], None]) -> None:
+        """Set what is called with the reason when this node is asked to end.
+
+        `rosnode kill` asks, and so does the master when a newer node registers with its name.
+        """
         self._ended = callback
 
-    def _asked_to_end(self, _reason: str) -> None:
-        self._loop.post(self._ended)
+    def _asked_to_end(self, reason: str) -> None:
+        self._loop.post(lambda: self._ended(reason))
 
     def _accept(self) -> None:
         try:
