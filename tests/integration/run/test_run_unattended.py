@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from tests.local_run import ROOT, running
+from tests.local_run import ROOT, is_running, running
 from tests.soak import damage, kills, kinds, leaks, recovery
 from tests.soak.jobs import LITTLE_DQN, LITTLE_PPO
 
@@ -67,9 +67,17 @@ def troubled():
 
 
 def lose_the_master(run):
-    """Kill the ROS master; return the trainer's exit code, and why it began again."""
-    ends, attempts = len(kills.ENDED.findall(run.output())), len(run.attempts())
-    os.kill(run.pid_of("rosmaster"), signal.SIGKILL)
+    """Kill the ROS master; return the trainer's exit code, and why it began again.
+
+    The runner is stopped until the trainer has ended: a new master that answers in time costs no attempt.
+    """
+    ends, attempts, trainer = len(kills.ENDED.findall(run.output())), len(run.attempts()), run.trainer()
+    run.process.send_signal(signal.SIGSTOP)
+    try:
+        os.kill(run.pid_of("rosmaster"), signal.SIGKILL)
+        run.until(lambda: not is_running(trainer))
+    finally:
+        run.process.send_signal(signal.SIGCONT)
     (code,) = run.until(lambda: kills.ENDED.findall(run.output())[ends:])
     (again,) = run.until(lambda: run.attempts()[attempts:])
     return int(code), again
