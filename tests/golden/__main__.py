@@ -2,6 +2,7 @@
 
     tests/golden/<example>.<layout>.yaml    the whole plan of each manifests/examples/*.yaml
     manifests/crd.yaml, docs/trainingjob.md what the API is made of
+    docs/trainingjob.md                     the default hyperparameters of the algorithms
     docs/metrics.md                         every metric that the programs declare
     charts/palaestra/README.md              what its values.yaml says
     charts/palaestra/dashboards/*.json      what tools/dashboards asks and shows
@@ -22,6 +23,7 @@ from palaestra.plan.text import as_yaml
 from tests.chart import installation, readme
 from tests.control_plane.programs import NoPrograms
 from tools import dashboards
+from tools.hyperparameters import page as hyperparameters
 from tools.metrics import page as metrics
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +45,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
             yield path, as_yaml(plan(job, layout).objects)
     for name, text in generated_files(ROOT).items():
         yield ROOT / name, text
+    yield ROOT / hyperparameters.PAGE, hyperparameters.page((ROOT / hyperparameters.PAGE).read_text())
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text

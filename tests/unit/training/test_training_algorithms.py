@@ -70,7 +70,7 @@ def test_all_five_are_there():
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_defaults_are_hyperparameters_of_the_class(name):
     """A default that the class doesn't know would fail every run."""
-    assert check(Algorithm(name=name, hyperparameters=dict(ALGORITHMS[name].defaults))).cls
+    assert check(Algorithm(name=name, hyperparameters=dict(ALGORITHMS[name].arena))).cls
 
 
 def test_mistyped_hyperparameters_are_told_all_at_once_with_the_nearest_name():
@@ -219,7 +219,7 @@ def test_plain_stable_baselines_loads_what_ours_saved(make_env, tmp_path, ours, 
 
 def test_several_environments_are_no_reason_to_warn(make_env):
     """A soft update at each step is one at each vector step."""
-    model = model_of("DQN", make_env(members=3))
+    model = model_of("DQN", make_env(members=3), target_update_interval=1)
 
     assert model.target_update_interval == 3
 

@@ -41,9 +41,9 @@ reads:
   the configuration ({CONFIG_VARIABLE}), the newest checkpoint of the run directory
 writes:
   the run directory ({RUN_VARIABLE}): attempts.jsonl, checkpoints/, tensorboard/,
-  evaluations.jsonl, model.zip (the best by evaluation), training.yaml and, at the end,
-  summary.json; the termination message (PALAESTRA_TERMINATION_LOG); on a claim, the link
-  tensorboard/<job>-<first 8 of its UID>/<replica> at its top
+  evaluations.jsonl, model.zip (the best by evaluation), training.yaml, hyperparameters.json
+  and, at the end, summary.json; the termination message (PALAESTRA_TERMINATION_LOG); on a
+  claim, the link tensorboard/<job>-<first 8 of its UID>/<replica> at its top
 
 A run directory with a checkpoint is resumed; one that is finished is reported.
 """
@@ -51,8 +51,8 @@ EVAL = f"""\
 Measure the model.zip of a run directory on episodes with seeds of a stream of their own.
 
 reads:
-  RUN_DIR/model.zip, RUN_DIR/training.yaml; the simulators of {CONFIG_VARIABLE}, or without it
-  processes that load the worlds in RUN_DIR
+  RUN_DIR/model.zip, RUN_DIR/training.yaml, RUN_DIR/hyperparameters.json; the simulators of
+  {CONFIG_VARIABLE}, or without it processes that load the worlds in RUN_DIR
 writes:
   one JSON object to standard output
 """

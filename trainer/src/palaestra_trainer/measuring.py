@@ -10,6 +10,7 @@ from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.evaluation import evaluate_on_all
+from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.seeds import episode_seeds
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.member import Nobody
@@ -25,7 +26,7 @@ def measure(
     episodes: int,
     stream: str,
 ) -> dict[str, Any]:
-    """Return how a saved model does in the first `episodes` episodes of a stream of seeds.
+    """Return how the model of a run directory does in the first `episodes` episodes of a stream of seeds.
 
     Of the configuration's simulators only the evaluating ones are made and started.
 
@@ -45,9 +46,8 @@ def measure(
         stack.callback(fleet.stop)
         fleet.start()
         env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)
-        trained = algorithms.make_model(
-            configuration.algorithm, env, configuration.seed, configuration.device
-        )
+        begun = algorithms.begun_with(configuration, RunDirectory(model.parent))
+        trained = algorithms.make_model(begun, env, configuration.seed, configuration.device)
         checkpoint.load_tensors(model, trained)
         seeds = episode_seeds(configuration.seed, stream, episodes)
         evaluation = evaluate_on_all(algorithms.policy_of(trained), fleet.evaluating, seeds)

@@ -49,6 +49,11 @@ class RunDirectory:
         return self.path / "evaluations.jsonl"
 
     @property
+    def hyperparameters(self) -> Path:
+        """All hyperparameters that the run began with, also those that its job left out."""
+        return self.path / "hyperparameters.json"
+
+    @property
     def journal(self) -> Path:
         """Where the run stood some seconds ago, which matters if it is killed."""
         return self.path / "journal.json"

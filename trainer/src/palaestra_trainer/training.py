@@ -118,6 +118,7 @@ class Attempt:
         self._directory = directory
         self._progress = progress
         self._around = around
+        self._algorithm = configuration.algorithm
 
     def play(self) -> End:
         """Train; return how it ended. Nothing is left running, whatever happens."""
@@ -157,6 +158,8 @@ class Attempt:
         interruption = stack.enter_context(Interruption())
         self._watch(stack)
         found = self._newest()
+        before = RunDirectory(found.path.parent.parent) if found else None
+        self._algorithm = algorithms.begin_with(configuration, self._directory, before)
         self._take_over(found)  # before anything is served: a counter that jumps has grown, to Prometheus
         known = constants(configuration)
         stack.enter_context(StatusServer(configuration.status_address, progress, known))
@@ -216,7 +219,7 @@ class Attempt:
         env = SimulatorsVecEnv(run.fleet.collecting, self._configuration.seed, check=run.interruption.check)
         stack.callback(env.close)
         wanted = self._configuration
-        model = algorithms.make_model(wanted.algorithm, env, wanted.seed, wanted.device)
+        model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
         logger = configure(str(self._directory.tensorboard), ["tensorboard"])
@@ -248,6 +251,7 @@ class Attempt:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
+        algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
         self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason)
         link_curves(self._directory, self._configuration)

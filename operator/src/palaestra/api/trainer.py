@@ -102,7 +102,7 @@ class Algorithm(ApiModel):
 
     hyperparameters: FreeObject = Field(default={})
     """Keyword arguments of the algorithm's class, in its own spelling (`learning_rate`, not
-    `learningRate`); absent ones keep the trainer's defaults."""
+    `learningRate`); absent ones have the defaults of docs/trainingjob.md."""
 
     normalize: Normalize | None = None
     """What is brought to one scale before it is learned from; `{}`: observations and rewards; absent:

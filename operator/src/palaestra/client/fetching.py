@@ -29,6 +29,7 @@ from palaestra.plan.replica import TRAINER
 
 PARTS = (
     "training.yaml",
+    "hyperparameters.json",
     "model.zip",
     "evaluations.jsonl",
     "summary.json",

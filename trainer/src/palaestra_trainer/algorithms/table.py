@@ -1,6 +1,7 @@
 """The algorithms by name, their defaults, and what they refuse.
 
-The defaults suit the task that ships, `MoveToTargetEnv-v0`; whatever a
+The defaults are those of the class, so Stable-Baselines3's. Only the arena's
+environments have some of their own, which were found by trying. Whatever a
 TrainingJob sets takes their place, one by one. Hyperparameters are keyword
 arguments of the class and are checked against its signature, so a mistyped
 one is found before a simulator is started. Where Stable-Baselines3 takes a
@@ -39,19 +40,31 @@ OURS = frozenset(
 )  # fmt: skip
 
 
+ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
 LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One algorithm: its class and its default hyperparameters."""
+    """One algorithm.
+
+    Attributes:
+        cls: its class.
+        arena: hyperparameters that suit the arena's environments better than the defaults of the class.
+    """
 
     cls: type[BaseAlgorithm]
-    defaults: Mapping[str, Any]
+    arena: Mapping[str, Any]
+
+    @property
+    def defaults(self) -> dict[str, Any]:
+        """The defaults of the class, which are Stable-Baselines3's."""
+        parameters = inspect.signature(self.cls.__init__).parameters
+        return {name: parameter.default for name, parameter in parameters.items() if name not in OURS}
 
 
-def _entry(cls: type[BaseAlgorithm], **defaults: Any) -> Entry:
-    return Entry(cls=cls, defaults=MappingProxyType(defaults))
+def _entry(cls: type[BaseAlgorithm], **arena: Any) -> Entry:
+    return Entry(cls=cls, arena=MappingProxyType(arena))
 
 
 ALGORITHMS: Mapping[str, Entry] = MappingProxyType(
@@ -117,7 +130,7 @@ def check(algorithm: Algorithm) -> Entry:
             f"algorithm.name: {algorithm.name} is not an algorithm; "
             f"{nearest(algorithm.name, dict(ALGORITHMS))}"
         )
-    known = _hyperparameters(entry.cls)
+    known = list(entry.defaults)
     lines = [
         f"algorithm.hyperparameters.{name}: {algorithm.name} has no such hyperparameter; "
         f"{nearest(name, known)}"
@@ -134,6 +147,23 @@ def check(algorithm: Algorithm) -> Entry:
     return entry
 
 
+def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
+    """Return the algorithm with all its hyperparameters: those that are given, and defaults for the rest.
+
+    Args:
+        algorithm: what the job says.
+        environment: the id of its environment, as the job says it.
+    """
+    arena = environment.rpartition(":")[2] in ARENA_ENVIRONMENTS
+    return with_defaults(algorithm, ALGORITHMS[algorithm.name].arena if arena else {})
+
+
+def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
+    """Return the algorithm with all its hyperparameters; those of `better` precede the class's defaults."""
+    known = ALGORITHMS[algorithm.name].defaults
+    return algorithm.model_copy(update={"hyperparameters": {**known, **better, **algorithm.hyperparameters}})
+
+
 def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:
     """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
 
@@ -148,7 +178,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
             f"environment.id: its observation is a {type(env.observation_space).__name__}; "
             "give it one Box, e.g. by gymnasium's FlattenObservation"
         )
-    given = {**entry.defaults, **algorithm.hyperparameters}
+    given = with_defaults(algorithm, {}).hyperparameters
     chosen = {name: _as_python(value) for name, value in given.items()}
     if "target_update_interval" in chosen:
         # A vector step is num_envs steps: the target can't be updated more often than that.
@@ -173,7 +203,3 @@ def _as_python(value: Any) -> Any:
     if isinstance(value, str) and (number := LINEAR.fullmatch(value)):
         return LinearSchedule(float(number[1]), 0.0, 1.0)
     return value
-
-
-def _hyperparameters(cls: type[BaseAlgorithm]) -> list[str]:
-    return [name for name in inspect.signature(cls.__init__).parameters if name not in OURS]

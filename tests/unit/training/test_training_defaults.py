@@ -1,0 +1,140 @@
+"""Which hyperparameters a run has that its job leaves out."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import signal
+import zipfile
+
+import pytest
+import stable_baselines3 as sb3
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.algorithms.table import ALGORITHMS, resolve
+from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.measuring import measure
+from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.seeds import EVALUATE
+
+SB3 = {"DQN": sb3.DQN, "SAC": sb3.SAC, "PPO": sb3.PPO, "A2C": sb3.A2C}
+ARENA = "MoveToTargetEnv-v0"
+
+
+@pytest.fixture
+def interrupted(play, job):
+    """Interrupt a run of DQN whose job leaves the discount out; return its configuration."""
+    calls = iter(range(1, 10_000))
+
+    def interrupt():
+        if next(calls) == 60:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    configuration = job("DQN")
+    assert play(configuration, on_step=interrupt)[0] == 75
+    return configuration
+
+
+def discount(directory):
+    """Return the discount of the newest checkpoint's model."""
+    with zipfile.ZipFile(checkpoint.newest(directory.checkpoints).path / "model.zip") as archive:
+        return json.loads(archive.read("data"))["gamma"]
+
+
+@pytest.mark.parametrize("name", sorted(SB3))
+def test_an_own_environment_has_the_defaults_of_stable_baselines3(name):
+    """Those of the arena were found in the arena."""
+    theirs = inspect.signature(SB3[name].__init__).parameters
+
+    resolved = resolve(Algorithm(name=name), "hall:Hall-v0").hyperparameters
+
+    assert resolved == {hyperparameter: theirs[hyperparameter].default for hyperparameter in resolved}
+    assert {"learning_rate", "gamma", "policy_kwargs"} <= resolved.keys()
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+@pytest.mark.parametrize("environment", [ARENA, f"palaestra_trainer.environments:{ARENA}"])
+def test_the_arena_keeps_its_own_defaults(name, environment):
+    """However its module is named."""
+    resolved = resolve(Algorithm(name=name), environment).hyperparameters
+
+    assert resolved.items() >= ALGORITHMS[name].arena.items()
+    assert resolved["gamma"] < 0.98
+
+
+def test_what_a_job_gives_precedes_every_default():
+    """One by one."""
+    given = Algorithm(name="DQN", hyperparameters={"gamma": 0.5})
+
+    resolved = resolve(given, ARENA).hyperparameters
+
+    assert (resolved["gamma"], resolved["learning_rate"]) == (0.5, "lin_5e-4")
+
+
+def test_a_run_goes_on_with_the_hyperparameters_it_began_with(interrupted, play, directory):
+    """Here it began at a release that had another discount."""
+    kept = json.loads(directory.hyperparameters.read_text())
+    assert kept["gamma"] == discount(directory) == 0.99
+    directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
+
+    code, _ = play(interrupted)
+
+    assert (code, discount(directory)) == (0, 0.5)
+    assert json.loads(directory.hyperparameters.read_text())["gamma"] == 0.5
+
+
+def test_a_run_that_began_at_a5276f3_goes_on_with_what_it_had(interrupted, play, directory):
+    """That release gave every environment the arena's defaults, and wrote no such file."""
+    directory.hyperparameters.unlink()
+
+    code, _ = play(interrupted)
+
+    assert (code, discount(directory)) == (0, 0.93)
+    assert not directory.hyperparameters.exists()
+
+
+def test_a_run_of_a5276f3_without_a_checkpoint_goes_on_with_what_it_had(play, job, directory):
+    """It was interrupted before its first one."""
+    directory.path.mkdir()
+    directory.begin_attempt("", "new run")
+
+    play(job("DQN"))
+
+    assert discount(directory) == 0.93
+
+
+@pytest.mark.usefixtures("interrupted")
+def test_a_run_that_prolongs_another_has_its_hyperparameters(play, job, directory, tmp_path):
+    """And keeps them: the other may be gone when it resumes."""
+    kept = json.loads(directory.hyperparameters.read_text())
+    directory.hyperparameters.write_text(json.dumps(kept | {"gamma": 0.5}))
+    further = RunDirectory(tmp_path / "further")
+
+    play(job("DQN", steps=120, resumeFrom=str(directory.path)), into=further)
+
+    assert discount(further) == 0.5
+    assert json.loads(further.hyperparameters.read_text())["gamma"] == 0.5
+
+
+def test_a_run_whose_hyperparameters_cannot_be_read_is_refused(interrupted, play, directory, last_word):
+    """Defaults in their place would be another run."""
+    directory.hyperparameters.write_text("{")
+
+    code, _ = play(interrupted)
+
+    assert code == 2
+    assert "hyperparameters.json: cannot be read" in last_word().reason
+
+
+def test_a_policy_is_measured_with_the_hyperparameters_of_its_run(play, job, directory):
+    """Its network has the shape that they say."""
+    hyperparameters = {"learning_starts": 10, "batch_size": 8, "buffer_size": 500}
+    configuration = job("DQN", algorithm={"name": "DQN", "hyperparameters": hyperparameters})
+    _, members = play(configuration)
+
+    measured = measure(
+        configuration, directory.model, lambda _: [members["evaluate-0"]], episodes=2, stream=EVALUATE
+    )
+
+    assert measured["episodes"] == 2

@@ -1,0 +1,69 @@
+"""The hyperparameters that a run began with: it goes on with them, whatever the defaults are by then.
+
+They lie in the run directory, all of them. A run that began at a release without that file goes on with
+what that release gave every environment, which were the arena's.
+"""
+
+from __future__ import annotations
+
+import json
+
+from palaestra_trainer.algorithms.table import ALGORITHMS, resolve, with_defaults
+from palaestra_trainer.configuration import Algorithm, Configuration
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import RunDirectory, replace_file
+
+
+def begin_with(
+    configuration: Configuration, directory: RunDirectory, before: RunDirectory | None
+) -> Algorithm:
+    """Return what an attempt learns with: the algorithm and all its hyperparameters.
+
+    Args:
+        configuration: of the run.
+        directory: of the run; it may not have begun.
+        before: the run whose checkpoint it goes on from, its own or another; None: there is no checkpoint.
+
+    Raises:
+        ConfigurationError: what the run directory says cannot be read.
+    """
+    if directory.hyperparameters.exists() or not (before or directory.attempts.exists()):
+        return _kept(configuration, directory) or resolve(
+            configuration.algorithm, configuration.environment.id
+        )
+    return begun_with(configuration, before or directory)
+
+
+def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorithm:
+    """Return what a run that has begun learns with.
+
+    Raises:
+        ConfigurationError: what the run directory says cannot be read.
+    """
+    kept = _kept(configuration, directory)
+    return kept or with_defaults(configuration.algorithm, ALGORITHMS[configuration.algorithm.name].arena)
+
+
+def keep(algorithm: Algorithm, directory: RunDirectory) -> None:
+    """Write what a run begins with into its directory, unless it has begun.
+
+    Raises:
+        OSError: it could not be written.
+    """
+    if directory.hyperparameters.exists() or directory.attempts.exists():
+        return
+    text = json.dumps(algorithm.hyperparameters, indent=2) + "\n"
+    replace_file(directory.hyperparameters, lambda path: path.write_text(text, encoding="utf-8"))
+
+
+def _kept(configuration: Configuration, directory: RunDirectory) -> Algorithm | None:
+    path = directory.hyperparameters
+    try:
+        hyperparameters = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise ConfigurationError(
+            f"{path}: cannot be read ({error}); restore it, or use another run directory"
+        ) from error
+    return configuration.algorithm.model_copy(update={"hyperparameters": hyperparameters})
