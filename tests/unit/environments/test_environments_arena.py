@@ -102,14 +102,17 @@ def test_both_may_be_chosen_even_if_they_are_near():
     [
         ({"goal": (0, 0)}, "reset option 'goal' is not known; use start or target"),
         ({"target": (0.8, 0.8)}, r"target: \(0.8, 0.8\) is in a wall or a cylinder"),
-        ({"start": (2.5, 0.0, 0.0)}, r"start: \(2.5, 0\) is in a wall"),
+        ({"start": (2.5, 0.0, 0.0)}, r"start: \(2.5, 0\) has the robot in a wall or a cylinder"),
+        ({"start": (1.9, 0.0, 0.0)}, r"start: \(1.9, 0\) has the robot in a wall .* within 1.7714 m"),
+        ({"start": (0.8, 0.35, 0.0)}, r"start: \(0.8, 0.35\) has the robot in a wall"),
+        ({"start": (math.nan, 0.0, 0.0)}, r"start: \(nan, 0\) has the robot in a wall"),
         ({"target": (math.nan, 0.0)}, r"target: \(nan, 0\) is in a wall"),
         ({"start": (0.0, 0.0)}, r"start: \(0.0, 0.0\) is not 3 numbers; give x, y, heading"),
         ({"target": np.zeros((1, 2))}, r"target: .* is not 2 numbers; give x, y"),
         ({"target": "home"}, "target: 'home' is not 2 numbers"),
         ({"target": 1.0}, "target: 1.0 is not 2 numbers"),
     ],
-    ids=["unknown", "cylinder", "wall", "nan", "too few", "matrix", "text", "number"],
+    ids=["unknown", "cylinder", "wall", "in", "at", "nowhere", "nan", "too few", "matrix", "text", "number"],
 )
 def test_a_place_that_cannot_be_is_refused(chosen, message):
     """Rather than searched around for ever."""

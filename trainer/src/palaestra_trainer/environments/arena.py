@@ -20,6 +20,7 @@ from palaestra_trainer.robots.base import RADIUS_M, Pose
 HALF_SIDE_M = 2.0  # from the centre to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
 CYLINDER_RADIUS_M = 0.25  # wide enough that none hides between two of the robot's infrared rays
+OUTLINE_M = 0.2286  # radius of the body and its bumper in the shipped world
 CLEARANCE_M = 0.10  # between the robot's body and anything else, at the start and on the target
 APART_M = 1.0  # least distance from start to target
 
@@ -73,8 +74,8 @@ def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
     """Return a task whose `start` (x, y, heading; or a Pose) and `target` (x, y) may be chosen.
 
     Raises:
-        ConfigurationError: another name than these, not so many numbers, or a place inside a
-            wall or a cylinder.
+        ConfigurationError: another name than these, not so many numbers, a target inside a wall or a
+            cylinder, or a start where the robot would be inside of one.
     """
     if unknown := sorted(set(chosen) - {"start", "target"}):
         raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
@@ -82,10 +83,10 @@ def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
     if start is not None:
         if not isinstance(start, Pose):
             start = Pose(*_numbers("start", start, ("x", "y", "heading")))
-        _check_place("start", start.x_m, start.y_m)
+        _check_place("start", start.x_m, start.y_m, OUTLINE_M)
     if target is not None:
         x_m, y_m = _numbers("target", target, ("x", "y"))
-        _check_place("target", x_m, y_m)
+        _check_place("target", x_m, y_m, 0.0)
         target = x_m, y_m
     return draw_task(random, start, target)
 
@@ -101,9 +102,11 @@ def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
     )
 
 
-def _check_place(name: str, x_m: float, y_m: float) -> None:
-    if not gap(x_m, y_m) > 0.0:  # so that NaN is refused too
+def _check_place(name: str, x_m: float, y_m: float, radius_m: float) -> None:
+    """Refuse a place without `radius_m` of free floor around it: the robot would be pushed out of there."""
+    if not gap(x_m, y_m) > radius_m:  # so that NaN is refused too
+        fact = "is in a wall or a cylinder" if not radius_m else "has the robot in a wall or a cylinder"
         raise ConfigurationError(
-            f"reset option {name}: ({x_m:g}, {y_m:g}) is in a wall or a cylinder; "
-            f"choose a free place within {HALF_SIDE_M:g} m of the centre on each axis"
+            f"reset option {name}: ({x_m:g}, {y_m:g}) {fact}; choose a free place within"
+            f" {HALF_SIDE_M - radius_m:g} m of the centre on each axis"
         )
