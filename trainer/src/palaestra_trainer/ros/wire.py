@@ -20,6 +20,7 @@ from palaestra_trainer.waits import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192
+_MOST_KEPT_BYTES = 4 << 20  # pictures come at each step, and a buffer is not made anew for each
 
 # Being woken costs a virtual machine 30 us, more than a stub needs for its answer. So where the last wait was
 # short, the next one first looks a few times, and lets others run in between.
@@ -151,19 +152,23 @@ class Wire:
         return ahead + LENGTH.size + int(length)
 
     def _take(self, ahead: int, end: int) -> memoryview:
-        if self._filled == end:
+        if self._filled == end <= _MOST_KEPT_BYTES:
             self._filled = 0
             return self._view[:end] if ahead else self._view[LENGTH.size : end]
         frame = memoryview(bytes(self._view[:end]))
         rest = bytes(self._view[end : self._filled])
+        if end > _MOST_KEPT_BYTES:
+            self._buffer = bytearray(_BUFFER_BYTES + len(rest))
+            self._view = memoryview(self._buffer)
         self._view[: len(rest)] = rest
         self._filled = len(rest)
         return frame if ahead else frame[LENGTH.size :]
 
     def _make_room(self, end: int) -> None:
-        if end > len(self._buffer):
-            larger = bytearray(end + _BUFFER_BYTES)
-            larger[: self._filled] = self._view[: self._filled]
+        """Make room for as many bytes as have come: the length of a frame is a claim until then."""
+        if self._filled == len(self._buffer):
+            larger = bytearray(min(2 * self._filled, end + _BUFFER_BYTES))
+            larger[: self._filled] = self._view
             self._buffer, self._view = larger, memoryview(larger)
 
     def _read_more(self) -> None:
