@@ -2,6 +2,7 @@
 
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
+├── UnreadableAnswer     the ROS master or a node answered with no answer of ROS
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a number of the learner's is none; don't retry       exit 81
@@ -31,6 +32,13 @@ class ConfigurationError(TrainerError, ValueError):
 
 class MasterLost(TrainerError, ConnectionError):
     """The ROS master does not answer: names are lost and nothing registers again."""
+
+
+class UnreadableAnswer(TrainerError, ValueError):
+    """The ROS master or a node answered with something that is no answer of ROS.
+
+    Services and topics raise it as a fault of the simulator that they belong to.
+    """
 
 
 class FaultBudgetSpent(TrainerError, RuntimeError):

@@ -1,36 +1,24 @@
-"""The ROS master, asked with a deadline; rosgraph's own client would wait for ever."""
+"""The ROS master, asked with a deadline."""
 
 from __future__ import annotations
 
-import http.client
 import os
-import xmlrpc.client
 from typing import Any
 from urllib.parse import urlsplit
 
-from palaestra_trainer.errors import MasterLost
+from palaestra_trainer.errors import MasterLost, UnreadableAnswer
+from palaestra_trainer.ros.calls import OK, Answer, call
 
 DEFAULT_URI = "http://localhost:11311"
 _TIMEOUT_S = 5.0
-_OK = 1
-
-
-class Deadline(xmlrpc.client.Transport):
-    """HTTP for one XML-RPC call that ends after `timeout_s` seconds."""
-
-    def __init__(self, timeout_s: float) -> None:
-        super().__init__()
-        self._timeout_s = timeout_s
-
-    def make_connection(self, host: Any) -> http.client.HTTPConnection:
-        """Return a connection whose reads and writes end in time."""
-        connection = http.client.HTTPConnection(host, timeout=self._timeout_s)
-        self._connection = host, connection  # where the base class looks for what to close
-        return connection
 
 
 class Master:
-    """The master at ROS_MASTER_URI, asked in the name of `caller`."""
+    """The master at ROS_MASTER_URI, asked in the name of `caller`.
+
+    Every method but `ping` raises MasterLost if no master answers or it refuses, and UnreadableAnswer if its
+    answer cannot be read.
+    """
 
     def __init__(self, caller: str, timeout_s: float = _TIMEOUT_S) -> None:
         self.uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
@@ -41,21 +29,30 @@ class Master:
         """Return if the master answers.
 
         Raises:
-            MasterLost: it does not.
+            MasterLost: it does not, or what answers there is no master.
         """
-        self._call("getPid")
+        try:
+            self._call("getPid")
+        except UnreadableAnswer as error:
+            raise MasterLost(f"no ROS master at {self.uri}: {error}; is another program there?") from error
 
     def service_address(self, service: str) -> tuple[str, int] | None:
         """Return host and port of the node that serves `service`; None when no node does."""
-        uri = self._ask("lookupService", service)
-        if uri is None:
+        answer = self._answer("lookupService", service)
+        if answer.code != OK:
             return None
-        parts = urlsplit(uri)
-        return str(parts.hostname), int(parts.port or 0)
+        try:
+            parts = urlsplit(answer.value)
+            return str(parts.hostname), int(parts.port or 0)
+        except (ValueError, TypeError, AttributeError) as error:
+            raise self._unreadable(f"an address of {service}", answer) from error
 
     def register_subscriber(self, topic: str, type_name: str, node_uri: str) -> list[str]:
         """Register this node as a subscriber and return the addresses of the topic's publishers."""
-        return list(self._call("registerSubscriber", topic, type_name, node_uri))
+        answer = self._call("registerSubscriber", topic, type_name, node_uri)
+        if isinstance(answer.value, list) and all(isinstance(uri, str) for uri in answer.value):
+            return answer.value
+        raise self._unreadable(f"the publishers of {topic}", answer)
 
     def unregister_subscriber(self, topic: str, node_uri: str) -> None:
         """Take a registration back."""
@@ -63,22 +60,23 @@ class Master:
 
     def node_names(self) -> set[str]:
         """Return the full names of all nodes that publish, subscribe or serve."""
-        state = self._call("getSystemState")
-        return {node for part in state for _, nodes in part for node in nodes}
-
-    def _call(self, method: str, *arguments: Any) -> Any:
-        code, text, value = self._answer(method, *arguments)
-        if code != _OK:
-            raise MasterLost(f"the ROS master refused {method}: {text}")
-        return value
-
-    def _ask(self, method: str, *arguments: Any) -> Any | None:
-        code, _, value = self._answer(method, *arguments)
-        return value if code == _OK else None
-
-    def _answer(self, method: str, *arguments: Any) -> Any:
+        answer = self._call("getSystemState")
         try:
-            with xmlrpc.client.ServerProxy(self.uri, transport=Deadline(self._timeout_s)) as proxy:
-                return getattr(proxy, method)(self._caller, *arguments)
-        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+            return {str(node) for part in answer.value for _, nodes in part for node in nodes}
+        except (ValueError, TypeError) as error:
+            raise self._unreadable("names of nodes", answer) from error
+
+    def _call(self, method: str, *arguments: Any) -> Answer:
+        answer = self._answer(method, *arguments)
+        if answer.code != OK:
+            raise MasterLost(f"the ROS master refused {method}: {answer.text}")
+        return answer
+
+    def _answer(self, method: str, *arguments: Any) -> Answer:
+        try:
+            return call(self.uri, self._timeout_s, method, self._caller, *arguments)
+        except OSError as error:
             raise MasterLost(f"no ROS master answers at {self.uri} ({error}); is it running?") from error
+
+    def _unreadable(self, wanted: str, answer: Answer) -> UnreadableAnswer:
+        return UnreadableAnswer(f"the ROS master answered with {answer.value!r} instead of {wanted}")

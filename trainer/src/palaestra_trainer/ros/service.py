@@ -7,7 +7,7 @@ from typing import Any
 
 from palaestra_sim.protocol.rostypes import service_type
 from palaestra_sim.protocol.tcpros import LENGTH
-from palaestra_trainer.errors import SimulatorDead, WrongData
+from palaestra_trainer.errors import SimulatorDead, UnreadableAnswer, WrongData
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node
 from palaestra_trainer.ros.wire import Wire
@@ -103,7 +103,10 @@ class RosService:
 
     def _connect(self) -> Wire:
         node = ensure_node()
-        address = Master(node).service_address(self.name)
+        try:
+            address = Master(node).service_address(self.name)
+        except UnreadableAnswer as error:
+            raise WrongData(self.simulator, f"{self.name} cannot be looked up: {error}") from error
         if address is None:
             raise SimulatorDead(self.simulator, f"no node serves {self.name}")
         header = {

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import contextlib
-import http.client
 import struct
-import xmlrpc.client
 from collections.abc import Callable
 from typing import Any
 
 from palaestra_sim.protocol.rostypes import message_type
-from palaestra_trainer.errors import MasterLost, SimulatorDead, SimulatorFault, SimulatorHung, WrongData
-from palaestra_trainer.ros.master import Deadline, Master
+from palaestra_trainer.errors import (
+    MasterLost,
+    SimulatorDead,
+    SimulatorFault,
+    SimulatorHung,
+    UnreadableAnswer,
+    WrongData,
+)
+from palaestra_trainer.ros.calls import OK, call
+from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node, node_uri
 from palaestra_trainer.ros.wire import Wire
 
 DEADLINE_S = 0.5
 _CONNECT_S = 5.0
-_OK = 1
 
 
 class RosSubscriber:
@@ -58,10 +63,14 @@ class RosSubscriber:
         Raises:
             SimulatorDead: nobody publishes the topic, or the publisher cannot be reached.
             SimulatorHung: the publisher does not answer in time.
+            WrongData: the master or the publisher answers with something else.
         """
         self._drop()
         node = ensure_node()
-        publishers = Master(node).register_subscriber(self.name, self._type.name, node_uri())
+        try:
+            publishers = Master(node).register_subscriber(self.name, self._type.name, node_uri())
+        except UnreadableAnswer as error:
+            raise WrongData(self.simulator, f"{self.name} cannot be subscribed to: {error}") from error
         self._registered = True
         if not publishers:
             raise SimulatorDead(self.simulator, f"no node publishes {self.name}")
@@ -113,8 +122,8 @@ class RosSubscriber:
         self._drop()
         if self._registered:
             self._registered = False
-            # A master that is gone has forgotten us already.
-            with contextlib.suppress(MasterLost):
+            # A master that is gone has forgotten us already; one that is out of its mind cannot be helped.
+            with contextlib.suppress(MasterLost, UnreadableAnswer):
                 Master(ensure_node()).unregister_subscriber(self.name, node_uri())
 
     def _drop(self) -> None:
@@ -124,14 +133,18 @@ class RosSubscriber:
 
     def _ask_for_address(self, publisher: str, node: str) -> tuple[str, int]:
         try:
-            with xmlrpc.client.ServerProxy(publisher, transport=Deadline(_CONNECT_S)) as proxy:
-                answer: Any = proxy.requestTopic(node, self.name, [["TCPROS"]])
+            answer = call(publisher, _CONNECT_S, "requestTopic", node, self.name, [["TCPROS"]])
         except TimeoutError as error:
             raise SimulatorHung(self.simulator, f"{self.name} has a publisher that hangs") from error
-        except (OSError, http.client.HTTPException, xmlrpc.client.Error) as error:
+        except OSError as error:
             raise SimulatorDead(self.simulator, f"{self.name} has a publisher that is gone") from error
-        code, text, parameters = answer
-        if code != _OK:
-            raise SimulatorDead(self.simulator, f"{self.name} is not published: {text}")
-        _, host, port = parameters
-        return str(host), int(port)
+        except UnreadableAnswer as error:
+            raise WrongData(
+                self.simulator, f"{self.name} has a publisher that answers wrongly: {error}"
+            ) from error
+        if answer.code != OK:
+            raise SimulatorDead(self.simulator, f"{self.name} is not published: {answer.text}")
+        match answer.value:
+            case [str(), str(host), int(port)]:
+                return host, port
+        raise WrongData(self.simulator, f"{self.name} is published at {answer.value!r}, which is no address")

@@ -1,0 +1,57 @@
+"""One XML-RPC call of the ROS master or of a node, with a deadline and a checked answer.
+
+rosgraph's own client would wait for ever. What comes back is whatever the peer wrote: Python's reader raises
+errors of many kinds for bytes that are no answer, and all of them become `UnreadableAnswer` here.
+"""
+
+from __future__ import annotations
+
+import http.client
+import xmlrpc.client
+from typing import Any, NamedTuple
+
+from palaestra_trainer.errors import UnreadableAnswer
+
+OK = 1
+
+
+class Answer(NamedTuple):
+    """What every call of ROS answers: 1 for success, words for people, a value."""
+
+    code: int
+    text: str
+    value: Any
+
+
+class _Deadline(xmlrpc.client.Transport):
+    """HTTP for one call whose reads and writes end after `timeout_s` seconds."""
+
+    def __init__(self, timeout_s: float) -> None:
+        super().__init__()
+        self._timeout_s = timeout_s
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        """Return a connection whose reads and writes end in time."""
+        connection = http.client.HTTPConnection(host, timeout=self._timeout_s)
+        self._connection = host, connection  # where the base class looks for what to close
+        return connection
+
+
+def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> Answer:
+    """Return the answer of the server at `uri`.
+
+    Raises:
+        OSError: it cannot be reached; TimeoutError: it does not answer in time.
+        UnreadableAnswer: it answered, with something that is no answer of ROS.
+    """
+    try:
+        with xmlrpc.client.ServerProxy(uri, transport=_Deadline(timeout_s)) as proxy:
+            answer: Any = getattr(proxy, method)(*arguments)
+    except OSError:
+        raise
+    except Exception as error:  # the reader's own choice: ExpatError, ValueError, TypeError, IndexError, ...
+        raise UnreadableAnswer(f"{uri} answered {method} with no XML-RPC: {error!r}") from error
+    match answer:
+        case [int(code), str(text), value]:
+            return Answer(code, text, value)
+    raise UnreadableAnswer(f"{uri} answered {method} with {answer!r}, not with a code, a text and a value")
