@@ -6,6 +6,7 @@ happening.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import re
 from collections.abc import Callable, Iterable
@@ -20,6 +21,7 @@ from palaestra_sim.stub.faults.kinds import Fault
 from palaestra_sim.stub.faults.language import FaultError
 from palaestra_sim.stub.faults.options import Ordered
 from palaestra_sim.stub.faults.schedule import Life, Schedule
+from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Fields, Handler
 from palaestra_sim.stub.simulator import Simulator
 
@@ -117,10 +119,11 @@ class _Listener:
         self.topics: set[str] = set()
 
     def enable_all(self, period_ms: int) -> None:
-        """Enable every sensor, since their topics are there only then."""
+        """Enable every sensor, since their topics are there only then; a device that refuses has none."""
         for path, handler in self.services.items():
             if path.endswith("/enable"):
-                handler(SimpleNamespace(value=period_ms))
+                with contextlib.suppress(ServiceFailed):
+                    handler(SimpleNamespace(value=period_ms))
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
         """Note a service."""
