@@ -110,7 +110,7 @@ class FakeMember:
         *,
         steps: Mapping[int, SimulatorFault] | Sequence[int] = (),
         resets: Sequence[int] = (),
-        starts: Sequence[int] = (),
+        starts: Mapping[int, SimulatorFault] | Sequence[int] = (),
         recycle_after: int | None = None,
         held: bool = False,
     ) -> None:

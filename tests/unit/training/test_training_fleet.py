@@ -12,7 +12,13 @@ import pytest
 import structlog
 
 from palaestra_trainer.configuration import parse
-from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
+from palaestra_trainer.errors import (
+    ConfigurationError,
+    FaultBudgetSpent,
+    SimulatorDead,
+    SimulatorHung,
+    WorldMisfit,
+)
 from palaestra_trainer.interruption import Interrupted, Interruption
 from palaestra_trainer.simulators.budget import Care
 from palaestra_trainer.simulators.fleet import Fleet, resting
@@ -71,6 +77,44 @@ def test_one_that_does_not_come_up_ends_the_start(make_fleet):
         fleet.start()
 
     assert members[0].log == ["start", *["restart"] * 10]
+
+
+def misfit_starts(*numbers):
+    """Starts at which the world lacks what is needed."""
+    return {number: WorldMisfit("collect-0", "the world has no node DEF TARGET") for number in numbers}
+
+
+def test_two_processes_in_a_row_that_lack_what_is_needed_are_a_wrong_configuration(make_fleet):
+    """Retrying cannot help: the world is the same each time."""
+    fleet, members = make_fleet(starts=misfit_starts(1, 2))
+
+    with pytest.raises(ConfigurationError, match="collect-0: collect-0: the world has no node DEF TARGET"):
+        fleet.start()
+
+    assert members[0].log == ["start", "restart"]
+
+
+@pytest.mark.parametrize(
+    "starts",
+    [misfit_starts(1), misfit_starts(1, 3) | {2: SimulatorDead("collect-0", "died")}],
+    ids=["one", "two with another fault between"],
+)
+def test_a_misfit_that_the_next_process_does_not_repeat_is_mended(make_fleet, starts):
+    """One process may answer before its world is whole."""
+    fleet, members = make_fleet(starts=starts)
+
+    fleet.start()
+
+    assert members[0].log == ["start", *["restart"] * len(starts)]
+
+
+def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_fleet):
+    """Its worlds were right."""
+    fleet, members = make_fleet(starts=misfit_starts(1, 2, 3))
+
+    fleet.start(stepped=True)
+
+    assert members[0].log == ["start", *["restart"] * 3]
 
 
 def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member, monkeypatch):

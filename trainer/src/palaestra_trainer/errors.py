@@ -13,6 +13,7 @@ TrainerError
     ├── SimulatorDead    its connections are refused or were closed
     ├── SimulatorHung    it is connected and does not answer in time
     └── WrongData        it answered, with something that cannot be right
+        └── WorldMisfit  its world lacks a device or node that the program needs
 """
 
 from __future__ import annotations
@@ -94,3 +95,11 @@ class WrongData(SimulatorFault, ValueError):
     """It answered with data that cannot be right."""
 
     kind = "wrong_data"
+
+
+class WorldMisfit(WrongData):
+    """Its world lacks a device or node that the program needs, by a complete list or a definite answer.
+
+    A fault like others where the world was right before. Where the second process in a row says so before a
+    run's first step, the configuration is wrong.
+    """

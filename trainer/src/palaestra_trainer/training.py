@@ -172,7 +172,7 @@ class Attempt:
         fleet = Fleet(configuration, members, progress)
         progress.figures.meters = fleet.meters()
         stack.callback(fleet.stop)
-        fleet.start(interruption.check)
+        fleet.start(interruption.check, stepped=found is not None)
         rest(fleet.evaluating)
         run = Run(
             configuration=configuration,

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.errors import NoReading
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, Pose, RobotinoAbc
-from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, TouchSensor, Webots, set_velocities
+from palaestra_trainer.webots import (
+    DistanceSensor,
+    Motor,
+    Simulation,
+    TouchSensor,
+    Webots,
+    require_node,
+    set_velocities,
+)
 
 PERIOD_MS = 192  # six basic steps of 32 ms
 
@@ -68,6 +76,7 @@ class Robotino(RobotinoAbc):
         To be called when it runs already as the robot is made, and after its world was loaded anew.
 
         Raises:
+            WorldMisfit: the world lacks the robot's node, or the robot a device of a Robotino.
             SimulatorDead, SimulatorHung, WrongData
         """
         self.close()  # what is left of connections to a simulator before this one
@@ -115,7 +124,7 @@ class Robotino(RobotinoAbc):
 
 
 class RobotinoScene:
-    """What is arranged around a simulated Robotino.
+    """What is arranged around a simulated Robotino. Each start of the simulator looks for the mark.
 
     Args:
         webots: the simulator.
@@ -128,6 +137,7 @@ class RobotinoScene:
         self._robot = robot
         self._target = target
         self.resets = 0
+        webots.at_start(f"mark {target}", lambda: require_node(webots.observer, target))
 
     def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
         """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings.

@@ -55,7 +55,7 @@ class Fleet:
         """Return what counts for each member, by its name."""
         return {keeper.name: keeper.meter for keeper in self._all}
 
-    def start(self, check: Check = go_on) -> None:
+    def start(self, check: Check = go_on, *, stepped: bool = False) -> None:
         """Start all members at once; return when all have been tried, and enough of each group are up.
 
         Those that are not up yet go on being mended in the background.
@@ -64,11 +64,15 @@ class Fleet:
             check: called every tenth of a second; what it raises, such as `Interrupted`, waits for
                 no member: a try that is under way may go on in its thread, and no other is begun.
 
+            stepped: whether the run has taken steps before, so that its worlds were right.
+
         Raises:
             FaultBudgetSpent: too many of a group do not come up, however often it is tried.
+            ConfigurationError: a world lacks what the environment needs; two processes of it said so.
         """
         check()
         for keeper in self._all:
+            keeper.stepped = stepped
             keeper.begin_start()
         began, report_at_s = time.monotonic(), LONG_S
         try:
@@ -87,6 +91,8 @@ class Fleet:
             for keeper in self._all:
                 keeper.abandon()
             raise
+        for keeper in self._all:
+            keeper.stepped = True  # from here on the others may step, whatever becomes of this one
 
     def stop(self) -> None:
         """Stop all members at once, however they are, also those that are being mended."""

@@ -20,7 +20,7 @@ from typing import Any
 import structlog
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
+from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
 from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
@@ -48,6 +48,7 @@ class Keeper:
         group: the simulators that the member is one of.
         tried: whether it has been tried to start the member.
         lost: whether the member was given up, since the others of its group are enough.
+        stepped: whether the run has taken a step, with the worlds that it has.
         meter: counts what is played.
     """
 
@@ -62,7 +63,8 @@ class Keeper:
         self.member = member
         self.watcher: Watcher = watcher or Nobody()
         self.group = group or Group()
-        self.tried = self.lost = False
+        self.tried = self.lost = self.stepped = False
+        self._misfit = False  # whether the last process had a world that lacks what is needed
         self._care = care or Care()
         self._budget = RestartBudget(member.name, self._care, clock)
         self._clock = clock
@@ -92,6 +94,7 @@ class Keeper:
 
         Raises:
             FaultBudgetSpent: it broke more often than its budget allows.
+            ConfigurationError: before any step, two of its processes lacked what the environment needs.
             MasterLost: it could not be mended without a ROS master.
             SimulatorFault: it could not be recycled; begin to mend it.
         """
@@ -193,6 +196,7 @@ class Keeper:
     def _may_restart(self, fault: SimulatorFault) -> bool:
         if self._abandoned:
             raise FaultBudgetSpent(f"{self.name}: was abandoned ({fault}); start the run again") from fault
+        self._judge_world(fault)
         try:
             self._budget.spend(fault)
         except FaultBudgetSpent as spent:
@@ -203,6 +207,12 @@ class Keeper:
         if self._budget.flapping:
             self.watcher.flapping(self.name)
         return True
+
+    def _judge_world(self, fault: SimulatorFault) -> None:
+        """Raise ConfigurationError if the second process in a row lacks what is needed, before any step."""
+        before, self._misfit = self._misfit, isinstance(fault, WorldMisfit) and not self.stepped
+        if before and self._misfit:
+            raise ConfigurationError(f"{self.name}: {fault}") from fault
 
     def _lose(self, spent: FaultBudgetSpent) -> None:
         log.error("simulator given up: the others go on", simulator=self.name, fact=str(spent))

@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 
 from palaestra_trainer.configuration import Recycle
-from palaestra_trainer.errors import SimulatorFault, WrongData
+from palaestra_trainer.errors import ConfigurationError, SimulatorFault
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.simulators.recycling import Wear
@@ -35,7 +35,7 @@ class Simulator:
 
     Raises:
         SimulatorDead, SimulatorHung: the sidecar cannot be asked for the robots' names.
-        WrongData: the world has no robot that is a supervisor.
+        ConfigurationError: the world has no robot that is a supervisor.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Simulator:
         state = sidecar.first_state(start_deadline_s)
         supervisor = next((robot for robot in state.robots if robot.supervisor), None)
         if supervisor is None:
-            raise WrongData(name, "the world has no robot with supervisor TRUE; give it one")
+            raise ConfigurationError(f"{name}: the world has no robot with supervisor TRUE; give it one")
         driven = next((robot for robot in state.robots if not robot.supervisor), supervisor)
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s

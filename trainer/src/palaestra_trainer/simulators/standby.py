@@ -18,7 +18,13 @@ from concurrent.futures import Future, wait
 import structlog
 
 from palaestra_sim.protocol.status import StandbyState
-from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.errors import (
+    FaultBudgetSpent,
+    SimulatorDead,
+    SimulatorFault,
+    SimulatorHung,
+    WorldMisfit,
+)
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, RestartBudget
 from palaestra_trainer.simulators.member import Environment
@@ -125,6 +131,7 @@ class Side:
         self.simulator = simulator
         self._budget = RestartBudget(simulator.name, care)
         self.wanted = True
+        self._was_up = False
         self._preparation: Future[None] | None = None
 
     @property
@@ -180,11 +187,13 @@ class Side:
             try:
                 self._come_up()
             except SimulatorFault as fault:
-                if not self.wanted:
+                never_up = not self._was_up and isinstance(fault, WorldMisfit)
+                if never_up or not self.wanted:
                     raise
                 log.warning("standby did not come up", simulator=self.simulator.name, fact=str(fault))
                 self._spend(fault)
             else:
+                self._was_up = True
                 return
 
     def _come_up(self) -> None:

@@ -14,6 +14,7 @@ from palaestra_trainer.webots.devices import (
 )
 from palaestra_trainer.webots.facade import Launcher, Webots
 from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.requirements import require_node
 from palaestra_trainer.webots.simulation import Simulation
 from palaestra_trainer.webots.supervisor import Supervisor
 
@@ -29,5 +30,6 @@ __all__ = [
     "Supervisor",
     "TouchSensor",
     "Webots",
+    "require_node",
     "set_velocities",
 ]

@@ -31,10 +31,12 @@ class Sensor:
         decode: reads the value out of a message's bytes.
 
     Attributes:
+        robot: see above.
+        device: see above.
         late: whether what arrives until the next step may belong to the one before.
     """
 
-    __slots__ = ("_enable", "_value", "_values", "device", "late")
+    __slots__ = ("_enable", "_value", "_values", "device", "late", "robot")
 
     def __init__(
         self,
@@ -43,6 +45,7 @@ class Sensor:
         type_name: str,
         decode: Callable[[bytes | memoryview], Any] | None = None,
     ) -> None:
+        self.robot = robot
         self.device = device
         path = f"/{robot}/{topic_name(device)}"
         self._enable = RosService(f"{path}/enable", "webots_ros/set_int")
@@ -145,15 +148,19 @@ class Motor:
         device: the motor's name in the world, e.g. wheel0_joint
 
     Attributes:
+        robot: see above.
+        device: see above.
         velocity: rad/s, as the simulator has confirmed it; None while it is not known what it made of it.
         velocity_service: sets it.
     """
 
-    __slots__ = ("_position", "_services", "velocity", "velocity_service")
+    __slots__ = ("_position", "_services", "device", "robot", "velocity", "velocity_service")
 
     def __init__(self, robot: str, device: str) -> None:
         services = Services(robot)
         name = topic_name(device)
+        self.robot = robot
+        self.device = device
         self._services = services
         self._position = services.get(f"{name}/set_position", "set_float")
         self.velocity: float | None = None

@@ -54,6 +54,10 @@ class Observer:
         """Return the names of the robot's devices."""
         return tuple(self._services.get("robot/get_device_list", "robot_get_device_list")(ask=1).list)
 
+    def number_of_devices(self) -> int:
+        """Return how many devices the robot has."""
+        return int(self._services.ask("robot/get_number_of_devices", "get_int"))
+
     def exists(self, name: str) -> bool:
         """Return whether the world has a node with DEF `name`."""
         return bool(self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name).node)

@@ -17,6 +17,7 @@ from palaestra_trainer.ros import RosService, call_together
 from palaestra_trainer.turns import let_others
 from palaestra_trainer.webots.devices import Motor, Sensor
 from palaestra_trainer.webots.observer import Observer
+from palaestra_trainer.webots.requirements import require_devices, require_node
 from palaestra_trainer.webots.supervisor import Supervisor
 
 # Two extra steps deliver whatever a lost wake-up withheld; a sensor that is silent after them is broken.
@@ -70,8 +71,10 @@ class Simulation:
         """Enable every sensor and release every motor, after the simulator has started.
 
         Raises:
+            WorldMisfit: the world lacks a device, or a node that is tracked.
             SimulatorDead, SimulatorHung, WrongData
         """
+        self._require_all()
         self._tracked = dict.fromkeys(self._tracked)
         for sensor in self._sensors:
             sensor.enable(self.period_ms)
@@ -115,6 +118,16 @@ class Simulation:
         parts: tuple[RosService | Sensor | Motor, ...] = (*self._steps, *self._sensors, *self._motors)
         for part in parts:
             part.close()
+
+    def _require_all(self) -> None:
+        wanted: dict[str, list[str]] = {}
+        parts: tuple[Sensor | Motor, ...] = (*self._sensors, *self._motors)
+        for part in parts:
+            wanted.setdefault(part.robot, []).append(part.device)
+        for robot, devices in wanted.items():
+            require_devices(robot, devices)
+        for name in self._tracked:
+            require_node(self._observer, name)
 
     def _advance_and_read(self) -> Sensor | None:
         for sensor in self._sensors:

@@ -1,0 +1,124 @@
+"""Worlds without what the environment needs: told before the first step, as a wrong configuration."""
+
+import threading
+from contextlib import nullcontext
+
+import gymnasium
+import pytest
+
+import palaestra_trainer.environments  # noqa: F401 - registers the environment
+from palaestra_sim.stub.ros import Loop, RosNode
+from palaestra_sim.world import builtin
+from palaestra_trainer.errors import ConfigurationError, WorldMisfit
+from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.simulators.keeper import Keeper, await_one
+from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.simulators.simulator import Simulator
+from palaestra_trainer.webots import Webots
+from palaestra_trainer.webots.requirements import require_devices
+
+DEADLINE_S = 60.0
+ARENA = builtin("arena")
+WITHOUT = {
+    "a sensor": (
+        ARENA.replace(b'"ir3"', b'"sonar"'),
+        "the robot has no device ir3; it has wheel0_joint, .*, ir2, sonar, ir4",
+    ),
+    "the robot's node": (ARENA.replace(b"DEF ROBOTINO", b"DEF ROBOT"), "the world has no node DEF ROBOTINO"),
+    "the mark": (ARENA.replace(b"DEF TARGET", b"DEF GOAL"), "the world has no node DEF TARGET"),
+}
+
+
+@pytest.fixture
+def world(tmp_path):
+    """`world(source)`: the path of a world file."""
+
+    def write(source):
+        path = tmp_path / "changed.wbt"
+        path.write_bytes(source)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(("source", "fact"), WITHOUT.values(), ids=WITHOUT.keys())
+def test_a_start_names_what_the_world_lacks(master, world, source, fact):
+    """Before the first step, by name."""
+    del master
+    assert source != ARENA
+    webots = Webots("robotino", world(source), start_deadline_s=DEADLINE_S)
+    robot = Robotino(webots)
+    RobotinoScene(webots, robot)
+    try:
+        with pytest.raises(WorldMisfit, match=fact):
+            webots.start()
+    finally:
+        robot.close()
+        webots.stop()
+        webots.close()
+
+
+def test_the_second_process_in_a_row_makes_a_wrong_configuration_of_it(master, world):
+    """The restart budget of ten is not spent on a world that stays as it is."""
+    del master
+    source, fact = WITHOUT["a sensor"]
+
+    def make(robot, scene):
+        return gymnasium.make("MoveToTargetEnv-v0", disable_env_checker=True, robot=robot, scene=scene)
+
+    launcher = ProcessLauncher(world(source))
+    simulator = Simulator("collect-0", launcher, make, DEADLINE_S)
+    keeper = Keeper(simulator)
+    pids = []
+    start = simulator.start
+
+    def start_and_count():
+        try:
+            start()
+        finally:
+            pids.append(launcher.state().pid)
+
+    simulator.start = start_and_count
+    try:
+        keeper.begin_start()
+        await_one([keeper])
+
+        with pytest.raises(ConfigurationError, match=f"collect-0: robotino: {fact}"):
+            keeper.up()
+
+        assert len(set(pids)) == 2
+    finally:
+        keeper.stop()
+        launcher.close()
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_only_a_complete_list_of_devices_is_a_proof(master, count):
+    """A simulator that is still starting is not judged."""
+    loop = Loop()
+    node = RosNode(loop, "half_started", master)
+    node.serve("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": ["ir2"]})
+    node.serve("robot/get_number_of_devices", "webots_ros/get_int", lambda _: {"value": count})
+    thread = threading.Thread(target=loop.run, daemon=True)
+    thread.start()
+    try:
+        with pytest.raises(WorldMisfit) if count == 1 else nullcontext():
+            require_devices("half_started", ["ir1"])
+    finally:
+        loop.post(node.close)
+        loop.post(loop.stop)
+        thread.join(DEADLINE_S)
+        loop.close()
+
+
+def test_a_world_without_a_supervisor_is_a_wrong_configuration(master, world):
+    """Every process of it would say the same."""
+    del master
+    launcher = ProcessLauncher(world(ARENA.replace(b"supervisor TRUE", b"supervisor FALSE")))
+    try:
+        with pytest.raises(
+            ConfigurationError, match="collect-0: the world has no robot with supervisor TRUE"
+        ):
+            Simulator("collect-0", launcher, lambda _robot, _scene: None, DEADLINE_S)
+    finally:
+        launcher.close()

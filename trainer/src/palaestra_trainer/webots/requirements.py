@@ -1,0 +1,49 @@
+"""What a program needs of a world, asked for before the first step.
+
+A world that lacks it would otherwise look like a broken simulator: a service that no node offers. Only a
+complete list and a definite answer count, so a simulator that is only starting is never misjudged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from palaestra_trainer.errors import WorldMisfit
+from palaestra_trainer.webots.devices import topic_name
+from palaestra_trainer.webots.observer import Observer
+
+
+def require_devices(robot: str, wanted: Iterable[str]) -> None:
+    """Return if the robot with the ROS name `robot` has every device in `wanted`.
+
+    Raises:
+        WorldMisfit: its list of devices is complete and lacks some.
+        SimulatorDead, SimulatorHung, WrongData: it cannot be asked.
+    """
+    observer = Observer(robot)
+    try:
+        listed, count = observer.devices(), observer.number_of_devices()
+    finally:
+        observer.close()
+    known = {topic_name(device) for device in listed}
+    missing = [device for device in dict.fromkeys(wanted) if topic_name(device) not in known]
+    if missing and len(listed) == count:
+        has = ", ".join(listed) or "none"
+        raise WorldMisfit(
+            robot,
+            f"the robot has no device {', '.join(missing)}; it has {has}."
+            " Use a world with the robot that the environment drives",
+        )
+
+
+def require_node(observer: Observer, name: str) -> None:
+    """Return if the world has a node with DEF `name`.
+
+    Raises:
+        WorldMisfit: it has none.
+        SimulatorDead, SimulatorHung, WrongData: it cannot be asked.
+    """
+    if not observer.exists(name):
+        raise WorldMisfit(
+            observer.node_name, f"the world has no node DEF {name}; name the node so in the world"
+        )
