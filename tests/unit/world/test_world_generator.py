@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from palaestra_sim.world import RunIdentity, WorldError, WorldRobot, generate, robots, ros_name
+from palaestra_sim.world import RunIdentity, WorldError, WorldRobot, generate, rename, robots, ros_name
 
 Make = Callable[[str], bytes]
 
@@ -411,3 +411,37 @@ def test_a_world_beside_its_files_may_name_them_by_relative_addresses(
 
     assert made == world(text.replace("NAME", ros_name(identity, "robotino")))
     assert "a second robot" in refusal(text + robot("") * 2, relative_addresses=True)
+
+
+def test_a_world_beside_another_has_a_suffix_behind_its_names_and_no_clock(world: Make) -> None:
+    """Only one simulator of a master may publish the time."""
+    source = world(robot('controllerArgs ["--name=arm" "--clock" "--synchronize"]'))
+
+    made = rename(source, "_2")
+
+    assert made == source.replace(b"arm", b"arm_2").replace(b' "--clock"', b"")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "",
+            'my.wbt:2:1: the robot "robotino" has no ROS name; add "--name=" with one to its controllerArgs',
+        ),
+        (
+            f'controllerArgs "--name={"a" * 62}"',
+            (
+                f"my.wbt:2:1: the ROS name {'a' * 62}_2 has more than 63 bytes;"
+                " shorten the one in controllerArgs"
+            ),
+        ),
+    ],
+    ids=["none", "too long"],
+)
+def test_a_name_that_cannot_have_a_suffix_is_refused(world: Make, arguments: str, message: str) -> None:
+    """The controller would cut it off."""
+    with pytest.raises(WorldError) as caught:
+        rename(world(robot(arguments)), "_2", name="my.wbt")
+
+    assert str(caught.value) == message

@@ -106,11 +106,14 @@ def log_to_stdout() -> None:
 
 
 def _world(given: argparse.Namespace, slot: str) -> Path:
-    """Return the world to run: the given one, or with --job its copy with its own ROS names."""
-    if given.job is None:
+    """Return the world to run: the given one, or with --job or --suffix its copy with other ROS names."""
+    if given.job is None and not given.suffix:
         return Path(given.world).absolute()
     if given.work is None:
-        raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
+        option = "--job" if given.job else "--suffix"
+        raise SidecarError(f"--work: is missing; with {option}, give the folder for the generated world")
+    if given.job is None:
+        return preparation.renamed(given.world, given.work.absolute(), given.suffix)
     identity = RunIdentity(
         job=given.job,
         namespace=given.namespace,

@@ -84,6 +84,9 @@ def _add_identity(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"
     )
+    group.add_argument(
+        "--suffix", default="", metavar="TEXT", help="without --job: goes behind the names in the world"
+    )
     group.add_argument("--standby", action="store_true", help="have a second simulator, which may stand by")
 
 

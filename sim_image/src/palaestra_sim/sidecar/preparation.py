@@ -6,12 +6,14 @@ the generator makes the same world of what it has made before.
 """
 
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.protocol.control import RobotName
 from palaestra_sim.sidecar.errors import SidecarError
-from palaestra_sim.world import RunIdentity, builtin_path, generate, robots
+from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots
 
 SLOTS = ("a", "b")  # of the simulators of one sidecar: the first, and one that may stand by for it
 _PROJECT = "project"
@@ -45,11 +47,26 @@ def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool) -> Pat
         WorldError: the world is wrong.
         SidecarError: it cannot be read or written; nothing is half-written.
     """
-    source, name = read(world), file_name(identity)
+    make = partial(generate, read(world), identity, clock=clock, name=str(world))
+    return _written(world, work, file_name(identity), make)
+
+
+def renamed(world: Path, work: Path, suffix: str) -> Path:
+    """Write a copy of `world` with `suffix` behind its ROS names into the folder `work`; return where it is.
+
+    Raises:
+        WorldError, SidecarError: as `named` does.
+    """
+    make = partial(rename, read(world), suffix, name=str(world))
+    return _written(world, work, f"{world.stem}{suffix}.wbt", make)
+
+
+def _written(world: Path, work: Path, name: str, make: Callable[..., bytes]) -> Path:
+    """Write what `make` makes of `world`, with the files around it if it names some."""
     try:
-        generated, folder = generate(source, identity, clock=clock, name=str(world)), None
+        generated, folder = make(), None
     except WorldError:
-        generated = generate(source, identity, clock=clock, name=str(world), relative_addresses=True)
+        generated = make(relative_addresses=True)
         folder = work / _PROJECT / (world.absolute().parent.name or "worlds")
     try:
         if folder is not None:

@@ -5,6 +5,7 @@ Pure: bytes in, bytes out. No clock, no network, no file but the worlds that shi
     parse(source)                              the tree of a world
     check(source)                              raises unless every simulator can have a world of it
     generate(source, identity, clock=False)    the world of one simulator
+    rename(source, "_2")                       the world of one more, beside those that run
     robots(source)                             the robots in it that speak ROS
     ros_name(identity, "robotino")             the name that such a robot gets
     builtin("arena")                           a world that ships
@@ -13,7 +14,7 @@ Pure: bytes in, bytes out. No clock, no network, no file but the worlds that shi
 from palaestra_sim.errors import UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path
 from palaestra_sim.world.checks import check
-from palaestra_sim.world.generate import generate
+from palaestra_sim.world.generate import generate, rename
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.reader import parse
 from palaestra_sim.world.robots import WorldRobot, robots
@@ -34,6 +35,7 @@ __all__ = [
     "generate",
     "name_prefix",
     "parse",
+    "rename",
     "robots",
     "ros_name",
 ]

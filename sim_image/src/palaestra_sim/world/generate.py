@@ -11,11 +11,14 @@ What changes is the `controllerArgs` of every robot whose controller is "ros", a
 All else stays as it is, byte for byte. A world made this way is made of itself again.
 """
 
+from collections.abc import Sequence
+
 from palaestra_sim.world.arguments import argument_edits, asks_for_clock
-from palaestra_sim.world.checks import candidate
+from palaestra_sim.world.checks import Candidate, candidate
 from palaestra_sim.world.edits import edited
-from palaestra_sim.world.names import RunIdentity, ros_name
-from palaestra_sim.world.robots import robot_name
+from palaestra_sim.world.names import MAX_NAME_BYTES, RunIdentity, ros_name
+from palaestra_sim.world.robots import described, robot_name
+from palaestra_sim.world.tree import Node
 
 
 def generate(
@@ -35,12 +38,40 @@ def generate(
         WorldError: as `check` does.
     """
     found = candidate(source, name, relative_addresses=relative_addresses)
+    names = [ros_name(identity, robot_name(robot)) for robot in found.robots]
+    return _named(found, names, clock=clock)
+
+
+def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresses: bool = False) -> bytes:
+    """Return the world with `suffix` behind each ROS name that it has, and without any `--clock`.
+
+    For a second simulator of a world that is beside another on one ROS master. `name` and
+    `relative_addresses` are as for `check`.
+
+    Raises:
+        WorldError: as `check` does; or a robot has no ROS name, or one that would become too long.
+    """
+    found = candidate(source, name, relative_addresses=relative_addresses)
+    return _named(found, [_longer(found, robot, suffix) for robot in found.robots], clock=False)
+
+
+def _longer(found: Candidate, robot: Node, suffix: str) -> str:
+    present = described(robot).ros_name
+    if not present:
+        fact = f'the robot "{robot_name(robot)}" has no ROS name'
+        raise found.source.error(robot.span[0], fact, 'add "--name=" with one to its controllerArgs')
+    if len((present + suffix).encode()) > MAX_NAME_BYTES:
+        fact = f"the ROS name {present}{suffix} has more than {MAX_NAME_BYTES} bytes"
+        raise found.source.error(robot.span[0], fact, "shorten the one in controllerArgs")
+    return present + suffix
+
+
+def _named(found: Candidate, names: Sequence[str], *, clock: bool) -> bytes:
+    """Return a world whose robots have `names`, one for each in source order."""
     timekeeper = next(filter(asks_for_clock, found.robots), None) if clock else None
     edits = [
         edit
-        for robot in found.robots
-        for edit in argument_edits(
-            found.world, robot, ros_name(identity, robot_name(robot)), clock=robot is timekeeper
-        )
+        for robot, new in zip(found.robots, names, strict=True)
+        for edit in argument_edits(found.world, robot, new, clock=robot is timekeeper)
     ]
     return edited(found.source, found.world.tokens, sorted(edits, key=lambda edit: edit.start))

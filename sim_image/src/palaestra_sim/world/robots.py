@@ -36,7 +36,7 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
     Raises:
         WorldError: the bytes are no world file.
     """
-    return tuple(_described(node) for node in ros_robots(parse(source, name)))
+    return tuple(described(node) for node in ros_robots(parse(source, name)))
 
 
 def ros_robots(world: World) -> tuple[Node, ...]:
@@ -54,7 +54,8 @@ def robot_name(node: Node) -> str:
     return node.text("name") or default
 
 
-def _described(node: Node) -> WorldRobot:
+def described(node: Node) -> WorldRobot:
+    """Return a robot's node as clients see it."""
     arguments = node.texts("controllerArgs")
     names = [argument.removeprefix(NAME) for argument in arguments if argument.startswith(NAME)]
     return WorldRobot(

@@ -39,10 +39,13 @@ class Robotino(RobotinoAbc):
     Args:
         webots: the simulator. Each of its starts connects this robot, the newest of its name; if it runs
             already, `connect` must be called.
-        node_name: the ROS name of the robot's controller; by default the robot is its own supervisor.
+        node_name: the ROS name that the world gives the robot; by default the robot is its own supervisor.
         definition: the DEF name of the robot in the world.
         period_ms: simulated milliseconds in one `advance`.
         robots: the ROS names of all robots in the world; they step together. By default robot and supervisor.
+
+    Attributes:
+        node_name: the ROS name of the robot's controller, as it runs; for sensors and motors of your own.
     """
 
     def __init__(
@@ -53,13 +56,15 @@ class Robotino(RobotinoAbc):
         period_ms: int = PERIOD_MS,
         robots: Iterable[str] = (),
     ) -> None:
-        name = node_name or webots.supervisor_node_name
+        name = webots.name_of(node_name) if node_name else webots.robot_name
+        self.node_name = name
         self.definition = definition
         self._observer = webots.observer
         self._wheels = tuple(Motor(name, f"wheel{number}_joint") for number in range(3))
         self._infrared = tuple(DistanceSensor(name, f"ir{number + 1}") for number in range(SENSORS))
         self._bumper = TouchSensor(name, "touch sensor")
-        together = dict.fromkeys((name, webots.supervisor_node_name, *robots))
+        others = map(webots.name_of, robots)
+        together = dict.fromkeys((name, webots.robot_name, *others))
         self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, period_ms)
         self.simulation.track(definition)
         self.simulation.add((*self._infrared, self._bumper), self._wheels)

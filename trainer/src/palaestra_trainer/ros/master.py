@@ -11,6 +11,7 @@ from palaestra_trainer.ros.calls import OK, Answer, call
 
 DEFAULT_URI = "http://localhost:11311"
 _TIMEOUT_S = 5.0
+_NODE_TIMEOUT_S = 1.0
 
 
 class Master:
@@ -65,6 +66,21 @@ class Master:
             return {str(node) for part in answer.value for _, nodes in part for node in nodes}
         except (ValueError, TypeError) as error:
             raise self._unreadable("names of nodes", answer) from error
+
+    def runs(self, node: str) -> bool:
+        """Return whether a node of that full name is running; a killed one leaves its name behind."""
+        answer = self._answer("lookupNode", node)
+        if answer.code != OK:
+            return False
+        try:
+            call(str(answer.value), _NODE_TIMEOUT_S, "getPid", self._caller)
+        except TimeoutError:
+            return True
+        except OSError:
+            return False
+        except UnreadableAnswer:
+            return True
+        return True
 
     def _call(self, method: str, *arguments: Any) -> Answer:
         answer = self._answer(method, *arguments)

@@ -8,15 +8,18 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.child import drain, end_child, first_line, start_child
 from palaestra_trainer.simulators.master import ensure_master
+from palaestra_trainer.simulators.reservations import Reservation
 from palaestra_trainer.simulators.sidecar import Sidecar
 
 _END_S = 20.0
+_MOST_BESIDE = 100
 _ADDRESSES = re.compile(r"control=(\S+)")
 
 
@@ -28,6 +31,7 @@ class ProcessLauncher(Sidecar):
         driver: stub or webots.
         options: command-line options for the simulator.
         names: the sidecar's options that give the robots ROS names of their own.
+        suffix: what stands behind the ROS names that the world has.
 
     Raises:
         ConfigurationError: the sidecar refused the world or the driver; its words are in the message.
@@ -39,8 +43,14 @@ class ProcessLauncher(Sidecar):
         driver: str = "stub",
         options: Sequence[str] = (),
         names: Sequence[str] = (),
+        suffix: str = "",
     ) -> None:
         ensure_master()
+        self.suffix = suffix
+        self._reservation = Reservation()
+        self._folder = tempfile.TemporaryDirectory(prefix="palaestra-world-")
+        if suffix:
+            names = (*names, f"--suffix={suffix}", f"--work={self._folder.name}")
         command = [
             *_program("palaestra-sidecar"),
             f"--driver={driver}",
@@ -56,13 +66,44 @@ class ProcessLauncher(Sidecar):
         found = _ADDRESSES.search(line)
         if found is None:
             _, said = self._process.communicate(timeout=_END_S)
+            self._folder.cleanup()
             raise ConfigurationError(said.decode(errors="replace").strip() or f"the sidecar said {line!r}")
         drain(self._process)
         super().__init__(f"http://{found[1]}", Path(world).stem)
 
+    @classmethod
+    def beside_others(cls, world: str | Path, driver: str, options: Sequence[str]) -> ProcessLauncher:
+        """Return a launcher whose ROS names are the world's, with `_2`, `_3`, ... where those are in use.
+
+        Raises:
+            ConfigurationError: as the class; or all names are in use.
+        """
+        for number in range(1, _MOST_BESIDE + 1):
+            launcher = cls(world, driver, options, suffix="" if number == 1 else f"_{number}")
+            try:
+                if launcher.reserve():
+                    return launcher
+            except BaseException:
+                launcher.close()
+                raise
+            launcher.close()
+        raise ConfigurationError(
+            f"{world}: {_MOST_BESIDE} simulators with its ROS names run already; close those that are unused"
+        )
+
+    def reserve(self) -> bool:
+        """Keep others from the ROS names of this simulator until `close`; False: one is in use.
+
+        Raises:
+            MasterLost: no ROS master answers.
+        """
+        return self._reservation.take(robot.ros_name for robot in self.state().robots)
+
     def close(self) -> None:
         """End the sidecar, and the simulator with it."""
         end_child(self._process)
+        self._reservation.release()
+        self._folder.cleanup()
 
 
 def _program(name: str) -> list[str]:

@@ -4,6 +4,7 @@ What is peculiar to that controller is handled here and nowhere else: the wake-u
 that blocks for ever while paused, what a reset restores and what not.
 """
 
+from palaestra_trainer.webots.attached import Attached
 from palaestra_trainer.webots.devices import (
     DistanceSensor,
     Motor,
@@ -19,6 +20,7 @@ from palaestra_trainer.webots.simulation import Simulation
 from palaestra_trainer.webots.supervisor import Supervisor
 
 __all__ = [
+    "Attached",
     "DistanceSensor",
     "Launcher",
     "Mode",

@@ -68,8 +68,11 @@ class Owned(Launcher, Protocol):
 class Webots:
     """One simulator, started, stopped and switched between fast and pause.
 
+    By default it is a simulator of its own: where the ROS names of the world are in use on the master, `_2`,
+    `_3`, ... stands behind them. One that runs already is used with `launcher=Attached()` only.
+
     Args:
-        supervisor_node_name: the ROS name of the world's supervisor.
+        supervisor_node_name: the ROS name that the world gives its supervisor.
         world_path: the world to load; or the name of a world that ships, e.g. "arena".
         launcher: what starts the process; by default a process on this machine.
         driver: of that process: "stub", the simulator that ships, or "webots".
@@ -91,11 +94,15 @@ class Webots:
         start_deadline_s: float = 60.0,
     ) -> None:
         self._own: Owned | None = None
+        self._suffix = ""
         if launcher is None:
             # The launcher talks to a sidecar, which this layer knows nothing of.
             from palaestra_trainer.simulators.process import ProcessLauncher  # noqa: PLC0415
 
-            launcher = self._own = ProcessLauncher(world_path, driver, options)
+            own = ProcessLauncher.beside_others(world_path, driver, options)
+            launcher = self._own = own
+            self._suffix = own.suffix
+        supervisor_node_name = self.name_of(supervisor_node_name)
         self.supervisor_node_name = supervisor_node_name
         self.world_path = world_path
         self.observer = Observer(supervisor_node_name)
@@ -107,6 +114,15 @@ class Webots:
         self._at_start: dict[str, Callable[[], None]] = {}
         self._entered = 0
         self._stopped = False
+
+    @property
+    def robot_name(self) -> str:
+        """The ROS name of the supervisor as it runs: the one that was given, perhaps with `_2` behind it."""
+        return self.supervisor_node_name
+
+    def name_of(self, robot: str) -> str:
+        """Return the ROS name, as it runs, of the robot that the world gives the ROS name `robot`."""
+        return f"{robot}{self._suffix}"
 
     def at_start(self, name: str, connect: Callable[[], None]) -> None:
         """Have `connect` called after each start from now on, in place of what `name` had called before."""

@@ -1,0 +1,144 @@
+"""Two simulators of one world on one master, as in a notebook: each facade drives its own."""
+
+import os
+import signal
+import subprocess
+import sys
+import uuid
+
+import pytest
+
+from palaestra_sim.world import builtin
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead
+from palaestra_trainer.robots import Movement, Pose
+from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.ros import Master
+from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.simulators.reservations import Reservation
+from palaestra_trainer.webots import Attached, Webots
+
+START = Pose(0.0, 0.0, 0.0)
+DEADLINE_S = 60.0
+
+
+@pytest.fixture
+def name():
+    """A ROS name that only this test uses, whoever shares its master."""
+    return f"twin_{uuid.uuid4().hex[:8]}"
+
+
+@pytest.fixture
+def world(master, tmp_path, name):
+    """The path of an arena in which the robot has that name."""
+    del master
+    path = tmp_path / "arena.wbt"
+    path.write_bytes(builtin("arena").replace(b"--name=robotino", f"--name={name}".encode()))
+    return path
+
+
+@pytest.fixture
+def make(world, name):
+    """`make()`: a facade of that world."""
+    made = []
+
+    def begin(**options):
+        made.append(Webots(name, world, start_deadline_s=DEADLINE_S, **options))
+        return made[-1]
+
+    yield begin
+    for webots in made:
+        webots.close()
+
+
+def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
+    """The second one gets the next free name, and says which."""
+    first, second = make(), make()
+    robots = [Robotino(webots) for webots in (first, second)]
+    scenes = [RobotinoScene(webots, robot) for webots, robot in zip((first, second), robots, strict=True)]
+
+    with first, second:
+        for scene in scenes:
+            scene.reset(1, START, (1.0, 1.5))
+        robots[0].move(Movement.FORWARD)
+        for _ in range(5):
+            robots[0].advance()
+            robots[1].advance()
+
+    assert (first.robot_name, second.robot_name) == (name, f"{name}_2")
+    assert [robot.node_name for robot in robots] == [name, f"{name}_2"]
+    assert robots[0].pose().x_m > 0.3
+    assert robots[1].pose().x_m == pytest.approx(0.0, abs=1e-6)
+
+    second.stop()
+
+    assert first.available()
+    first.stop()
+
+
+def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
+    """Names do not grow for ever."""
+    first = make()
+    first.close()
+
+    assert make().robot_name == name
+
+
+def test_the_name_of_a_simulator_that_was_killed_is_free(make, world, name):
+    """The master still lists it."""
+    launcher = ProcessLauncher(world)
+    make(launcher=launcher).start()
+    os.kill(launcher.state().pid, signal.SIGKILL)
+    launcher.close()
+
+    assert make().robot_name == name
+
+
+def test_a_name_that_another_program_has_reserved_is_not_taken(make, master, name):
+    """Two notebooks that start at the same time must not get one name."""
+    code = (
+        "from palaestra_trainer.simulators.reservations import Reservation\n"
+        "held = Reservation()\n"
+        f"print(held.take([{name!r}]), flush=True)\n"
+        "input()\n"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env={**os.environ, "ROS_MASTER_URI": master},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert other.stdout.readline() == "True\n"
+
+        assert make().robot_name == f"{name}_2"
+    finally:
+        other.communicate("\n", timeout=DEADLINE_S)
+    assert Reservation().take([name])
+
+
+def test_a_simulator_that_runs_is_used_with_an_attached_launcher_only(make):
+    """And it is never stopped through it."""
+    owner = make()
+    owner.start()
+    guest = make(launcher=Attached())
+
+    with guest:
+        assert guest.observer.time() == owner.observer.time()
+    with pytest.raises(ConfigurationError, match="only attached to; stop it where it was started"):
+        guest.stop()
+
+    assert owner.available()
+    owner.stop()
+
+
+def test_attaching_to_nothing_says_so_at_once(make):
+    """Nothing will come that could be waited for."""
+    with pytest.raises(SimulatorDead, match="no simulator answers under this name"):
+        make(launcher=Attached()).start()
+
+
+def test_a_node_that_does_not_run_is_known_as_such(master):
+    """By asking it, not by its registration."""
+    del master
+    assert not Master("/test").runs("/nobody")
