@@ -1,7 +1,7 @@
 """The hyperparameters that a run began with: it goes on with them, whatever the defaults are by then.
 
 They lie in the run directory, all of them. A run that began at a release without that file goes on with
-what that release gave every environment, which were the arena's.
+what that release gave every environment: the arena's, and MlpPolicy also for images.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorit
     Raises:
         ConfigurationError: what the run directory says cannot be read.
     """
-    kept = _kept(configuration, directory)
-    return kept or with_defaults(configuration.algorithm, ALGORITHMS[configuration.algorithm.name].arena)
+    algorithm = configuration.algorithm
+    before = {**ALGORITHMS[algorithm.name].arena, "policy": "MlpPolicy"}
+    return _kept(configuration, directory) or with_defaults(algorithm, before)
 
 
 def keep(algorithm: Algorithm, directory: RunDirectory) -> None:

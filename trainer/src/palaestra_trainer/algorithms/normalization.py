@@ -97,7 +97,7 @@ class ValidNormalize(VecNormalize):
         observations = np.asarray(self.venv.reset())
         self.old_obs = observations
         self.returns = np.zeros(self.num_envs)
-        self._see(observations[valid_rows(self.venv.reset_infos)])
+        self._see(observations[valid_rows(self.unwrapped.reset_infos)])
         return self._normalized(observations)
 
     def step_wait(self) -> VecEnvStepReturn:
@@ -106,7 +106,7 @@ class ValidNormalize(VecNormalize):
         observations, valid = np.asarray(rows), valid_rows(infos)
         self.old_obs, self.old_reward = observations, rewards
         # Where no episode could begin, what is shown is the end of the last one.
-        blind = dones & ~valid_rows(self.venv.reset_infos)
+        blind = dones & ~valid_rows(self.unwrapped.reset_infos)
         self._see(observations[valid & ~blind])
         self._earn(rewards, valid)
         self.returns = np.where(dones, 0.0, self.returns)

@@ -16,7 +16,7 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.policies import ActorCriticPolicy, BasePolicy
+from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticPolicy, BasePolicy
 from stable_baselines3.common.type_aliases import GymEnv, MaybeCallback, Schedule
 from stable_baselines3.common.utils import obs_as_tensor, safe_mean
 
@@ -36,7 +36,7 @@ class REINFORCE(BaseAlgorithm):
     episode counts as ended: its return is what was seen.
 
     Args:
-        policy: "MlpPolicy" or a class; an actor-critic one, whose value
+        policy: "MlpPolicy", "CnnPolicy" or a class; an actor-critic one, whose value
             network is trained only if it is the baseline.
         env: environment or VecEnv to learn in.
         learning_rate: of Adam, or a function of the remaining progress (1 to 0).
@@ -56,7 +56,10 @@ class REINFORCE(BaseAlgorithm):
     """
 
     policy: ActorCriticPolicy
-    policy_aliases: ClassVar[dict[str, type[BasePolicy]]] = {"MlpPolicy": ActorCriticPolicy}
+    policy_aliases: ClassVar[dict[str, type[BasePolicy]]] = {
+        "MlpPolicy": ActorCriticPolicy,
+        "CnnPolicy": ActorCriticCnnPolicy,
+    }
 
     def __init__(  # noqa: PLR0913, PLR0917 - one argument a hyperparameter, as in Stable-Baselines3
         self,

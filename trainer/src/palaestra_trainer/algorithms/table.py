@@ -23,6 +23,7 @@ from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_trainer.algorithms.device import usable
+from palaestra_trainer.algorithms.images import policy_for, with_channels_first
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
@@ -168,11 +169,13 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
 
     Where the algorithm is to normalize, the model's own environment does, see `normalization`.
+    Images get CnnPolicy, all else MlpPolicy, unless the hyperparameter `policy` says otherwise: a run has it
+    that began when every observation got MlpPolicy.
 
     Raises:
         ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
     """
-    entry = check(algorithm)
+    entry = ALGORITHMS[algorithm.name]
     if not isinstance(env.observation_space, spaces.Box):
         raise ConfigurationError(
             f"environment.id: its observation is a {type(env.observation_space).__name__}; "
@@ -184,10 +187,13 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         # A vector step is num_envs steps: the target can't be updated more often than that.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
     chosen["policy_kwargs"] = dict(chosen.get("policy_kwargs") or {})
+    policy = chosen.pop("policy", None) or policy_for(env.observation_space, algorithm.normalize)
     if algorithm.normalize:
+        if not algorithm.normalize.observations:
+            env = with_channels_first(env)
         env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
     try:
-        return entry.cls("MlpPolicy", env, seed=seed, device=usable(device), **chosen)
+        return entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
     except (AssertionError, TypeError, ValueError) as error:
         # Stable-Baselines3 checks values and spaces by assertions.
         raise ConfigurationError(

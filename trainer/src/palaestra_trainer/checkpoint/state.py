@@ -18,6 +18,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
+from palaestra_trainer.algorithms.images import as_returned, as_seen
 from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
 from palaestra_trainer.checkpoint.generators import Generators
 from palaestra_trainer.simulators.episode_state import EpisodeState
@@ -43,7 +44,7 @@ class State:
     Attributes:
         numbers: what the algorithm counts, by attribute.
         generators: where the random generators stand.
-        observation: the last one, a row for each member, not normalized.
+        observation: the last one, a row for each member, as the environments returned it.
         episode_starts: which rows of it are the first of an episode.
         episodes: statistics of the last episodes, as Stable-Baselines3 keeps them.
         successes: whether the last episodes succeeded.
@@ -78,7 +79,7 @@ class State:
         return cls(
             numbers={name: getattr(model, name) for name in _NUMBERS if hasattr(model, name)},
             generators=Generators.now(model.action_space, model.device),
-            observation=np.asarray(seen),
+            observation=as_returned(model, seen),
             episode_starts=np.asarray(model._last_episode_starts),  # noqa: SLF001 - as above
             episodes=tuple(model.ep_info_buffer or ()),
             successes=tuple(model.ep_success_buffer or ()),
@@ -111,13 +112,13 @@ class State:
 
     def _show_observation(self, model: BaseAlgorithm) -> None:
         """Let the last observation be the model's, as it sees it and as it is."""
-        seen: np.ndarray = self.observation
+        original = seen = as_seen(model, self.observation)
         if (normalizer := normalizer_of(model)) and self.running_returns is not None:
             if self.scales is not None:
                 normalizer.scales = self.scales
-            seen = normalizer.go_on(self.observation, self.running_returns)
+            seen = normalizer.go_on(original, self.running_returns)
         model._last_obs = seen  # noqa: SLF001 - see of()
-        model._last_original_obs = self.observation  # noqa: SLF001 - as above
+        model._last_original_obs = original  # noqa: SLF001 - as above
 
     def write(self, folder: Path) -> None:
         """Write it into a folder, but for what is part of the model."""

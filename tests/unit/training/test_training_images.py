@@ -1,0 +1,157 @@
+"""Runs whose observations are images."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import zipfile
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.torch_layers import FlattenExtractor, NatureCNN
+
+from palaestra_trainer import checkpoint, training
+from palaestra_trainer.algorithms import make_model
+from palaestra_trainer.configuration import Algorithm, Normalize
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import RunDirectory, read_lines
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+
+ROWS, COLUMNS = 36, 48
+OFF_POLICY = {"learning_starts": 10, "batch_size": 8, "buffer_size": 60, "target_update_interval": 10}
+HYPERPARAMETERS = {
+    "DQN": OFF_POLICY,
+    "PPO": {"n_steps": 16, "batch_size": 8, "n_epochs": 1},
+    "A2C": {},
+    "REINFORCE": {"episodes_per_update": 2},
+}
+NORMALIZE = {"observations": False}
+
+
+@pytest.fixture
+def make_seeing(make_member):
+    """Make a member of the corridor that sees its place as a picture with channels last."""
+
+    def make(name, shape=(ROWS, COLUMNS, 3)):
+        member = make_member(name)
+        corridor = member.env
+
+        class Gallery(type(corridor)):
+            observation_space = spaces.Box(0, 255, shape, np.uint8)
+
+            def _observe(self):
+                picture = np.zeros(shape, np.uint8)
+                picture[:, 20 + self._position] = 255
+                picture[self._digit] = 100
+                return picture
+
+        member.env = Gallery(member)
+        return member
+
+    return make
+
+
+@pytest.fixture
+def play(make_seeing, job, tmp_path):
+    """Train into a folder; a signal comes at each of the steps `signals`, counted over one attempt."""
+
+    def run(folder, name, collectors=1, signal_at=0, normalize=None):
+        algorithm = {"name": name, "hyperparameters": HYPERPARAMETERS[name]}
+        steps = iter(range(1, 10_000))
+
+        def make_members(given):
+            members = [make_seeing(entry.name) for entry in given.simulators]
+            take = members[0].take_step
+            members[0].take_step = lambda: (
+                take(),
+                next(steps) == signal_at and os.kill(os.getpid(), signal.SIGTERM),
+            )
+            return members
+
+        if normalize is not None:
+            algorithm["normalize"] = normalize
+        configuration = job(name, algorithm=algorithm, steps=90, collectors=collectors)
+        directory = RunDirectory(tmp_path / folder)
+        return training.run(configuration, directory, make_members), directory
+
+    return run
+
+
+def outcome(directory):
+    """Return all that a run came to: tensors, evaluations."""
+    path = checkpoint.newest(directory.checkpoints).path / "model.zip"
+    with zipfile.ZipFile(path) as archive:
+        tensors = torch.load(io.BytesIO(archive.read("policy.pth")), weights_only=True)
+    lines = [{**line, "seconds": 0} for line in read_lines(directory.evaluations)]
+    return {name: tensor.tolist() for name, tensor in tensors.items()}, lines
+
+
+@pytest.mark.parametrize(
+    ("name", "normalize"),
+    [*((name, None) for name in sorted(HYPERPARAMETERS)), ("DQN", NORMALIZE), ("PPO", NORMALIZE)],
+    ids=lambda it: "rewards-normalized" if it == NORMALIZE else it,
+)
+def test_a_run_on_images_that_is_interrupted_ends_as_one_that_was_not(play, name, normalize):
+    """To the last bit, with the layout of its pictures the same before and after."""
+    whole, reference = play("whole", name, collectors=2, normalize=normalize)
+    interrupted, directory = play("cut", name, collectors=2, signal_at=28, normalize=normalize)
+
+    resumed, _ = play("cut", name, collectors=2, normalize=normalize)
+
+    assert (whole, interrupted, resumed) == (0, 75, 0)
+    assert [line["reason"][:7] for line in read_lines(directory.attempts)] == ["new run", "resumed"]
+    assert outcome(directory) == outcome(reference)
+
+
+def test_a_checkpoint_keeps_images_as_the_environment_returned_them(play):
+    """What the environments return at a resume is compared with it."""
+    _, directory = play("run", "PPO")
+
+    with np.load(checkpoint.newest(directory.checkpoints).path / "state.npz") as arrays:
+        assert arrays["observation"].shape == (1, ROWS, COLUMNS, 3)
+
+
+@pytest.mark.parametrize("name", sorted(HYPERPARAMETERS))
+@pytest.mark.parametrize("shape", [(ROWS, COLUMNS, 3), (3, ROWS, COLUMNS)], ids=["last", "first"])
+def test_images_get_the_policy_for_images(make_seeing, name, shape):
+    """Flattened pixels would be learned from as well, and badly."""
+    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0", shape))], run_seed=1)
+    model = make_model(Algorithm(name=name, hyperparameters=HYPERPARAMETERS[name]), env, seed=1)
+
+    extractors = [part for part in model.policy.modules() if isinstance(part, NatureCNN | FlattenExtractor)]
+
+    assert {type(extractor) for extractor in extractors} == {NatureCNN}
+
+
+def test_a_run_on_images_that_began_at_a5276f3_keeps_its_policy(play):
+    """That release gave it MlpPolicy; its tensors fit no other."""
+    _, directory = play("run", "PPO", signal_at=28)
+    directory.hyperparameters.unlink()
+    for path in directory.checkpoints.iterdir():
+        for file in path.iterdir():
+            file.unlink()
+
+    code, _ = play("run", "PPO")
+
+    assert code == 0
+    names, _ = outcome(directory)
+    assert not any("cnn" in name for name in names)
+
+
+@pytest.mark.parametrize(
+    ("shape", "normalize", "fact"),
+    [
+        ((20, 48, 3), None, "its images have 20 x 48 pixels, and CnnPolicy needs 36 x 36"),
+        ((36, 48, 3), Normalize(), "algorithm.normalize.observations: CnnPolicy scales images itself"),
+    ],
+)
+def test_images_that_the_policy_cannot_take_are_refused(make_seeing, shape, normalize, fact):
+    """Before a simulator starts, and by name."""
+    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0", shape))], run_seed=1)
+
+    with pytest.raises(ConfigurationError, match=fact):
+        make_model(Algorithm(name="PPO", normalize=normalize), env, seed=1)
