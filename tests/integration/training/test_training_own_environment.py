@@ -75,3 +75,12 @@ def test_a_wrong_environment_ends_the_run_with_2(train, arguments, seen, fact):
     assert fact in log
     assert "ConfigurationWrong" in log
     assert "Traceback" not in log
+
+
+def test_nan_from_an_own_environment_names_it_and_ends_the_run_with_81(train):
+    """Four restarts of a simulator that is well would not mend it."""
+    code, log = train(seen="np.array([0.0, np.nan], np.float32)")
+
+    assert code == 81, log
+    assert "episode 0, reset: collect-0: environment Hall-v0: observation[1] is nan" in log
+    assert "simulator fault" not in log

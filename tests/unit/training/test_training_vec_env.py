@@ -291,8 +291,8 @@ def test_every_kind_of_fault_is_told_by_its_name_and_once(make_env, make_member)
     assert told == ["hung", None, "wrong_data", None, None]
 
 
-def test_an_observation_that_is_no_number_is_a_fault(make_env, make_member):
-    """Once in a network, NaN is everywhere."""
+def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
+    """The robot has checked its sensors: a restart of the simulator would not help."""
     member = make_member()
     member.env = Wrapper(member.env)
     env = make_env(member)
@@ -300,10 +300,31 @@ def test_an_observation_that_is_no_number_is_a_fault(make_env, make_member):
     step = member.env.env.step
     member.env.step = lambda action: (np.array([0.0, np.nan], np.float32), *step(action)[1:])
 
+    with pytest.raises(Diverged) as refusal:
+        walk(env, 1)
+
+    place = "episode 0, step 1: collect-0: environment Corridor: observation[1] is nan"
+    assert str(refusal.value) == f"{place}; mend the environment"
+
+
+def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):
+    """With the episode, so that it can be played again."""
+    member = make_member()
+    member.env._observe = lambda: {"wheels": np.array([[0.0], [math.inf]])}
+    env = make_env(member)
+
+    with pytest.raises(Diverged, match=r"episode 0, reset: .* observation wheels\[1, 0\] is inf"):
+        env.reset()
+
+
+def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_member):
+    """The robot raises it; a restart may help."""
+    env = make_env(make_member(steps={1: WrongData("ir1", "nan from ir1")}))
+    env.reset()
+
     _, _, _, infos = walk(env, 1)[0]
 
     assert infos[0]["sim_fault"]["kind"] == "wrong_data"
-    assert infos[0]["sim_fault"]["fact"] == "collect-0: observation[1] is nan"
 
 
 def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make_env, make_member):

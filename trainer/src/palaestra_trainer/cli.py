@@ -30,7 +30,7 @@ exit codes:
   2   the configuration is wrong; trying again cannot help
   75  interrupted by a signal, or the ROS master was lost, and saved; start it again to go on
   80  a simulator failed more often than its restart limit allows
-  81  diverged: a reward, a loss or a weight is NaN or infinite
+  81  diverged: a number of the environment, a loss or a weight is NaN or infinite
   82  stalled, or a simulator hung: no environment step for stallDeadlineSeconds
   1   anything else; trying again may help
 """

@@ -47,7 +47,7 @@ class FaultBudgetSpent(TrainerError, RuntimeError):
 
 
 class Diverged(TrainerError, ArithmeticError):
-    """A reward, a loss or a weight is NaN or infinite; retrying from here cannot help."""
+    """A number of the environment, a loss or a weight is NaN or infinite; retrying from here cannot help."""
 
 
 class NoSuchSensor(TrainerError, NotImplementedError):

@@ -399,8 +399,10 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.DIVERGED: Row(
         "the learner diverged (exit code 81): {words}",
-        "a reward, a loss or a weight is NaN or infinite; the message says which; it is not tried again",
-        "mend the reward or lower the learning rate, in a new TrainingJob; the last good checkpoint is kept",
+        "an observation or reward of the environment, a loss or a weight is NaN or infinite; "
+        "the message names it; it is not tried again",
+        "mend the environment or lower the learning rate, in a new TrainingJob; "
+        "the last good checkpoint is kept",
     ),
     Reason.NO_PROGRESS: Row(
         "{pods} pods in a row were taken or interrupted without one new step; "

@@ -148,7 +148,10 @@ class Collector:
     def _reset(self, options: dict[str, Any] | None) -> None:
         seed = self.next_seed()
         self.episode += 1
-        self._observation, self.reset_info = self.keeper.reset(seed, options, self._check)
+        try:
+            self._observation, self.reset_info = self.keeper.reset(seed, options, self._check)
+        except Diverged as error:
+            raise Diverged(f"episode {self.episode - 1}, reset: {error}") from error
         self._started = time.monotonic()
         self._actions = ActionLog()
 

@@ -135,10 +135,11 @@ class Keeper:
 
         Raises:
             SimulatorFault: it broke; begin to mend it.
+            Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
         observation, info = self.member.env.reset(seed=seed, options=options)
-        check_observation(self.name, observation)
+        check_observation(self.name, self.member.env, observation)
         self.meter.resets += 1
         return observation, info
 
@@ -146,8 +147,8 @@ class Keeper:
         """Return what the environment's step returns, all of it numbers that can be learnt from.
 
         Raises:
-            SimulatorFault: it broke, also by an observation that is not finite; begin to mend it.
-            Diverged: the reward is not finite.
+            SimulatorFault: it broke; begin to mend it.
+            Diverged: observation or reward is not finite.
         """
         began = time.perf_counter() - away_s()
         step: Step = self.member.env.step(action)
@@ -155,7 +156,7 @@ class Keeper:
         self.meter.steps.observe(seconds)
         if self._pace.slow(seconds):
             self.watcher.slow(self.name, seconds)
-        check_observation(self.name, step[0])
+        check_observation(self.name, self.member.env, step[0])
         check_reward(self.name, step[1], step[4])
         return step
 

@@ -8,20 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from palaestra_trainer.errors import Diverged, WrongData
+from palaestra_trainer.errors import Diverged
+from palaestra_trainer.simulators.member import Environment
 
 
-def check_observation(simulator: str, observation: Any) -> None:
+def check_observation(simulator: str, env: Environment, observation: Any) -> None:
     """Return if every number of an observation is finite; it may be a mapping of several.
 
+    The robot has checked its sensors before, so what is wrong here comes from the environment's own code.
+
     Raises:
-        WrongData: one is not, whose place the message names.
+        Diverged: one is not; the message names the environment and the number's place.
     """
-    if isinstance(observation, Mapping):
-        for name, part in observation.items():
-            _check_part(simulator, f"observation {name}", part)
-    else:
-        _check_part(simulator, "observation", observation)
+    parts = observation if isinstance(observation, Mapping) else {"": observation}
+    for name, part in parts.items():
+        if fact := _not_finite(part):
+            where = f"observation {name}".rstrip()
+            raise Diverged(f"{simulator}: {_name(env)}: {where}{fact}; mend the environment")
 
 
 def check_reward(simulator: str, reward: Any, info: Mapping[str, Any]) -> None:
@@ -38,9 +41,15 @@ def check_reward(simulator: str, reward: Any, info: Mapping[str, Any]) -> None:
     raise Diverged(f"{simulator}: the reward is {float(reward)}{where}; mend the environment's reward")
 
 
-def _check_part(simulator: str, name: str, part: Any) -> None:
+def _not_finite(part: Any) -> str:
+    """Return place and value of the first number that is not finite; "" if there is none."""
     numbers = np.asarray(part)
     if numbers.dtype.kind != "f" or np.isfinite(numbers).all():
-        return
+        return ""
     place = tuple(int(index) for index in np.argwhere(~np.isfinite(numbers))[0])
-    raise WrongData(simulator, f"{name}{list(place)} is {numbers[place]}")
+    return f"{list(place)} is {numbers[place]}"
+
+
+def _name(env: Environment) -> str:
+    inner = env.unwrapped
+    return f"environment {inner.spec.id if inner.spec else type(inner).__name__}"

@@ -100,7 +100,7 @@ class SimulatorsVecEnv(VecEnv):
 
         Raises:
             FaultBudgetSpent: a member broke more often than its budget allows.
-            Diverged: an environment's reward is not finite.
+            Diverged: an environment's observation or reward is not finite.
         """
         self._await_somebody()
         with self._watcher.spending(Cause.TRANSPORT):
