@@ -38,6 +38,29 @@ def test_a_signal_ends_a_run_with_a_checkpoint_and_75(play, job, directory, last
 
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
+def test_a_long_rollout_does_not_wait_for_its_end_once_a_signal_has_come(play, job, directory, name):
+    """It is dropped: at most one rollout is played again."""
+    long = {"DQN": {"train_freq": 3000, "buffer_size": 50}, "PPO": {"n_steps": 4000, "batch_size": 50}}
+    configuration = job(
+        name,
+        steps=4000,
+        algorithm={"name": name, "hyperparameters": long[name]},
+        evaluation={"everySteps": 0},
+    )
+    steps = []
+
+    def step():
+        steps.append(1)
+        if len(steps) == 42:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    code, _ = play(configuration, on_step=step)
+
+    assert (code, len(steps)) == (75, 42)
+    assert checkpoint.newest(directory.checkpoints).manifest.step == 0
+
+
+@pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_an_interrupted_run_goes_on_where_it_was(play, job, directory, name):
     """It ends at the same total, plays again what was under way, and counts what was before."""
     configuration = job(name)

@@ -16,7 +16,6 @@ from typing import Any
 
 import structlog
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
 from palaestra_sim.protocol.status import Cause
 from palaestra_trainer import algorithms, checkpoint, patience
@@ -165,10 +164,8 @@ class Conductor(BaseCallback):
         self._record_rewards(infos, self.locals["dones"])
         if self._run.display.due:
             self._run.display.show(self._run.progress.status())
-        if not isinstance(self.model, OffPolicyAlgorithm):
-            # An off-policy rollout is over in no time; any other may take longer than one is
-            # given to end, and is dropped.
-            self._run.interruption.check()
+        # A rollout may take longer than the run is given to end: it is dropped, and played again.
+        self._run.interruption.check()
         return True
 
     def _on_rollout_end(self) -> None:
