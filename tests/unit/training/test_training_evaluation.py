@@ -17,7 +17,7 @@ class Walker:
     def predict(self, observation, state=None, episode_start=None, *, deterministic=False):
         """Choose."""
         assert deterministic
-        assert episode_start is None
+        assert episode_start.shape == (1,)
         return int(round(float(observation[1]) * 10) % 2 == 0), state
 
 
@@ -149,3 +149,21 @@ def test_more_success_counts_before_more_return(make_member):
 
     assert good.score > bad.score
     assert good.summary()["success_rate"] == 1.0
+
+
+def test_a_recurrent_policy_keeps_its_state_over_an_episode_and_begins_the_next_without_it(make_member):
+    """An LSTM that forgets each step is another policy than the one that was trained."""
+    seen = []
+
+    class Counter:
+        """A policy whose state is the number of its steps."""
+
+        def predict(self, _observation, state=None, episode_start=None, *, deterministic=False):
+            """Walk right."""
+            assert deterministic
+            seen.append((state, episode_start.tolist()))
+            return 1, (state or 0) + 1
+
+    evaluate(Counter(), make_member(), [10, 21])
+
+    assert seen == [(None, [True]), (1, [False]), (2, [False])] * 2

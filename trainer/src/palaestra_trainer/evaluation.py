@@ -228,10 +228,11 @@ def _play(policy: Policy, keeper: Keeper, seed: int, check: Check, rewards: list
     """Play an episode to its end; whatever cuts it, `rewards` has that of each step that was taken."""
     observation, _ = keeper.reset(seed, check=check)
     info: dict[str, Any] = {}
+    memory: Any = None  # of a recurrent policy
     over = False
     while not over:
         check()
-        action, _ = policy.predict(observation, deterministic=True)
+        action, memory = policy.predict(observation, memory, np.array([not rewards]), deterministic=True)
         observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
         keeper.watcher.stepped(1)
         rewards.append(float(reward))
