@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 import stable_baselines3 as sb3
 from gymnasium import spaces
+from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.utils import explained_variance
 
 from palaestra_trainer.algorithms import ALGORITHMS, DQN, PPO, REINFORCE, check, make_model
+from palaestra_trainer.algorithms.rows import OnPolicyRows
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.keeper import Keeper
@@ -182,6 +186,49 @@ def test_a_rollout_without_a_valid_row_is_not_learned_from(make_env):
 
     assert model.num_timesteps == 10
     assert all(bool(it.isfinite().all()) for it in model.policy.parameters())
+
+
+@pytest.mark.parametrize("name", ["A2C", "PPO"])
+@pytest.mark.parametrize("faults", [range(2, 8), range(1, 8)], ids=["one row", "no row"])
+def test_an_update_of_fewer_than_two_valid_rows_is_no_divergence(make_env, name, faults):
+    """The deviation of one advantage is NaN; the fault was the simulator's."""
+    short = {"n_steps": 5, "normalize_advantage": True} | ({"batch_size": 5} if name == "PPO" else {})
+    model = model_of(name, make_env(faults=faults), **short)
+
+    model.learn(10)
+
+    assert all(bool(it.isfinite().all()) for it in model.policy.parameters())
+
+
+def test_explained_variance_is_that_of_valid_rows(make_env):
+    """An invalid row's return is its value, so it would count as explained."""
+    model = model_of("PPO", make_env(faults=(3, 7)))
+    model.set_logger(Logger(folder=None, output_formats=[]))
+    recorded = {}
+    model.logger.record = lambda name, value, **_: recorded.update({name: value})
+
+    model.learn(12)
+
+    rollout = model.rollout_buffer
+    valid = rollout.swap_and_flatten(rollout.valid).flatten()
+    values, returns = rollout.values.flatten()[valid], rollout.returns.flatten()[valid]
+    assert not valid.all()
+    assert recorded["train/explained_variance"] == explained_variance(values, returns)
+
+
+def test_an_algorithm_with_a_rollout_buffer_of_its_own_is_refused(make_env):
+    """As RecurrentPPO of sb3-contrib makes one: it would learn from rows that a fault spoiled."""
+
+    class MakesItsOwn(sb3.PPO):
+        def _setup_model(self):
+            super()._setup_model()
+            self.rollout_buffer = RolloutBuffer(8, self.observation_space, self.action_space, n_envs=1)
+
+    class RecurrentRows(OnPolicyRows, MakesItsOwn):
+        pass
+
+    with pytest.raises(TypeError, match="RecurrentRows: makes a RolloutBuffer, which learns from rows"):
+        RecurrentRows("MlpPolicy", make_env(), n_steps=8, batch_size=8)
 
 
 def test_dqn_with_nothing_but_faults_waits_for_a_row(make_env):

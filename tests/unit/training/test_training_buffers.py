@@ -91,6 +91,19 @@ def test_the_row_before_a_fault_ends_as_truncated():
     assert rows["timeouts"] == [1, 0, 0]
 
 
+def test_a_row_that_took_the_place_of_another_member_s_newest_is_not_truncated():
+    """The buffer is full, and the member that broke is away for longer than the buffer is long."""
+    buffer = replay(size=4)
+    add(buffer, [1.0, 2.0], [True, True])
+    for mark in (3.0, 4.0, 5.0):  # the last one takes the place of row 1.0
+        add(buffer, [0.0, mark], [False, True])
+
+    add(buffer, [0.0, 6.0], [False, True])
+
+    assert in_order(buffer)["rewards"] == [3.0, 4.0, 5.0, 6.0]
+    assert in_order(buffer)["timeouts"] == [0.0] * 4
+
+
 def test_a_fault_at_once_truncates_nothing():
     """There is no row before it."""
     buffer = replay()

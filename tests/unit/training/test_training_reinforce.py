@@ -153,6 +153,16 @@ def test_the_value_network_learns_only_as_baseline(make_model, baseline):
     assert torch.equal(before, model.policy.value_net.weight) is (baseline == "none")
 
 
+def test_without_a_baseline_nothing_is_subtracted_from_the_returns(make_model):
+    """The mean of an update's returns is a baseline too; they are only brought to one scale."""
+    model, _ = make_model(baseline="none")
+    returns = torch.tensor([1.0, 7.0, 5.0, 5.0])
+
+    advantages = model._advantages(returns, values=torch.full((4,), 3.0))
+
+    assert torch.allclose(advantages, returns / 5.0)
+
+
 def test_a_callback_can_end_training(make_model):
     """As with every other algorithm."""
     model, batches = make_model()

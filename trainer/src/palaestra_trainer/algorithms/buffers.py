@@ -90,6 +90,8 @@ class ValidReplayBuffer(ReplayBuffer):
         for row, info in enumerate(infos):
             if info.get("valid", True):
                 one = slice(row, row + 1)
+                # In a full buffer this row may have been another member's newest one.
+                self._newest = [None if newest == self.pos else newest for newest in self._newest]
                 self._newest[row] = self.pos
                 self.changed.add(self.pos // self.chunk_rows)
                 super().add(obs[one], next_obs[one], action[one], reward[one], done[one], [info])

@@ -43,7 +43,8 @@ class REINFORCE(BaseAlgorithm):
         episodes_per_update: whole episodes of each environment in one update.
         gamma: discount per step, 0 to 1.
         baseline: "value" subtracts a learned V(s), "none" nothing.
-        normalize_advantage: give G - b mean 0 and deviation 1 within an update.
+        normalize_advantage: give G - b mean 0 and deviation 1 within an update; without a baseline
+            no mean is subtracted, and G is divided by its root mean square.
         ent_coef: weight of the policy's entropy, against early certainty.
         vf_coef: weight of the baseline's squared error.
         max_grad_norm: longest gradient; longer ones are scaled down.
@@ -209,10 +210,7 @@ class REINFORCE(BaseAlgorithm):
         returns = torch.as_tensor(batch.returns, device=self.device)
         values, log_prob, entropy = self.policy.evaluate_actions(observations, actions)
         values = values.flatten()
-        advantages = returns - values.detach() if self.baseline == "value" else returns
-        if self.normalize_advantage and len(advantages) > 1:
-            advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
-        policy_loss = -(advantages * log_prob).mean()
+        policy_loss = -(self._advantages(returns, values.detach()) * log_prob).mean()
         entropy_loss = log_prob.mean() if entropy is None else -entropy.mean()
         self.logger.record("train/policy_gradient_loss", policy_loss.item())
         self.logger.record("train/entropy_loss", entropy_loss.item())
@@ -222,6 +220,15 @@ class REINFORCE(BaseAlgorithm):
             self.logger.record("train/value_loss", value_loss.item())
             loss = loss + self.vf_coef * value_loss
         return loss
+
+    def _advantages(self, returns: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
+        """Return G - b of each step, on one scale if that is wanted."""
+        if self.baseline == "none":
+            return returns / (returns.square().mean().sqrt() + 1e-8) if self.normalize_advantage else returns
+        advantages = returns - values
+        if self.normalize_advantage and len(advantages) > 1:
+            advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
+        return advantages
 
     def _act(self) -> np.ndarray:
         with torch.no_grad():

@@ -17,6 +17,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.type_aliases import RolloutReturn, TrainFreq, TrainFrequencyUnit
+from stable_baselines3.common.utils import explained_variance
 
 from palaestra_trainer.algorithms.buffers import ValidReplayBuffer, ValidRolloutBuffer, valid_rows
 
@@ -58,21 +59,41 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
 
 
 class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
-    """An on-policy algorithm whose rollouts mask invalid rows."""
+    """An on-policy algorithm whose rollouts mask invalid rows.
+
+    Raises:
+        TypeError: it makes a rollout buffer of its own, so nothing would be masked.
+    """
+
+    def _masked(self) -> ValidRolloutBuffer:
+        if not isinstance(self.rollout_buffer, ValidRolloutBuffer):
+            raise TypeError(
+                f"{type(self).__name__}: makes a {type(self.rollout_buffer).__name__}, which learns from "
+                "rows that a fault spoiled; use an algorithm that takes rollout_buffer_class"
+            )
+        return self.rollout_buffer
 
     def _setup_model(self) -> None:
         self.rollout_buffer_class = ValidRolloutBuffer
         super()._setup_model()
+        self._masked()  # raises at once, not at the first fault
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
         super()._update_info_buffer(infos, dones)
-        if isinstance(self.rollout_buffer, ValidRolloutBuffer):
-            self.rollout_buffer.mark(valid_rows(infos))
+        self._masked().mark(valid_rows(infos))
 
     def train(self) -> None:
-        """Learn from the rollout, unless none of its rows is valid."""
-        if not isinstance(self.rollout_buffer, ValidRolloutBuffer) or self.rollout_buffer.valid.any():
-            super().train()
+        """Learn from the rollout, unless too few of its rows are valid.
+
+        The deviation of a single advantage is NaN.
+        """
+        rollout = self._masked()
+        if rollout.valid.sum() < (2 if getattr(self, "normalize_advantage", False) else 1):
+            return
+        super().train()
+        valid = rollout.swap_and_flatten(rollout.valid).flatten()
+        explained = explained_variance(rollout.values.flatten()[valid], rollout.returns.flatten()[valid])
+        self.logger.record("train/explained_variance", explained)
 
 
 class DQN(OffPolicyRows, sb3.DQN):
