@@ -10,6 +10,7 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import explained_variance
+from torch import nn, optim
 
 from palaestra_trainer.algorithms import ALGORITHMS, DQN, PPO, REINFORCE, check, make_model
 from palaestra_trainer.algorithms.rows import OnPolicyRows
@@ -110,6 +111,51 @@ def test_returns_over_several_steps_are_refused_where_rows_are_mixed():
     """The next row in the buffer may be another simulator's."""
     with pytest.raises(ConfigurationError, match="n_steps"):
         check(Algorithm(name="DQN", hyperparameters={"n_steps": 3}))
+
+
+WRONG = [
+    ("A2C", {"ent_coef": "lin_0.01"}, "ent_coef: 'lin_0.01' is refused; give a number"),
+    ("DQN", {"gamma": "0.9"}, "gamma: '0.9' is refused; give a number"),
+    ("DQN", {"batch_size": 32.5}, "batch_size: 32.5 is refused; give a whole number"),
+    ("PPO", {"use_sde": 1}, "use_sde: 1 is refused; give true or false"),
+    ("PPO", {"clip_range_vf": "small"}, "'small' is refused; give null or a number or a schedule such as"),
+    ("DQN", {"train_freq": ["a", 1]}, "give a whole number or a list of a whole number and text"),
+    ("PPO", {"policy_kwargs": [64]}, "policy_kwargs: [64] is refused; give a mapping or null"),
+    ("PPO", {"policy_kwargs": {"net_arc": [8]}}, "has no such argument; did you mean net_arch?"),
+    ("PPO", {"policy_kwargs": {"net_arch": "big"}}, "net_arch: 'big' is refused; give a list or a mapping"),
+    ("PPO", {"policy_kwargs": {"activation_fn": "Tahn"}}, "'Tahn' is not known; did you mean Tanh?"),
+    ("PPO", {"policy_kwargs": {"optimizer_class": 3}}, "3 is not known; use one of Adam"),
+    ("PPO", {"policy_kwargs": {"features_extractor_class": "Own"}}, "a job cannot name this class"),
+]
+
+
+@pytest.mark.parametrize(("name", "hyperparameters", "line"), WRONG, ids=lambda it: str(it)[:40])
+def test_a_value_of_a_wrong_type_is_refused_by_the_signature(name, hyperparameters, line):
+    """A simulator that is started for it is started for nothing, and again at each of four attempts."""
+    with pytest.raises(ConfigurationError) as refusal:
+        check(Algorithm(name=name, hyperparameters=hyperparameters))
+
+    assert line in str(refusal.value)
+
+
+def test_what_yaml_cannot_say_has_words(make_env):
+    """A schedule, a tuple, and classes of PyTorch by their names."""
+    policy = {"net_arch": [8], "activation_fn": "elu", "optimizer_class": "AdamW"}
+    words = {"learning_rate": "lin_0.25", "train_freq": [1, "episode"], "policy_kwargs": policy}
+    check(Algorithm(name="DQN", hyperparameters=words))
+
+    model = model_of("DQN", make_env(), **words)
+
+    assert (model.lr_schedule(1.0), model.lr_schedule(0.0)) == (0.25, 0.0)
+    assert model.train_freq.frequency == 1
+    assert any(isinstance(part, nn.ELU) for part in model.policy.modules())
+    assert isinstance(model.policy.optimizer, optim.AdamW)
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_defaults_have_the_types_of_the_signature(name):
+    """A whole number stands for a number with a fraction, as everywhere in YAML."""
+    check(Algorithm(name=name, hyperparameters=ALGORITHMS[name].defaults))
 
 
 @pytest.mark.parametrize(

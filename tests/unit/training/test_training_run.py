@@ -154,6 +154,23 @@ def test_members_that_are_missing_are_told(job, directory, last_word):
     assert "collect-0, evaluate-0" in last_word().reason
 
 
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        {"name": "A2C", "hyperparameters": {"ent_coef": "lin_0.01"}},
+        {"name": "PPO", "hyperparameters": {"batch_size": 1}},
+        {"name": "SAC"},
+    ],
+    ids=["type", "value", "space"],
+)
+def test_an_algorithm_that_does_not_fit_is_refused_before_a_simulator_starts(play, job, algorithm):
+    """By its signature, or by its own checks."""
+    code, members = play(job(algorithm=algorithm))
+
+    assert code == 2
+    assert [member for member in members.values() if "start" in member.log] == []
+
+
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, directory, last_word, name):
     """NaN would come back with every attempt."""

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import structlog
 import torch
@@ -104,6 +105,13 @@ def run(
     return int(end.code)
 
 
+class Learning(NamedTuple):
+    """A model, and the environment that it learns in."""
+
+    env: SimulatorsVecEnv
+    model: BaseAlgorithm
+
+
 class Attempt:
     """One attempt, which plays once."""
 
@@ -125,8 +133,7 @@ class Attempt:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
             with ExitStack() as stack:
-                run, found = self._prepare(stack)
-                self._train(run, found, stack)
+                self._train(*self._prepare(stack))
         except Exception as error:  # the process's edge: every end has an exit code
             end = end_of(error)
             if end.reason == "Unexpected":
@@ -147,11 +154,11 @@ class Attempt:
             faults=self._progress.faults(),
         )
 
-    def _prepare(self, stack: ExitStack) -> tuple[Run, Checkpoint | None]:
-        """Return a run whose simulators are up, and the checkpoint that it goes on from.
+    def _prepare(self, stack: ExitStack) -> tuple[Run, Learning, Checkpoint | None]:
+        """Return a run whose simulators are up, what learns in them, and the checkpoint that it goes on from.
 
-        The attempt is on record before its simulators start: one that they end is an attempt too.
-        What was opened is closed by `stack`.
+        The model is made before simulators start, since it refuses wrong values and spaces. The attempt is
+        on record before them too: one that they end is an attempt. What was opened is closed by `stack`.
         """
         configuration, progress = self._configuration, self._progress
         algorithms.check(configuration.algorithm)
@@ -172,6 +179,7 @@ class Attempt:
         fleet = Fleet(configuration, members, progress)
         progress.figures.meters = fleet.meters()
         stack.callback(fleet.stop)
+        learning = self._make_model(fleet, interruption, stack)
         fleet.start(interruption.check, stepped=found is not None)
         rest(fleet.evaluating)
         run = Run(
@@ -182,7 +190,15 @@ class Attempt:
             interruption=interruption,
             display=self._around.display,
         )
-        return run, found
+        return run, learning, found
+
+    def _make_model(self, fleet: Fleet, interruption: Interruption, stack: ExitStack) -> Learning:
+        """Return a new model in its environment, which no simulator has to be up for."""
+        use_threads(self._around.environment)
+        wanted = self._configuration
+        env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check)
+        stack.callback(env.close)
+        return Learning(env, algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device))
 
     def _take_over(self, found: Checkpoint | None) -> None:
         """Let the progress go on from that of the attempts before."""
@@ -214,12 +230,8 @@ class Attempt:
             raise ConfigurationError(f"resumeFrom: {another} has no checkpoint; name the run of another job")
         return found
 
-    def _train(self, run: Run, found: Checkpoint | None, stack: ExitStack) -> None:
-        use_threads(self._around.environment)
-        env = SimulatorsVecEnv(run.fleet.collecting, self._configuration.seed, check=run.interruption.check)
-        stack.callback(env.close)
-        wanted = self._configuration
-        model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
+    def _train(self, run: Run, learning: Learning, found: Checkpoint | None) -> None:
+        env, model = learning
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
         logger = configure(str(self._directory.tensorboard), ["tensorboard"])

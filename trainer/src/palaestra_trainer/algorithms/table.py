@@ -3,15 +3,13 @@
 The defaults are those of the class, so Stable-Baselines3's. Only the arena's
 environments have some of their own, which were found by trying. Whatever a
 TrainingJob sets takes their place, one by one. Hyperparameters are keyword
-arguments of the class and are checked against its signature, so a mistyped
-one is found before a simulator is started. Where Stable-Baselines3 takes a
-schedule, "lin_0.001" is one from 0.001 at the start to 0 at the end.
+arguments of the class and are checked against its signature, names and values,
+so a mistake is found before a simulator is started.
 """
 
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -19,9 +17,9 @@ from typing import Any
 
 from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
+from palaestra_trainer.algorithms import values
 from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.images import policy_for, with_channels_first
 from palaestra_trainer.algorithms.normalization import ValidNormalize
@@ -42,7 +40,6 @@ OURS = frozenset(
 
 
 ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
-LINEAR = re.compile(r"lin_(\d+(?:\.\d*)?(?:e-?\d+)?)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,10 +117,10 @@ ALGORITHMS: Mapping[str, Entry] = MappingProxyType(
 
 
 def check(algorithm: Algorithm) -> Entry:
-    """Return the entry of the algorithm if its name and all its hyperparameters are known.
+    """Return the entry of the algorithm if its name and all its hyperparameters are right.
 
     Raises:
-        ConfigurationError: one line for each unknown name, with the nearest known one.
+        ConfigurationError: one line for each unknown name, with the nearest known one, and each wrong value.
     """
     entry = ALGORITHMS.get(algorithm.name)
     if entry is None:
@@ -132,13 +129,14 @@ def check(algorithm: Algorithm) -> Entry:
             f"{nearest(algorithm.name, dict(ALGORITHMS))}"
         )
     known = list(entry.defaults)
+    given = algorithm.hyperparameters
     lines = [
-        f"algorithm.hyperparameters.{name}: {algorithm.name} has no such hyperparameter; "
-        f"{nearest(name, known)}"
-        for name in algorithm.hyperparameters
+        f"{values.FIELD}.{name}: {algorithm.name} has no such hyperparameter; {nearest(name, known)}"
+        for name in given
         if name not in known
     ]
-    if algorithm.hyperparameters.get("n_steps", 1) != 1 and "train_freq" in known:
+    lines += values.mistakes(entry.cls, {name: value for name, value in given.items() if name in known})
+    if given.get("n_steps", 1) != 1 and "train_freq" in known:
         lines.append(
             "algorithm.hyperparameters.n_steps: rows of several simulators lie in one buffer, "
             "so only 1 works; leave it out"
@@ -182,12 +180,11 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
             "give it one Box, e.g. by gymnasium's FlattenObservation"
         )
     given = with_defaults(algorithm, {}).hyperparameters
-    chosen = {name: _as_python(value) for name, value in given.items()}
+    policy = given.pop("policy", None) or policy_for(env.observation_space, algorithm.normalize)
+    chosen = values.arguments(entry.cls, given)
     if "target_update_interval" in chosen:
         # A vector step is num_envs steps: the target can't be updated more often than that.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
-    chosen["policy_kwargs"] = dict(chosen.get("policy_kwargs") or {})
-    policy = chosen.pop("policy", None) or policy_for(env.observation_space, algorithm.normalize)
     if algorithm.normalize:
         if not algorithm.normalize.observations:
             env = with_channels_first(env)
@@ -200,12 +197,3 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
             f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
             f"({error}); change them, or use another algorithm"
         ) from error
-
-
-def _as_python(value: Any) -> Any:
-    """Return what YAML cannot say: a list as a tuple, "lin_0.001" as a schedule."""
-    if isinstance(value, list):
-        return tuple(value)
-    if isinstance(value, str) and (number := LINEAR.fullmatch(value)):
-        return LinearSchedule(float(number[1]), 0.0, 1.0)
-    return value
