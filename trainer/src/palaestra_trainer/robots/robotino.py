@@ -135,10 +135,16 @@ class RobotinoScene:
         webots: the simulator.
         robot: the robot that is placed.
         target: the DEF name of the mark on the floor.
+
+    Attributes:
+        supervisor: changes what else there is in the world, such as fields of nodes.
+        observer: answers what the world is like.
+        resets: since the simulator was last started.
     """
 
     def __init__(self, webots: Webots, robot: Robotino, target: str = "TARGET") -> None:
-        self._supervisor = webots.supervisor
+        self.supervisor = webots.supervisor
+        self.observer = webots.observer
         self._robot = robot
         self._target = target
         self.resets = 0
@@ -156,9 +162,9 @@ class RobotinoScene:
         """
         self.resets += 1
         self._robot.simulation.reset(seed)
-        self._supervisor.place(self._robot.definition, start.x_m, start.y_m, start.heading_rad)
-        self._supervisor.place(self._target, *target)
-        self._supervisor.stop_inertia(self._robot.definition)
+        self.supervisor.place(self._robot.definition, start.x_m, start.y_m, start.heading_rad)
+        self.supervisor.place(self._target, *target)
+        self.supervisor.stop_inertia(self._robot.definition)
         self._robot.advance()
 
 

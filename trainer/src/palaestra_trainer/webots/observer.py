@@ -33,6 +33,7 @@ class Observer:
         self._services = Services(node_name)
         self._nodes: dict[str, int] = {}
         self._fields: dict[tuple[str, str], int] = {}
+        self._types: dict[tuple[str, str], int] = {}
 
     def time(self) -> float:
         """Return the simulated time in seconds."""
@@ -117,10 +118,18 @@ class Observer:
             self._fields[name, field] = self._known(answer.field, f"{name} has no field {field}")
         return self._fields[name, field]
 
+    def field_type(self, name: str, field: str) -> int:
+        """Return the number of the type of a field of the node with DEF `name`."""
+        if (name, field) not in self._types:
+            service = self._services.get("supervisor/field/get_type", "field_get_type")
+            self._types[name, field] = int(service(field=self.field(name, field)).type)
+        return self._types[name, field]
+
     def forget_handles(self) -> None:
         """Drop all handles, which dangle after the world or the simulator was loaded anew."""
         self._nodes.clear()
         self._fields.clear()
+        self._types.clear()
 
     def close(self) -> None:
         """Drop handles and connections."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import math
 
 from palaestra_trainer.errors import SimulatorDead, WrongData
 from palaestra_trainer.ros import call_together
+from palaestra_trainer.webots.fields import Value, encoded, kind_of, turn_about_z
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.services import Services
 
-# An exact identity quaternion has no axis, so Webots would keep the old rotation and still report success.
-_SMALLEST_TURN = 1e-6
+Vector = tuple[float, float, float]
 
 
 class Supervisor:
@@ -86,7 +85,7 @@ class Supervisor:
                     self._services.get("supervisor/field/set_rotation", "field_set_rotation"),
                     {
                         "field": self._observer.field(name, "rotation"),
-                        "value": _turn_about_z(heading_rad),
+                        "value": turn_about_z(heading_rad),
                     },
                 )
             )
@@ -97,14 +96,51 @@ class Supervisor:
         service = self._services.get("supervisor/node/reset_physics", "node_reset_functions")
         service(node=self._observer.node(name))
 
+    def get_field(self, name: str, field: str, index: int = 0) -> Value:
+        """Return the value of a field of the node with DEF `name`, as the type that the field has.
+
+        A bool, int, float or str; x, y (, z) or red, green, blue; a rotation as x, y, z of its axis and the
+        angle in radians. `index` chooses one of a field of several values.
+
+        Raises:
+            ConfigurationError: the field holds nodes.
+            WrongData: also when there is no such node, field or index.
+        """
+        where = f"{name}.{field}"
+        kind = kind_of(self._observer.field_type(name, field), where)
+        service = self._services.get(f"supervisor/field/get_{kind.name}", f"field_get_{kind.name}")
+        return kind.from_wire(service(field=self._observer.field(name, field), index=index).value)
+
+    def set_field(self, name: str, field: str, value: Value, index: int = 0) -> None:
+        """Write a field of the node with DEF `name`; `value` is what `get_field` returns.
+
+        Raises:
+            ConfigurationError: the field holds nodes, or values of another type.
+            WrongData: also when there is no such node or field, or the simulator refuses the write.
+        """
+        where = f"{name}.{field}"
+        kind = kind_of(self._observer.field_type(name, field), where)
+        wire = encoded(kind, where, value)
+        service = self._services.get(f"supervisor/field/set_{kind.name}", f"field_set_{kind.name}")
+        service(field=self._observer.field(name, field), index=index, value=wire)
+
+    def velocity(self, name: str) -> tuple[Vector, Vector]:
+        """Return the linear (m/s) and angular (rad/s) velocity of the node with DEF `name`, in world axes."""
+        service = self._services.get("supervisor/node/get_velocity", "node_get_velocity")
+        twist = service(node=self._observer.node(name)).velocity
+        linear, angular = twist.linear, twist.angular
+        return (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z)
+
+    def set_velocity(self, name: str, linear: Vector, angular: Vector = (0.0, 0.0, 0.0)) -> None:
+        """Give the node with DEF `name` a linear (m/s) and an angular (rad/s) velocity, in world axes."""
+        service = self._services.get("supervisor/node/set_velocity", "node_set_velocity")
+        wanted = {
+            "linear": dict(zip("xyz", linear, strict=True)),
+            "angular": dict(zip("xyz", angular, strict=True)),
+        }
+        service(node=self._observer.node(name), velocity=wanted)
+
     def close(self) -> None:
         """Drop the connections, and what was confirmed over them."""
         self.paused = False
         self._services.close()
-
-
-def _turn_about_z(heading_rad: float) -> dict[str, float]:
-    z = math.sin(heading_rad / 2.0)
-    if abs(z) < _SMALLEST_TURN:
-        return {"x": 0.0, "y": 0.0, "z": _SMALLEST_TURN, "w": 1.0}
-    return {"x": 0.0, "y": 0.0, "z": z, "w": math.cos(heading_rad / 2.0)}

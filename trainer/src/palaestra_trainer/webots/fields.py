@@ -1,0 +1,128 @@
+"""Values of fields as Python has them, and how each travels over its service.
+
+A rotation is axis and angle here, as in a world file; its service wants a quaternion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from palaestra_trainer.errors import ConfigurationError
+
+Value = bool | int | float | str | tuple[float, ...]
+
+_MULTIPLE: Final = 0x10  # added to the type of a field that may have several values
+# An exact identity quaternion has no axis: Webots would keep the old rotation and still report success.
+_SMALLEST_TURN: Final = 1e-6
+
+
+class Kind(NamedTuple):
+    """What a field holds: its name in services, its values in words, and their way to and from the wire."""
+
+    name: str
+    wanted: str
+    to_wire: Callable[[Any], Any]
+    from_wire: Callable[[Any], Value]
+
+
+def kind_of(type_number: int, field: str) -> Kind:
+    """Return what a field of that type number holds; `field` is what errors call it.
+
+    Raises:
+        ConfigurationError: it holds nodes, which have no value.
+    """
+    kind = _KINDS.get(type_number & ~_MULTIPLE)
+    if kind is None:
+        raise ConfigurationError(f"{field}: holds nodes, not values; give their DEF names instead")
+    return kind
+
+
+def encoded(kind: Kind, field: str, value: Value) -> Any:
+    """Return `value` as the service of its kind wants it.
+
+    Raises:
+        ConfigurationError: the field cannot hold it.
+    """
+    try:
+        return kind.to_wire(value)
+    except (TypeError, ValueError):
+        raise ConfigurationError(f"{field}: holds {kind.wanted}, not {value!r}") from None
+
+
+def turn_about_z(heading_rad: float) -> dict[str, float]:
+    """Return the quaternion of a heading that Webots takes, also for 0."""
+    return _quaternion((0.0, 0.0, 1.0, heading_rad))
+
+
+def _exactly(*types: type) -> Callable[[Any], Any]:
+    """Return what lets values of these very types pass: a bool is no number here."""
+
+    def check(value: Any) -> Any:
+        if type(value) not in types:
+            raise TypeError
+        return value
+
+    return check
+
+
+def _number(value: Any) -> float:
+    number = float(_exactly(int, float)(value.item() if hasattr(value, "item") else value))
+    if not math.isfinite(number):
+        raise ValueError
+    return number
+
+
+def _numbers(value: Sequence[Any], names: str) -> dict[str, float]:
+    return {name: _number(each) for name, each in zip(names, value, strict=True)}
+
+
+def _vector(value: Sequence[Any]) -> dict[str, float]:
+    return _numbers(value, "xyz")
+
+
+def _plane(value: Sequence[Any]) -> dict[str, float]:
+    return {**_numbers(value, "xy"), "z": 0.0}
+
+
+def _color(value: Sequence[Any]) -> dict[str, float]:
+    return {**_numbers(value, "rgb"), "a": 1.0}
+
+
+def _quaternion(value: Sequence[Any]) -> dict[str, float]:
+    x, y, z, angle_rad = map(_number, value)
+    length = math.hypot(x, y, z)
+    if length == 0.0:
+        raise ValueError
+    half = math.sin(angle_rad / 2.0)
+    if abs(half) < _SMALLEST_TURN:
+        half, w = _SMALLEST_TURN, 1.0
+    else:
+        w = math.cos(angle_rad / 2.0)
+    return {"x": x / length * half, "y": y / length * half, "z": z / length * half, "w": w}
+
+
+def _axis_angle(turn: Any) -> tuple[float, ...]:
+    sine = math.hypot(turn.x, turn.y, turn.z)
+    angle_rad = 2.0 * math.atan2(sine, turn.w)
+    if sine <= _SMALLEST_TURN:
+        return (0.0, 0.0, 1.0, 0.0)
+    return (turn.x / sine, turn.y / sine, turn.z / sine, angle_rad)
+
+
+def _part(names: Sequence[str]) -> Callable[[Any], tuple[float, ...]]:
+    return lambda message: tuple(float(getattr(message, name)) for name in names)
+
+
+# Source: WbFieldType of Webots, R2021b to R2023b.
+_KINDS: Final[Mapping[int, Kind]] = {
+    1: Kind("bool", "True or False", _exactly(bool), bool),
+    2: Kind("int32", "a whole number", _exactly(int), int),
+    3: Kind("float", "a finite number", _number, float),
+    4: Kind("vec2f", "x, y", _plane, _part("xy")),
+    5: Kind("vec3f", "x, y, z", _vector, _part("xyz")),
+    6: Kind("rotation", "x, y, z of an axis and an angle in radians", _quaternion, _axis_angle),
+    7: Kind("color", "red, green, blue from 0 to 1", _color, _part("rgb")),
+    8: Kind("string", "text", _exactly(str), str),
+}
