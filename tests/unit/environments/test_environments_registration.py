@@ -102,9 +102,10 @@ def test_a_wrong_option_is_told_before_a_simulator_is_asked_for():
         make(simulator=never, max_steps=0)
 
 
-def test_without_robot_or_configuration_the_error_says_so(monkeypatch):
-    """The way out is in the message: the variable that names the configuration."""
-    monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
+def test_the_checker_of_gymnasium_accepts_an_environment_that_was_made_with_a_robot():
+    """It makes the environment once more, from copies of its arguments; a robot cannot be copied."""
+    robot, scene = fake_arena()
+    robot.socket = threading.Lock()
 
-    with pytest.raises(ConfigurationError, match="PALAESTRA_CONFIG"):
-        gymnasium.make(NAME)
+    check_env(gymnasium.make(NAME, robot=robot, scene=scene))

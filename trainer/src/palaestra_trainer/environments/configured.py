@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from palaestra_trainer.configuration import Configuration, Role, load
+from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, Role, load
 from palaestra_trainer.environments.claims import claim
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
@@ -26,6 +27,31 @@ class Configured:
     robot: RobotinoAbc
     scene: Scene
     release: Callable[[], None]
+
+
+def simulator_for(role: Role) -> Configured:
+    """Return the simulator of an environment that was given none, started.
+
+    It is one of PALAESTRA_CONFIG. Where that is not set, as in a notebook, it is a stub with the arena,
+    which is started here and ends when it is released, or with this process.
+
+    Raises:
+        ConfigurationError: each simulator with this role has an environment.
+        SimulatorFault: the simulator does not start.
+    """
+    return configured_simulator(role) if os.environ.get(CONFIG_VARIABLE) else own_simulator()
+
+
+def own_simulator() -> Configured:
+    """Return a stub with the arena, started for this environment alone.
+
+    Raises:
+        SimulatorFault: it does not start.
+    """
+    from palaestra_trainer.simulators.connect import Arena  # noqa: PLC0415 - as below
+
+    arena = Arena()
+    return Configured(name=arena.webots.robot_name, robot=arena.robot, scene=arena.scene, release=arena.close)
 
 
 def configured_simulator(role: Role) -> Configured:

@@ -20,7 +20,7 @@ from palaestra_trainer.configuration import Role
 from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
 from palaestra_trainer.environments.arena import Point, chosen_task
-from palaestra_trainer.environments.configured import configured_simulator
+from palaestra_trainer.environments.configured import simulator_for
 from palaestra_trainer.environments.observation import Situation
 from palaestra_trainer.environments.options import Options, parse
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
@@ -242,7 +242,8 @@ def make(
         simulator: called for robot and scene when none are given, once for each environment of `make_vec`;
             `palaestra_trainer.testing.fake_arena` needs no simulator.
         role: without `robot` and `simulator`, the environment takes the first simulator of PALAESTRA_CONFIG
-            with this role that no other environment has, in any process.
+            with this role that no other environment has, in any process. Without PALAESTRA_CONFIG it starts
+            a stub, which ends with `close()` or with this process.
         options: see `Options`; names of movements and parts are text.
 
     Raises:
@@ -255,7 +256,7 @@ def make(
         return MoveToTargetEnv(robot, scene, chosen)
     if simulator is not None:
         return MoveToTargetEnv(*simulator(), chosen)
-    taken = configured_simulator(role)
+    taken = simulator_for(role)
     return MoveToTargetEnv(taken.robot, taken.scene, chosen, taken.release)
 
 

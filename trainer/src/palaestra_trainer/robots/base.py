@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +98,14 @@ class RobotinoAbc(ABC):
     @abstractmethod
     def advance(self) -> int:
         """Let one control period pass; return how many extra ones had to (0 when all is well)."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return itself: a copy would drive the same robot.
+
+        gymnasium copies the arguments of an environment.
+        """
+        del memo
+        return self
 
     def move(self, movement: Movement) -> None:
         """Drive at the speeds of `movement` until told otherwise."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +150,14 @@ class RobotinoScene:
         self._target = target
         self.resets = 0
         webots.at_start(f"mark {target}", lambda: require_node(webots.observer, target))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return itself: a copy would arrange the same simulation.
+
+        gymnasium copies the arguments of an environment.
+        """
+        del memo
+        return self
 
     def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
         """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings.

@@ -13,6 +13,7 @@ import palaestra_trainer.environments  # noqa: F401 - importing registers what s
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration, load
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import care_of
 from palaestra_trainer.simulators.member import Member
@@ -20,6 +21,7 @@ from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
+from palaestra_trainer.webots import Mode, Webots
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
@@ -62,6 +64,30 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
         _simulator(configuration, entry, _process(configuration, entry, run))
         for entry in configuration.simulators
     ]
+
+
+class Arena:
+    """A stub with the arena as a process of this program, started; `close` ends it.
+
+    Raises:
+        SimulatorDead, SimulatorHung, WrongData: it does not come up in time.
+    """
+
+    def __init__(self) -> None:
+        self.webots = Webots("robotino", "arena")
+        self.robot = Robotino(self.webots)
+        self.scene = RobotinoScene(self.webots, self.robot)
+        try:
+            self.webots.start()  # connects the robot too
+            self.webots.supervisor.set_mode(Mode.FAST)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End it; safe to repeat."""
+        self.robot.close()
+        self.webots.close()
 
 
 def _process(configuration: Configuration, entry: SimulatorConfiguration, run: Path) -> ProcessLauncher:
