@@ -29,8 +29,9 @@ def _success() -> Panel:
     return Panel(
         question="How often does it reach its goal?",
         says=(
-            "Evaluation: the policy without exploration, on seeds of its own. Training: the last 100 "
-            "episodes, with exploration. Both flat at zero after a tenth of the steps: read the returns; "
+            "Evaluation: the policy without exploration, on seeds of its own, between the bounds of the 95 % "
+            "interval; at the end its confirmation. Training: the last 100 episodes, with exploration. "
+            "Both flat at zero after a tenth of the steps: read the returns; "
             "if these are flat too, the reward gives nothing to follow."
         ),
         unit=units.PercentUnit,
@@ -38,6 +39,7 @@ def _success() -> Panel:
         most=1,
         queries=(
             Query(of_run("palaestra_trainer_evaluation_success_ratio"), f"{RUN} evaluation"),
+            Query(of_run("palaestra_trainer_evaluation_success_bound_ratio"), f"{RUN} {{{{bound}}}}"),
             Query(of_run("palaestra_trainer_episode_success_ratio"), f"{RUN} training"),
         ),
     )

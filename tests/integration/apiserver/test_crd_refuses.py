@@ -130,6 +130,11 @@ WRONG = [
         {"everySteps": 0, "stopAtSuccessRate": 0.9},
         "stopAtSuccessRate.*nothing is evaluated while everySteps is 0",
     ),
+    (
+        "spec.trainer.evaluation",
+        {"everySteps": 0, "confirmEpisodes": 10},
+        "confirmEpisodes.*nothing is evaluated while everySteps is 0",
+    ),
     ("spec.trainer.checkpoint", {"keep": 0}, "spec.trainer.checkpoint.keep"),
     ("spec.storage", {"size": "much"}, "spec.storage.size"),
     ("spec.storage", {"ephemeral": True, "existingClaim": "c"}, "ephemeral.*excludes existingClaim; remove"),

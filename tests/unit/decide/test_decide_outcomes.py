@@ -3,6 +3,7 @@
 import pytest
 
 from palaestra.api.status import Phase
+from palaestra_sim.protocol.status import SuccessInterval
 
 
 @pytest.mark.parametrize(
@@ -190,6 +191,21 @@ def test_a_mark_that_nobody_knows_stops_all_the_same(training):
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.FAILED, "JobFailed")
     assert scene.replica().message == "rain"
+
+
+def test_success_is_reported_with_its_interval(training, last_word):
+    """The message of the condition is what most people read of a training that is over."""
+    scene, pod = training()
+    interval = SuccessInterval(low=0.9, high=0.98, episodes=100)
+    scene.end(pod, 0, last_word(step=100, success_rate=0.95, success_interval=interval))
+    scene.end_job("Complete")
+
+    scene.settle(1)
+
+    assert scene.replica().message == (
+        "the training is complete: 100 steps, success rate 0.95 (0.90 to 0.98, 100 episodes)"
+    )
+    assert scene.replica().success_interval.episodes == 100
 
 
 def test_what_the_trainer_said_last_stays_in_the_status(training, last_word, simulator):

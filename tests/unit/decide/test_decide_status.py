@@ -9,7 +9,14 @@ from palaestra.api.history import Faults, Goodput
 from palaestra.api.status import ConditionStatus, Phase
 from palaestra.decide import accept, prepare
 from palaestra.observe import Objects, observe
-from palaestra_sim.protocol.status import Cause, CheckpointStatus, FaultKind, FaultRecord, Termination
+from palaestra_sim.protocol.status import (
+    Cause,
+    CheckpointStatus,
+    FaultKind,
+    FaultRecord,
+    SuccessInterval,
+    Termination,
+)
 
 
 def test_the_columns_are_those_of_the_replica_that_is_worst_off(accepted):
@@ -54,6 +61,19 @@ def test_figures_have_the_four_decimals_that_people_read(training):
     replica = scene.replica()
     assert (replica.success_rate, replica.mean_return) == (0.3333, -0.0771)
     assert replica.steps_per_second == 251.2346
+
+
+def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
+    """The next attempt reports none until its first evaluation."""
+    scene, pod = training()
+    scene.poll(pod, step=30, success_rate=0.9, success_interval=SuccessInterval(low=0.7, high=1, episodes=20))
+    scene.settle()
+    scene.poll(pod, step=31)
+
+    scene.settle()
+
+    interval = scene.replica().success_interval
+    assert (interval.low, interval.high, interval.episodes) == (0.7, 1.0, 20)
 
 
 def test_simulators_and_checkpoints_are_told(training, simulator):

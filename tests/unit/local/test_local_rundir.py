@@ -1,6 +1,7 @@
 """The run directory: whose it is, what it was made for, what is kept."""
 
 import errno
+import json
 import os
 import uuid
 
@@ -207,6 +208,24 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     assert lines[2].endswith("93% of the wall clock")
     assert lines[4].endswith(f"tensorboard --logdir {directory}/tensorboard")
     assert lines[5].endswith(f"palaestra-eval {directory}")
+
+
+def test_the_summary_has_the_interval_of_the_success_rate(directory):
+    """It is in summary.json, where outcome.json of an older release has no place for it."""
+    interval = {"low": 0.8882, "high": 0.9785, "episodes": 100}
+    (directory / "summary.json").write_text(json.dumps({"success_interval": interval}))
+
+    line = summary(Outcome(exit_code=0, success_rate=0.951), directory)[0]
+
+    assert line.endswith("95% (95% interval 89% to 98%, 100 episodes)")
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"success_interval": null}', '{"success_interval": 3}'])
+def test_a_summary_without_an_interval_shows_the_rate_alone(directory, content):
+    """That of a run of an older release, or of a program of one's own."""
+    (directory / "summary.json").write_text(content)
+
+    assert summary(Outcome(exit_code=0, success_rate=0.951), directory)[0].split()[-1] == "95%"
 
 
 def test_the_summary_of_a_program_of_one_s_own_promises_nothing_that_it_did_not_write(directory):

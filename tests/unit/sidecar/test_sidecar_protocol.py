@@ -26,6 +26,7 @@ from palaestra_sim.protocol.status import (
     FaultKind,
     FaultRecord,
     SimulatorStatus,
+    SuccessInterval,
     Termination,
     TrainerStatus,
 )
@@ -193,6 +194,38 @@ def test_a_success_rate_is_a_share(status, share) -> None:
     """Percent would pass for a very good policy."""
     with pytest.raises(ProtocolError, match=r"^success_rate: is not within 0 to 1$"):
         TrainerStatus.from_json(status(success_rate=share).to_json())
+
+
+def test_an_interval_travels_with_its_rate(status) -> None:
+    """In /status, and in the last word."""
+    interval = SuccessInterval(low=0.25, high=0.75, episodes=20)
+    word = Termination(step=1, reason="done", success_interval=interval)
+
+    assert TrainerStatus.from_json(status(success_interval=interval).to_json()).success_interval == interval
+    assert Termination.from_message(word.to_message()).success_interval == interval
+
+
+def test_an_interval_that_is_not_known_is_no_field(status) -> None:
+    """Programs of a5276f3 refuse a field that they do not know."""
+    assert "success_interval" not in status(success_interval=None).to_json()
+    assert "success_interval" not in Termination(step=1, reason="done").to_json()
+
+
+@pytest.mark.parametrize(
+    ("changes", "mistake"),
+    [
+        ({"low": -0.1}, "low: is not within"),
+        ({"high": 2}, "high: is not within"),
+        ({"episodes": 0}, "episodes"),
+    ],
+)
+def test_bounds_of_a_success_rate_are_shares(status, changes, mistake) -> None:
+    """They are copied into a TrainingJob's status, whose schema bounds them."""
+    content = status(success_interval=SuccessInterval(low=0.1, high=0.2, episodes=5)).to_json()
+    content["success_interval"] |= changes
+
+    with pytest.raises(ProtocolError, match=mistake):
+        TrainerStatus.from_json(content)
 
 
 @pytest.mark.parametrize("time", ["yesterday", "2025-02-30T00:00:00Z", "2025-01-31", "2025-01-31T12:00:00"])

@@ -56,7 +56,8 @@ def clock() -> Clock:
 class Corridor(gymnasium.Env[np.ndarray, Any]):
     """Walk right (1) to the goal, three steps away; left (0) leads nowhere, for eight steps.
 
-    The observation is the position and the seed's last digit, both over 10.
+    The observation is the position and the seed's last digit, both over 10. The info says by `report`
+    whether an episode that reached the goal, or did not, succeeded; `report` may be replaced.
     """
 
     observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -67,6 +68,9 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
         self._member = member
         self.seeds: list[int | None] = []
         self.options: dict[str, Any] | None = None
+        self.report: Callable[[int | None, bool], dict[str, Any]] = lambda _seed, reached: {
+            "is_success": reached
+        }
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         """Begin to walk."""
@@ -90,7 +94,7 @@ class Corridor(gymnasium.Env[np.ndarray, Any]):
             reward,
             reached,
             self._steps >= MAX_STEPS and not reached,
-            {"is_success": reached, "reward_terms": {"walk": reward}},
+            {**self.report(self.seeds[-1], reached), "reward_terms": {"walk": reward}},
         )
 
     def _observe(self) -> np.ndarray:
@@ -250,12 +254,20 @@ def job(make_configuration):
 def play(directory, make_member):
     """Train; return the exit code and the members by name. Faults are given by a member's name.
 
-    `on_step` is called after each step of one member, by default of `collect-0`; the run is kept `into`
-    a run directory, by default that of the test.
+    `on_step` is called after each step of one member, by default of `collect-0`; environments report their
+    success by `report`; the run is kept `into` a run directory, by default that of the test.
     """
 
-    def run(
-        configuration, faults=(), on_step=None, step_reward=-0.1, of="collect-0", into=directory, **options
+    def run(  # noqa: PLR0913 - what a test changes of a run
+        configuration,
+        faults=(),
+        on_step=None,
+        *,
+        step_reward=-0.1,
+        of="collect-0",
+        into=directory,
+        report=None,
+        **options,
     ):
         members = {}
 
@@ -263,6 +275,8 @@ def play(directory, make_member):
             for entry in given.simulators:
                 members[entry.name] = make_member(entry.name, **dict(faults).get(entry.name, {}))
                 members[entry.name].env.step_reward = step_reward
+                if report:
+                    members[entry.name].env.report = report
             if on_step:
                 member = members[of]
                 member.take_step = lambda take=member.take_step: (take(), on_step())

@@ -97,6 +97,11 @@ def test_an_evaluation_is_told_until_the_next(progress):
 
     assert values(progress, "palaestra_trainer_evaluations_total") == {(): 2}
     assert values(progress, "palaestra_trainer_evaluation_success_ratio") == {(): 0}
+    assert values(progress, "palaestra_trainer_evaluation_success_bound_ratio", "bound") == {
+        ("low",): 0,
+        ("high",): 0.7935,
+    }
+    assert values(progress, "palaestra_trainer_evaluation_episodes") == {(): 1}
     assert values(progress, "palaestra_trainer_evaluation_return_mean") == {(): 2}
     assert values(progress, "palaestra_trainer_evaluation_length_mean_steps") == {(): 3}
 

@@ -14,7 +14,7 @@ from palaestra_trainer import checkpoint, training
 from palaestra_trainer.errors import ConfigurationError, MasterLost
 from palaestra_trainer.measuring import measure
 from palaestra_trainer.run_directory import read_lines
-from palaestra_trainer.seeds import EVALUATE, episode_seeds
+from palaestra_trainer.seeds import CONFIRM, EVALUATE, episode_seeds
 
 
 @pytest.mark.parametrize(("name", "collectors", "steps"), [("DQN", 1, 100), ("PPO", 2, 128), ("A2C", 1, 100)])
@@ -35,18 +35,18 @@ def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
     _, members = play(job())
 
     lines = list(read_lines(directory.evaluations))
-    seeds = list(episode_seeds(1, EVALUATE, 4))
+    seeds, confirming = episode_seeds(1, EVALUATE, 4), episode_seeds(1, CONFIRM, 100)
     assert [line["step"] for line in lines] == [40, 80, 100]
     assert set(lines[0]) >= {"episodes", "success_rate", "mean_return", "mean_length"}
-    assert members["evaluate-0"].env.seeds == seeds * 3
+    assert members["evaluate-0"].env.seeds == [*seeds] * 3 + [*confirming]
 
 
 def test_simulators_rest_while_nobody_needs_them(play, job):
-    """Evaluators but in evaluations, collectors in them."""
+    """Evaluators but in evaluations and the confirmation, collectors in them."""
     _, members = play(job())
 
-    assert members["evaluate-0"].log == ["start", "pause", *(["run", "pause"] * 3), "stop"]
-    assert members["collect-0"].log == ["start", *(["pause", "run"] * 3), "stop"]
+    assert members["evaluate-0"].log == ["start", "pause", *(["run", "pause"] * 4), "stop"]
+    assert members["collect-0"].log == ["start", *(["pause", "run"] * 4), "stop"]
 
 
 def test_model_zip_is_the_best_by_evaluation(play, job, directory):

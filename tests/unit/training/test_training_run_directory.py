@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+from zipfile import ZipFile
 
 import pytest
 
@@ -58,10 +59,12 @@ def test_a_file_is_replaced_as_a_whole_or_not_at_all(tmp_path):
     assert [it.name for it in tmp_path.iterdir()] == ["model.zip"]
 
 
-def test_the_summary_is_of_the_best_evaluation(directory):
-    """Whose policy model.zip is."""
+def test_the_summary_of_a_run_of_an_earlier_release_is_of_its_best_line(directory):
+    """Its model.zip does not say which evaluation it is from."""
     for step, rate in ((10, 0.5), (20, 0.9), (30, 0.7)):
         append_line(directory.evaluations, {"step": step, "success_rate": rate, "mean_return": 1.0})
+    with ZipFile(directory.model, "w") as archive:
+        archive.writestr("data", "{}")
     progress = Progress(30, [("collect-0", "Collect")], lambda: 0.0)
     progress.resumed(30, Counters(goodput={"learning": 1.5, "starting": 0.5}))
 

@@ -25,6 +25,16 @@ def test_a_running_job_is_told_from_spec_to_last_attempt():
     assert lines[-3:] == ["its last lines:", "first", "last"]
 
 
+def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none():
+    """A rate of twenty episodes looks as sure as one of a thousand without it."""
+    interval = {"low": 0.91, "high": 0.99, "episodes": 100}
+
+    assert "Success rate:   40% in the last evaluation" in told(make_job())
+    assert "Success rate:   97% (95% interval 91% to 99%, 100 episodes)" in told(
+        make_job(successRate=0.97, successInterval=interval)
+    )
+
+
 def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
     """Given up is more than its last state."""
     lines = told(make_job())

@@ -41,9 +41,10 @@ reads:
   the configuration ({CONFIG_VARIABLE}), the newest checkpoint of the run directory
 writes:
   the run directory ({RUN_VARIABLE}): attempts.jsonl, checkpoints/, tensorboard/,
-  evaluations.jsonl, model.zip (the best by evaluation), training.yaml, hyperparameters.json
-  and, at the end, summary.json; the termination message (PALAESTRA_TERMINATION_LOG); on a
-  claim, the link tensorboard/<job>-<first 8 of its UID>/<replica> at its top
+  evaluations.jsonl, confirmations.jsonl, model.zip (the best by evaluation), training.yaml,
+  hyperparameters.json and, at the end, summary.json; the termination message
+  (PALAESTRA_TERMINATION_LOG); on a claim, the link
+  tensorboard/<job>-<first 8 of its UID>/<replica> at its top
 
 A run directory with a checkpoint is resumed; one that is finished is reported.
 """
@@ -106,7 +107,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--seeds",
         default="B",
-        help="name of the stream of seeds (default: B; the model was chosen on A)",
+        help="name of the stream of seeds (default: B; the model was chosen on A, confirmed on C)",
     )
     chosen = parser.parse_args(arguments)
     configure_logs()

@@ -11,27 +11,19 @@ from __future__ import annotations
 import time
 from collections import Counter
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import structlog
 from stable_baselines3.common.callbacks import BaseCallback
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer import algorithms, checkpoint, patience
+from palaestra_trainer import checkpoint, patience
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.checkpoint import Checkpoint, State, Tensors
-from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.display import Display
 from palaestra_trainer.divergence import Learner
-from palaestra_trainer.errors import TrainerError
-from palaestra_trainer.evaluation import Evaluation, evaluate_on_all
-from palaestra_trainer.interruption import Interruption
 from palaestra_trainer.journal import Journal
-from palaestra_trainer.progress import Progress
-from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
-from palaestra_trainer.seeds import EVALUATE, episode_seeds
-from palaestra_trainer.simulators.fleet import Fleet, resting, running
+from palaestra_trainer.run import Run
+from palaestra_trainer.selection import Selection, last_evaluated
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 log = structlog.get_logger(__name__)
@@ -39,22 +31,6 @@ log = structlog.get_logger(__name__)
 # Learning phases shorter than this are not worth two service calls a simulator, nor a copy of the model.
 LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
-
-
-class Enough(TrainerError):
-    """The wanted success rate is reached; the run is done."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """Everything that belongs to one attempt of a run."""
-
-    configuration: Configuration
-    directory: RunDirectory
-    fleet: Fleet
-    progress: Progress
-    interruption: Interruption
-    display: Display
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +42,7 @@ class Resumed:
 
 
 class Conductor(BaseCallback):
-    """The callback that conducts one attempt.
-
-    Attributes:
-        best: success rate and mean return of the best evaluation so far, over all attempts.
-    """
+    """The callback that conducts one attempt."""
 
     def __init__(self, run: Run, env: SimulatorsVecEnv, resumed: Resumed | None = None) -> None:
         super().__init__()
@@ -93,17 +65,15 @@ class Conductor(BaseCallback):
         self._rollout_ended: float | None = None
         self._updates = 0
         self._resting = False
-        self.best = best_so_far(run.directory)
 
     def finish(self) -> None:
-        """Evaluate and save what training ended with."""
+        """Evaluate and save what training ended with, and confirm the best policy."""
         self._learner.check(self.model.num_timesteps)
         self._mark_boundary()
         if self._evaluated != self._step:
             self._evaluate_if_wanted()
-        if not self._run.directory.model.exists():
-            replace_file(self._run.directory.model, partial(checkpoint.save_tensors, model=self.model))
         self.save()
+        self._selection.finish(self._step)
 
     def save(self) -> None:
         """Save the state of the last boundary, if there has been one; the model is put back to it."""
@@ -137,6 +107,7 @@ class Conductor(BaseCallback):
 
     def _init_callback(self) -> None:
         self._learner = Learner(self.model)
+        self._selection = Selection(self._run, self.model)
 
     def _on_rollout_start(self) -> None:
         if self._rollout_ended is not None and self._updates_so_far() != self._updates:
@@ -197,40 +168,9 @@ class Conductor(BaseCallback):
         )
 
     def _evaluate_if_wanted(self) -> None:
-        wanted = self._run.configuration.evaluation
         self._evaluated = self._step
-        if not wanted.every_steps or not self._run.fleet.evaluating:
-            return
-        evaluation = self._evaluate(wanted.episodes)
-        self._keep(evaluation)
-        goal = wanted.stop_at_success_rate
-        if goal is not None and evaluation.success_rate >= goal:
-            raise Enough(f"success rate {evaluation.success_rate:.2f} at step {self._step}")
-
-    def _evaluate(self, episodes: int) -> Evaluation:
-        run = self._run
-        seeds = episode_seeds(run.configuration.seed, EVALUATE, episodes)
-        with (
-            run.progress.spending(Cause.EVALUATING),
-            resting(run.fleet.collecting),
-            running(run.fleet.evaluating),
-        ):
-            policy = algorithms.policy_of(self.model)
-            evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)
-        run.progress.evaluated(evaluation)
-        self.logger.record("eval/success_rate", evaluation.success_rate)
-        self.logger.record("eval/mean_reward", evaluation.mean_return)
-        self.logger.record("eval/mean_ep_length", evaluation.mean_length)
-        self.logger.dump(self._step)
-        log.info("evaluated", step=self._step, **evaluation.summary())
-        return evaluation
-
-    def _keep(self, evaluation: Evaluation) -> None:
-        directory = self._run.directory
-        if self.best is None or evaluation.score > self.best:
-            self.best = evaluation.score
-            replace_file(directory.model, partial(checkpoint.save_tensors, model=self.model))
-        append_line(directory.evaluations, {"step": self._step} | evaluation.summary())
+        if self._selection.measures:
+            self._selection.evaluate(self._step)
 
     def _record_rewards(self, infos: list[dict[str, Any]], dones: Any) -> None:
         for row, info in enumerate(infos):
@@ -240,26 +180,6 @@ class Conductor(BaseCallback):
                 if "episode" in info:
                     for name, value in terms.items():
                         self.logger.record_mean(f"reward/{name}", value)
-
-
-def best_so_far(directory: RunDirectory) -> tuple[float, float] | None:
-    """Return success rate and mean return of the evaluation that model.zip is from; None without."""
-    if not directory.model.exists():
-        return None
-    scores = (
-        (float(line["success_rate"]), float(line["mean_return"]))
-        for line in read_lines(directory.evaluations)
-    )
-    return max(scores, default=None)
-
-
-def last_evaluated(directory: RunDirectory, step: int) -> int:
-    """Return the step of the last evaluation up to `step`; 0 without one.
-
-    One that was due there but cut short is not among them, so that a resumed attempt makes up for it.
-    """
-    steps = (int(line["step"]) for line in read_lines(directory.evaluations))
-    return max((it for it in steps if it <= step), default=0)
 
 
 def _passed(before: int, now: int, every: int) -> bool:

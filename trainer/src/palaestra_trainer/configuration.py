@@ -34,6 +34,7 @@ log = structlog.get_logger(__name__)
 _UNKNOWN = "extra_forbidden"  # pydantic's name of the mistake
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
+CONFIRM_EPISODES = 100  # a rate of 95 % is then known to within 4 %
 
 Positive = Annotated[int, Field(ge=1)]
 Role = Literal["Collect", "Evaluate"]
@@ -103,12 +104,21 @@ class Evaluation(_Section):
     Attributes:
         every_steps: environment steps between two evaluations; 0: none.
         episodes: episodes of one evaluation, of all evaluating simulators together.
-        stop_at_success_rate: training ends at once when this share (0 to 1) succeeds.
+        stop_at_success_rate: training ends when this share (0 to 1) succeeds, in an evaluation and then in
+            its confirmation.
+        confirm_episodes: episodes of a confirmation; 0: none; None: `CONFIRM_EPISODES`, and no field in the
+            file, since a trainer of a5276f3 refuses it.
     """
 
     every_steps: Annotated[int, Field(ge=0)] = 2500
     episodes: Positive = 20
     stop_at_success_rate: Annotated[float, Field(gt=0, le=1)] | None = None
+    confirm_episodes: Annotated[int, Field(ge=0)] | None = None
+
+    @property
+    def confirming(self) -> int:
+        """Episodes of a confirmation; 0: none."""
+        return CONFIRM_EPISODES if self.confirm_episodes is None else self.confirm_episodes
 
 
 class Checkpoint(_Section):

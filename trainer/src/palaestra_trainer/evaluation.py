@@ -18,8 +18,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from palaestra_sim.protocol.status import SuccessInterval
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.interruption import Check, go_on
+from palaestra_trainer.intervals import wilson
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member
 
@@ -46,13 +48,22 @@ class Episode:
         seed: the seed it was reset with.
         total_reward: undiscounted sum of its rewards.
         length: its environment steps.
-        success: whether the environment said so at its end (`info["is_success"]`).
+        success: what the environment reported at its end (`info["is_success"]`); None: it reported nothing.
+        outcome: how it ended, in a word of the environment's (`info["outcome"]`); None: it has none.
     """
 
     seed: int
     total_reward: float
     length: int
-    success: bool
+    success: bool | None
+    outcome: str | None = None
+
+    def record(self) -> dict[str, Any]:
+        """Return it as a part of a line of evaluations.jsonl, without what was not reported."""
+        known = {"success": self.success, "outcome": self.outcome}
+        return {"seed": self.seed, "return": round(self.total_reward, 4), "length": self.length} | {
+            name: value for name, value in known.items() if value is not None
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,9 +83,20 @@ class Evaluation:
     seconds: float
 
     @property
-    def success_rate(self) -> float:
-        """Share of episodes that succeeded, 0 to 1."""
-        return fmean(episode.success for episode in self.episodes)
+    def success_rate(self) -> float | None:
+        """Share of episodes that succeeded, 0 to 1; None: no episode reported whether it did."""
+        return fmean(map(bool, successes)) if (successes := self._successes()) else None
+
+    @property
+    def success_interval(self) -> SuccessInterval | None:
+        """The 95 % interval around `success_rate`; None as there."""
+        successes = self._successes()
+        return wilson(sum(map(bool, successes)), len(successes)) if successes else None
+
+    def _successes(self) -> list[bool | None]:
+        """Return what each episode reported: an environment may report success and never failure."""
+        successes = [episode.success for episode in self.episodes]
+        return [] if all(success is None for success in successes) else successes
 
     @property
     def mean_return(self) -> float:
@@ -89,16 +111,26 @@ class Evaluation:
     @property
     def score(self) -> tuple[float, float]:
         """What the best evaluation has most of: success, then return."""
-        return (self.success_rate, self.mean_return)
+        return (self.success_rate or 0.0, self.mean_return)
 
-    def summary(self) -> dict[str, float | int]:
-        """Return the means, as a line of evaluations.jsonl has them."""
+    def summary(self) -> dict[str, float | int | None]:
+        """Return the means."""
+        rate = self.success_rate
         return {
             "episodes": len(self.episodes),
-            "success_rate": round(self.success_rate, 4),
+            "success_rate": None if rate is None else round(rate, 4),
             "mean_return": round(self.mean_return, 4),
             "mean_length": round(self.mean_length, 2),
             "faults": self.faults,
+        }
+
+    def record(self) -> dict[str, Any]:
+        """Return the means, the interval and each episode, as a line of evaluations.jsonl has them."""
+        interval = self.success_interval
+        return {
+            **self.summary(),
+            "success_interval": None if interval is None else interval.to_json(),
+            "played": [episode.record() for episode in self.episodes],
         }
 
 
@@ -241,5 +273,6 @@ def _play(policy: Policy, keeper: Keeper, seed: int, check: Check, rewards: list
         seed=seed,
         total_reward=sum(rewards),
         length=len(rewards),
-        success=bool(info.get("is_success", False)),
+        success=bool(info["is_success"]) if "is_success" in info else None,
+        outcome=outcome if isinstance(outcome := info.get("outcome"), str) else None,
     )

@@ -83,15 +83,28 @@ SUCCESS = gauge(
     "Share of the last 100 training episodes of this attempt that succeeded.",
 )
 
-EVALUATIONS = counter("palaestra_trainer_evaluations_total", "Evaluations in this attempt.")
+EVALUATIONS = counter(
+    "palaestra_trainer_evaluations_total", "Evaluations in this attempt, confirmations included."
+)
 EVALUATION_SUCCESS = gauge(
-    "palaestra_trainer_evaluation_success_ratio", "Share of successful episodes in the last evaluation."
+    "palaestra_trainer_evaluation_success_ratio",
+    "Share of successful episodes in the last evaluation or confirmation.",
+)
+EVALUATION_BOUND = gauge(
+    "palaestra_trainer_evaluation_success_bound_ratio",
+    "Bounds of the 95 % interval around that share.",
+    Label(name="bound", values=("low", "high")),
+)
+EVALUATION_EPISODES = gauge(
+    "palaestra_trainer_evaluation_episodes", "Episodes of the last evaluation or confirmation."
 )
 EVALUATION_RETURN = gauge(
-    "palaestra_trainer_evaluation_return_mean", "Mean return of the episodes of the last evaluation."
+    "palaestra_trainer_evaluation_return_mean",
+    "Mean return of the episodes of the last evaluation or confirmation.",
 )
 EVALUATION_LENGTH = gauge(
-    "palaestra_trainer_evaluation_length_mean_steps", "Mean length of the episodes of the last evaluation."
+    "palaestra_trainer_evaluation_length_mean_steps",
+    "Mean length of the episodes of the last evaluation or confirmation.",
 )
 
 LOSS = gauge(
@@ -181,6 +194,8 @@ FAMILIES: tuple[Family, ...] = (
     SUCCESS,
     EVALUATIONS,
     EVALUATION_SUCCESS,
+    EVALUATION_BOUND,
+    EVALUATION_EPISODES,
     EVALUATION_RETURN,
     EVALUATION_LENGTH,
     LOSS,

@@ -17,7 +17,7 @@ from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
 from palaestra_sim.protocol.metrics import Family, Values
-from palaestra_sim.protocol.status import SimulatorStatus, TrainerStatus
+from palaestra_sim.protocol.status import SimulatorStatus, SuccessInterval, TrainerStatus
 from palaestra_trainer import families
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.figures import Figures
@@ -107,9 +107,15 @@ def _evaluations(figures: Figures) -> dict[Family, Values]:
     return {
         families.EVALUATIONS: _one(figures.evaluations),
         families.EVALUATION_SUCCESS: _one(last.success_rate if last else None),
+        families.EVALUATION_BOUND: _bounds(last.success_interval if last else None),
+        families.EVALUATION_EPISODES: _one(len(last.episodes) if last else None),
         families.EVALUATION_RETURN: _one(last.mean_return if last else None),
         families.EVALUATION_LENGTH: _one(last.mean_length if last else None),
     }
+
+
+def _bounds(interval: SuccessInterval | None) -> Values:
+    return {} if interval is None else {("low",): interval.low, ("high",): interval.high}
 
 
 def _learning(logged: Mapping[str, float]) -> dict[Family, Values]:

@@ -17,7 +17,14 @@ from statistics import fmean
 from types import MappingProxyType
 from typing import Any
 
-from palaestra_sim.protocol.status import Cause, CheckpointStatus, FaultKind, FaultRecord, TrainerStatus
+from palaestra_sim.protocol.status import (
+    Cause,
+    CheckpointStatus,
+    FaultKind,
+    FaultRecord,
+    SuccessInterval,
+    TrainerStatus,
+)
 from palaestra_trainer.configuration import Role
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.evaluation import Evaluation
@@ -91,7 +98,9 @@ class Progress:
         step: valid environment steps so far, over all attempts.
         target: steps at which the run ends.
         counters: what is counted over all attempts, but for the time of this one: see `counted`.
-        success_rate: that of this attempt's last evaluation; None before it.
+        success_rate: that of this attempt's last evaluation or confirmation; None before it, or where the
+            environment reports no success.
+        success_interval: around it; None as there.
         checkpoint: the newest checkpoint; None without one.
         attempt: this one's number in the run directory's record; None before it is recorded.
         figures: what is counted in this attempt only.
@@ -107,6 +116,7 @@ class Progress:
         self.target = target
         self.counters = Counters()
         self.success_rate: float | None = None
+        self.success_interval: SuccessInterval | None = None
         self.checkpoint: CheckpointStatus | None = None
         self.attempt: int | None = None
         self.figures = Figures()
@@ -229,6 +239,7 @@ class Progress:
         """The policy was evaluated."""
         with self._lock:
             self.success_rate = evaluation.success_rate
+            self.success_interval = evaluation.success_interval
             self.counters.steps_lost += evaluation.steps_lost
         self.figures.evaluated(evaluation)
 
@@ -310,6 +321,7 @@ class Progress:
                 episodes=counters.episodes,
                 mean_return=fmean(self._returns) if self._returns else None,
                 success_rate=self.success_rate,
+                success_interval=self.success_interval,
                 steps_per_second=speed,
                 simulators=self._standings.statuses(),
                 last_checkpoint=self.checkpoint,

@@ -54,6 +54,11 @@ class RunDirectory:
         return self.path / "hyperparameters.json"
 
     @property
+    def confirmations(self) -> Path:
+        """One JSON line a confirmation of an evaluation."""
+        return self.path / "confirmations.jsonl"
+
+    @property
     def journal(self) -> Path:
         """Where the run stood some seconds ago, which matters if it is killed."""
         return self.path / "journal.json"

@@ -2,8 +2,9 @@
 
 A process that died and came back plays the same episodes as one that lived,
 because no seed depends on a process's life. Each stream (collecting,
-evaluating, and any name a person gives to `palaestra-eval --seeds`) draws from
-its own sequence, so that a policy is never chosen on episodes it is measured on.
+evaluating, confirming, and any name a person gives to `palaestra-eval --seeds`)
+draws from its own sequence, so that a policy is never chosen on episodes it is
+measured on.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 COLLECT = "collect"
 EVALUATE = "A"
+CONFIRM = "C"  # B is what `palaestra-eval` measures on
 
 
 def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> int:
@@ -32,6 +34,6 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
     return int(sequence.generate_state(1)[0]) >> 1
 
 
-def episode_seeds(run_seed: int, stream: str, episodes: int) -> Iterator[int]:
-    """Yield the seeds of the first `episodes` episodes of a stream that simulators share."""
-    return (episode_seed(run_seed, stream, 0, episode) for episode in range(episodes))
+def episode_seeds(run_seed: int, stream: str, episodes: int, first: int = 0) -> Iterator[int]:
+    """Yield the seeds of `episodes` episodes of a stream that simulators share, from number `first` on."""
+    return (episode_seed(run_seed, stream, 0, first + episode) for episode in range(episodes))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,29 +11,28 @@ from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.goodput import trained_share
 from palaestra_trainer.progress import Progress
 from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_file
+from palaestra_trainer.selection import best_of, confirmation_of
 
 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     """Return the summary of a run that has ended.
 
-    `success_rate` and `mean_return` are those of the best evaluation, whose
-    policy model.zip is (null if nothing was evaluated); faults and restarts are
-    of all attempts, and so are `duration_s`, the speed that follows from it, and
+    `success_rate`, its `success_interval` and `mean_return` are those of the policy
+    in model.zip, which learned for `best_step` steps: from its confirmation, else
+    from its evaluation; null if there was none. Faults and restarts are of all
+    attempts, and so are `duration_s`, the speed that follows from it, and
     `goodput`, its seconds by cause, of which `trained_share` trained.
     """
-    best = max(
-        read_lines(directory.evaluations),
-        key=lambda line: (line["success_rate"], line["mean_return"]),
-        default={},
-    )
+    measured = _measured(directory)
     counters = progress.counted()
     return {
         "target": progress.target,
         "steps": progress.step,
         "episodes": counters.episodes,
-        "success_rate": best.get("success_rate"),
-        "mean_return": best.get("mean_return"),
-        "best_step": best.get("step"),
+        "success_rate": measured.get("success_rate"),
+        "success_interval": measured.get("success_interval"),
+        "mean_return": measured.get("mean_return"),
+        "best_step": measured.get("step"),
         "steps_per_second": round(progress.step / max(counters.seconds, 1e-9), 1),
         "duration_s": round(counters.seconds, 1),
         "faults": counters.broken,
@@ -66,6 +66,17 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
     if content["target"] < configuration.steps:
         return None
     return content
+
+
+def _measured(directory: RunDirectory) -> dict[str, Any]:
+    """Return the line that says most of model.zip; empty: it was never evaluated."""
+    best = best_of(directory)
+    if best is None:
+        return {}
+    if confirmation := confirmation_of(directory, best.step):
+        return confirmation
+    evaluated = (line for line in read_lines(directory.evaluations) if line["step"] == best.step)
+    return next(evaluated, asdict(best))
 
 
 def _rounded(share: float | None) -> float | None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import structlog
 import torch
@@ -21,10 +21,10 @@ from stable_baselines3.common.logger import configure
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 from torch.utils.tensorboard.writer import SummaryWriter
 
-from palaestra_sim.protocol.status import Cause, ExitCode, Termination
+from palaestra_sim.protocol.status import Cause, ExitCode, SuccessInterval, Termination
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.checkpoint import Checkpoint
-from palaestra_trainer.conductor import Conductor, Enough, Resumed, Run
+from palaestra_trainer.conductor import Conductor, Resumed
 from palaestra_trainer.configuration import Configuration, dump
 from palaestra_trainer.display import Display, Lines
 from palaestra_trainer.divergence import Learner
@@ -36,7 +36,9 @@ from palaestra_trainer.logs import last_lines
 from palaestra_trainer.metrics import constants
 from palaestra_trainer.progress import Counters, Progress
 from palaestra_trainer.rejoining import rejoin
-from palaestra_trainer.run_directory import RunDirectory, drop_lines, replace_file
+from palaestra_trainer.run import Run
+from palaestra_trainer.run_directory import RunDirectory, replace_file
+from palaestra_trainer.selection import Enough, forget_after
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.member import Member, Spared
 from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
@@ -93,7 +95,12 @@ def run(
     if before is not None:
         log.info("already finished", **before)
         write_last_word(
-            Termination(step=before["steps"], reason="Completed: before", success_rate=before["success_rate"])
+            Termination(
+                step=before["steps"],
+                reason="Completed: before",
+                success_rate=before["success_rate"],
+                success_interval=_interval(before),
+            )
         )
         return ExitCode.DONE
     progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
@@ -146,6 +153,7 @@ class Attempt:
         return Termination(
             step=self._progress.step,
             success_rate=self._progress.success_rate,
+            success_interval=self._progress.success_interval,
             reason=f"{end.reason}: {end.message}",
             last_checkpoint=self._progress.checkpoint,
             attempt=self._progress.attempt,
@@ -244,7 +252,7 @@ class Attempt:
     def _forget_what_is_played_again(self) -> None:
         """Let evaluations and curves end where the run goes on; the attempt before got further."""
         step, curves = self._progress.step, self._directory.tensorboard
-        drop_lines(self._directory.evaluations, lambda line: line["step"] > step)
+        forget_after(self._directory, step)
         if curves.exists():
             # TensorBoard leaves out points from this step on in the files that are older than this mark.
             with SummaryWriter(str(curves), purge_step=step + 1):  # type: ignore[no-untyped-call]  # as torch has it
@@ -305,6 +313,12 @@ class Attempt:
                 lambda: write_last_word(self.last_word(stalled(self._progress))),
             )
         )
+
+
+def _interval(summary: Mapping[str, Any]) -> SuccessInterval | None:
+    """Return that of a finished run; one of a release up to a5276f3 has none."""
+    interval = summary.get("success_interval")
+    return None if interval is None else SuccessInterval.from_json(interval)
 
 
 def use_threads(environment: Mapping[str, str] = os.environ) -> None:

@@ -161,6 +161,19 @@ class SimulatorStatus(Reported):
     """`starting` or `ready`: its spare; absent: it has none."""
 
 
+class SuccessInterval(Reported):
+    """The 95 % interval (Wilson) around a success rate."""
+
+    low: Fraction
+    """Its lower bound, 0 to 1."""
+
+    high: Fraction
+    """Its upper bound, 0 to 1."""
+
+    episodes: Count
+    """Episodes that were played."""
+
+
 class ReplicaStatus(Reported):
     """One training run."""
 
@@ -192,7 +205,11 @@ class ReplicaStatus(Reported):
     """Environment steps at which it ends; absent: not known yet."""
 
     success_rate: Fraction | None = None
-    """Share of successful episodes in the last evaluation, 0 to 1; absent: none yet."""
+    """Share of successful episodes in the last evaluation or confirmation, 0 to 1; absent: none yet, or
+    the environment reports no success."""
+
+    success_interval: SuccessInterval | None = None
+    """Where the true success rate lies; absent: as `successRate`, or an older trainer."""
 
     mean_return: float | None = None
     """Mean return of recent training episodes, in rewards; absent: none ended yet."""

@@ -119,14 +119,24 @@ class Evaluation(ApiModel):
     """Episodes of one evaluation, always with the same seeds."""
 
     stop_at_success_rate: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Training ends when this share of an evaluation's episodes succeeds, above 0 and up to 1;
-    absent: it goes on for all `steps`."""
+    """Training ends when this share of an evaluation's episodes succeeds, above 0 and up to 1, and then
+    of the episodes that confirm it; absent: it goes on for all `steps`."""
+
+    confirm_episodes: Annotated[int, Field(ge=0, le=10_000)] | None = None
+    """Episodes that confirm an evaluation that would end training, and the best one at its end, with
+    seeds by which no policy was chosen; 0: none; absent: 100."""
 
     rules = (
         Rule(
             field="stopAtSuccessRate",
             holds=lambda it: it.stop_at_success_rate is None or it.every_steps > 0,
             cel="!has(self.stopAtSuccessRate) || self.everySteps > 0",
+            message="nothing is evaluated while everySteps is 0; remove it or evaluate",
+        ),
+        Rule(
+            field="confirmEpisodes",
+            holds=lambda it: not it.confirm_episodes or it.every_steps > 0,
+            cel="!has(self.confirmEpisodes) || self.confirmEpisodes == 0 || self.everySteps > 0",
             message="nothing is evaluated while everySteps is 0; remove it or evaluate",
         ),
     )

@@ -32,6 +32,7 @@ PARTS = (
     "hyperparameters.json",
     "model.zip",
     "evaluations.jsonl",
+    "confirmations.jsonl",
     "summary.json",
     "attempts.jsonl",
     "tensorboard",

@@ -224,6 +224,8 @@ def success(word: Termination | None) -> str:
     if word is None:
         return "the training is complete"
     rate = f", success rate {word.success_rate:.2f}" if word.success_rate is not None else ""
+    if (interval := word.success_interval) is not None:
+        rate += f" ({interval.low:.2f} to {interval.high:.2f}, {interval.episodes} episodes)"
     return f"the training is complete: {word.step} steps{rate}"
 
 

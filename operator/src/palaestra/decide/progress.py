@@ -8,11 +8,19 @@ from datetime import datetime
 from palaestra.api import Role
 from palaestra.api.history import Faults, Goodput
 from palaestra.api.lines import one_line
-from palaestra.api.status import TERMINAL, LastCheckpoint, Phase, SimulatorPhase, SimulatorStatus
+from palaestra.api.status import (
+    TERMINAL,
+    LastCheckpoint,
+    Phase,
+    SimulatorPhase,
+    SimulatorStatus,
+    SuccessInterval,
+)
 from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation
 from palaestra.decide.times import Wait
 from palaestra.observe.reading import MOST_COUNT, as_time
+from palaestra_sim.protocol import status as protocol
 from palaestra_sim.protocol.status import Cause, CheckpointStatus, Termination, TrainerStatus
 
 EVALUATING = "evaluating"  # the trainer's phase while nothing is learned from
@@ -32,6 +40,7 @@ def progress(it: Situation, phase: Phase) -> dict[str, object]:
     if told_last is not None and (step := _step(told_last)) is not None:
         fields["step"] = step
         fields["success_rate"] = _figure(told_last.success_rate, it.old.success_rate)
+        fields["success_interval"] = _interval(told_last.success_interval) or it.old.success_interval
         fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or it.old.last_checkpoint
     if polled is not None and ended_with is None:
         fields |= {
@@ -129,3 +138,7 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
 def _figure(new: float | None, old: float | None) -> float | None:
     """Return a figure as people read it, to the fourth decimal; the old one where there is no new one."""
     return old if new is None else round(new, 4)
+
+
+def _interval(told: protocol.SuccessInterval | None) -> SuccessInterval | None:
+    return None if told is None else SuccessInterval(low=told.low, high=told.high, episodes=told.episodes)

@@ -13,9 +13,12 @@ from palaestra.api.status import Status
 PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with what else changes, never alone
 _OF_JOB = frozenset({"step", "successRate"})
-_FIRST = frozenset({"step", "target", "successRate", "lastCheckpoint"})  # never absent once they were there
+_FIRST = frozenset(  # never absent once they were there
+    {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
+)
 _OF_REPLICA = frozenset(
-    {"step", "target", "successRate", "meanReturn", "stepsPerSecond", "simulators", "lastCheckpoint",
+    {"step", "target", "successRate", "successInterval", "meanReturn", "stepsPerSecond", "simulators",
+     "lastCheckpoint",
      "furthestStep", "simulatorRestarts", "lastProgress", "faults", "goodput", "stepsLost"}
 )  # fmt: skip
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Self
 
 from palaestra.local.files import write
+from palaestra_sim.protocol.status import SuccessInterval
 
 FILE = "outcome.json"
 
@@ -60,7 +61,7 @@ def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
     What nobody measured is left out: a program of the user's own need not measure anything.
     """
     facts = {
-        "success rate": _shown(outcome.success_rate, "{:.0%}"),
+        "success rate": _success(outcome.success_rate, run_directory),
         "steps": _shown(outcome.steps, "{:,}"),
         "steps per second": _shown(outcome.steps_per_second, "{:.0f}"),
         "trained": _shown(outcome.trained_share, "{:.0%} of the wall clock"),
@@ -92,6 +93,17 @@ def typed(program: str) -> str:
         return program
     here = Path.cwd()
     return str(beside.relative_to(here)) if beside.is_relative_to(here) else str(beside)
+
+
+def _success(rate: float | None, run_directory: Path) -> str:
+    """Return the rate with its interval, which unfinished runs and those of an older release lack."""
+    try:
+        content = json.loads((run_directory / "summary.json").read_bytes())
+        interval = SuccessInterval.from_json(content["success_interval"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return _shown(rate, "{:.0%}")
+    bounds = f"95% interval {interval.low:.0%} to {interval.high:.0%}, {interval.episodes} episodes"
+    return _shown(rate, f"{{:.0%}} ({bounds})")
 
 
 def _lines(facts: Mapping[str, str]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from datetime import datetime
 
 from palaestra.api import Role, TrainingJob
 from palaestra.api.history import Goodput, LastAttempt
-from palaestra.api.status import Condition, ReplicaStatus
+from palaestra.api.status import Condition, ReplicaStatus, SuccessInterval
 from palaestra.client import Happening
 from palaestra.view.durations import ago, short
 from palaestra.view.tables import NOTHING, lines_of
@@ -91,7 +91,7 @@ def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
     yield "Why", ": ".join(each for each in (replica.reason, replica.message) if each)
     yield "Step", progress(replica)
     if replica.success_rate is not None:
-        yield "Success rate", f"{replica.success_rate:.0%} in the last evaluation"
+        yield "Success rate", _success(replica.success_rate, replica.success_interval)
     if replica.mean_return is not None:
         yield "Mean return", f"{replica.mean_return:.4g}"
     if replica.last_checkpoint is not None:
@@ -120,6 +120,14 @@ def progress(replica: ReplicaStatus) -> str:
         if replica.target and replica.target > replica.step:
             told += f", about {short((replica.target - replica.step) / replica.steps_per_second)} to go"
     return told
+
+
+def _success(rate: float, interval: SuccessInterval | None) -> str:
+    if interval is None:
+        return f"{rate:.0%} in the last evaluation"
+    return (
+        f"{rate:.0%} (95% interval {interval.low:.0%} to {interval.high:.0%}, {interval.episodes} episodes)"
+    )
 
 
 def _counts(counts: dict[str, int]) -> str:

@@ -34,6 +34,7 @@ __all__ = [
     "SimulatorRole",
     "SimulatorStatus",
     "StandbyState",
+    "SuccessInterval",
     "Termination",
     "TrainerStatus",
     "decoded",
@@ -71,6 +72,39 @@ class CheckpointStatus:
         """
         fields = Fields(content, path)
         return cls(step=fields.whole("step"), time=fields.time("time"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SuccessInterval:
+    """Where the true success rate of a policy lies, by the episodes that were played: a 95 % interval.
+
+    Attributes:
+        low: its lower bound, 0 to 1.
+        high: its upper bound, 0 to 1.
+        episodes: how many were played.
+    """
+
+    low: float
+    high: float
+    episodes: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {"low": self.low, "high": self.high, "episodes": self.episodes}
+
+    @classmethod
+    def from_json(cls, content: object, path: str = "") -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            ProtocolError: `content` is anything else.
+        """
+        fields = Fields(content, path)
+        return cls(
+            low=fields.number("low", 0.0, 1.0),
+            high=fields.number("high", 0.0, 1.0),
+            episodes=fields.whole("episodes", 1),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +173,10 @@ class TrainerStatus:
         target: steps at which the run ends.
         episodes: training episodes that ended.
         mean_return: of recent training episodes; None: none ended yet.
-        success_rate: of the last evaluation, 0 to 1; None: none yet.
+        success_rate: of the last evaluation or confirmation, 0 to 1; None: none yet, or the environment
+            reports no success.
+        success_interval: around `success_rate`; None: as there, or a trainer of an older release. Absent,
+            not null.
         steps_per_second: lately; None: not known.
         simulators: each of them.
         last_checkpoint: the newest; None: none yet.
@@ -160,6 +197,7 @@ class TrainerStatus:
     phase: str
     mean_return: float | None = None
     success_rate: float | None = None
+    success_interval: SuccessInterval | None = None
     steps_per_second: float | None = None
     simulators: tuple[SimulatorStatus, ...] = ()
     last_checkpoint: CheckpointStatus | None = None
@@ -189,7 +227,11 @@ class TrainerStatus:
             "goodput": {cause: known(seconds) for cause, seconds in self.goodput.items()},
             "steps_lost": self.steps_lost,
         }
-        return content if age_s is None else content | {"last_progress_age_s": age_s}
+        newer = {
+            "success_interval": None if self.success_interval is None else self.success_interval.to_json(),
+            "last_progress_age_s": age_s,
+        }
+        return content | _without_absent(newer)
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
@@ -206,6 +248,7 @@ class TrainerStatus:
             phase=fields.text("phase", MOST_NAME, least=1),
             mean_return=fields.number("mean_return") if fields.has("mean_return") else None,
             success_rate=_share(fields),
+            success_interval=_interval(fields),
             steps_per_second=_speed(fields),
             simulators=fields.parts("simulators", SimulatorStatus.from_json, MOST_SIMULATORS),
             last_checkpoint=_checkpoint(fields),
@@ -270,7 +313,9 @@ class Termination:
     Attributes:
         step: valid environment steps learned from.
         reason: why it ended, in a sentence.
-        success_rate: of the last evaluation, 0 to 1; None: none.
+        success_rate: of the last evaluation or confirmation, 0 to 1; None: none, or the environment
+            reports no success.
+        success_interval: around `success_rate`; None: as there. Absent, not null.
         last_checkpoint: the newest; None: none.
         attempt: number of this attempt by the run directory's record, from 1; None: not recorded.
         restarts: of simulators after faults, in this attempt; None: not told.
@@ -281,6 +326,7 @@ class Termination:
     step: int
     reason: str
     success_rate: float | None = None
+    success_interval: SuccessInterval | None = None
     last_checkpoint: CheckpointStatus | None = None
     attempt: int | None = None
     restarts: int | None = None
@@ -309,7 +355,7 @@ class Termination:
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, texts and lists cut to what a reader takes."""
         checkpoint = self.last_checkpoint
-        return {
+        content = {
             "step": self.step,
             "reason": clipped(self.reason, MOST_REASON),
             "success_rate": known(self.success_rate),
@@ -319,6 +365,10 @@ class Termination:
             "log": [clipped(line, MOST_LINE) for line in self.log[-MOST_LINES:]],
             "faults": [fault.to_json() for fault in self.faults[-MOST_FAULTS:]],
         }
+        interval = self.success_interval
+        return content | _without_absent(
+            {"success_interval": None if interval is None else interval.to_json()}
+        )
 
     @classmethod
     def from_message(cls, message: str) -> Self:
@@ -341,6 +391,7 @@ class Termination:
             step=fields.whole("step"),
             reason=fields.text("reason", MOST_REASON),
             success_rate=_share(fields),
+            success_interval=_interval(fields),
             last_checkpoint=_checkpoint(fields),
             attempt=_attempt(fields),
             restarts=fields.whole("restarts") if fields.has("restarts") else None,
@@ -378,6 +429,16 @@ def _attempt(fields: Fields) -> int | None:
 
 def _share(fields: Fields) -> float | None:
     return fields.number("success_rate", 0.0, 1.0) if fields.has("success_rate") else None
+
+
+def _interval(fields: Fields) -> SuccessInterval | None:
+    name = "success_interval"
+    return fields.part(name, SuccessInterval.from_json) if fields.has(name) else None
+
+
+def _without_absent(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields that are set; releases up to a5276f3 refuse a field that they do not know."""
+    return {name: value for name, value in content.items() if value is not None}
 
 
 def _speed(fields: Fields) -> float | None:

@@ -1,0 +1,33 @@
+"""What belongs to one attempt of a run, for the parts of the training loop that share it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.display import Display
+from palaestra_trainer.interruption import Interruption
+from palaestra_trainer.progress import Progress
+from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.simulators.fleet import Fleet
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """One attempt of a run, whose simulators are up.
+
+    Attributes:
+        configuration: what is trained.
+        directory: where the run is kept.
+        fleet: its simulators.
+        progress: how far it is.
+        interruption: raises once a signal has come.
+        display: shows the progress to a person.
+    """
+
+    configuration: Configuration
+    directory: RunDirectory
+    fleet: Fleet
+    progress: Progress
+    interruption: Interruption
+    display: Display
