@@ -118,7 +118,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     `render()` is not implemented: it raises NotImplementedError. `close()` leaves the simulator
     running: its pod ends it, or the program that started it. A simulator of PALAESTRA_CONFIG is free
-    for another environment then.
+    for another environment then, and a stub that `gymnasium.make` started for it alone ends.
 
     Args:
         robot: what is driven.
