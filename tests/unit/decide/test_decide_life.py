@@ -60,7 +60,9 @@ def test_a_config_map_that_somebody_deleted_is_made_again(training):
 
 def test_a_config_map_of_an_earlier_version_is_made_again_as_it_was(training):
     """It held each simulator's own world; its name, which the Job mounts, has a hash of them."""
-    scene, _ = training()
+    stored = {"recycle": {"afterResets": 24}}  # the default then, written out by the API server
+    roles = {"collect": "Collect", "evaluate": "Evaluate"}
+    scene, _ = training(simulators=[{"name": name, "role": role, **stored} for name, role in roles.items()])
     scene.objects["config_maps"].clear()
     volume = scene.job()["spec"]["template"]["spec"]["volumes"][0]
     volume["configMap"]["name"] = "job-0-6311dc3b59"  # what a5276f3 called it

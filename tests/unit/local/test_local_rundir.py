@@ -81,7 +81,7 @@ def test_a_default_that_is_new_since_a_run_began_makes_it_no_other_job(tmp_path)
     """An upgrade between two attempts: what nobody asked for then is what nobody asks for now."""
     job = validate({**JOB, "spec": {"trainer": {"algorithm": {"name": "PPO", "normalize": {}}}}})
     old = rundir.record_of(job)
-    del old["spec"]["backoffLimit"], old["spec"]["network"], old["spec"]["simulators"][1]["recycle"]
+    del old["spec"]["backoffLimit"], old["spec"]["network"], old["spec"]["simulators"][1]["standby"]
     del old["spec"]["trainer"]["algorithm"]["normalize"]["rewards"]
     rundir.prepare(tmp_path, old)
 
@@ -96,6 +96,16 @@ def test_a_field_that_is_new_since_a_run_began_is_a_change_once_it_is_set(tmp_pa
 
     with pytest.raises(Refused, match=r"spec.seed: was 1, is 7\n"):
         rundir.refuse_another_job(tmp_path, rundir.record_of(validate({**JOB, "spec": {"seed": 7}})))
+
+
+def test_a_default_of_an_older_release_that_is_left_out_now_is_no_change(tmp_path):
+    """Up to a5276f3 every group was written with afterResets: 24, which nobody had asked for."""
+    before = {"name": "a", "startDeadlineSeconds": 60, "recycle": {"afterResets": 24}}
+    rundir.prepare(tmp_path, record(simulators=[before]))
+
+    rundir.refuse_another_job(tmp_path, record())
+    with pytest.raises(Refused, match=r"recycle.afterResets: was 24, is 3"):
+        rundir.refuse_another_job(tmp_path, record(simulators=[before | {"recycle": {"afterResets": 3}}]))
 
 
 def test_the_record_of_a_newer_release_is_compared_as_it_stands(tmp_path):

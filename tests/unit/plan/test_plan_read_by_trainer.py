@@ -78,7 +78,24 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
     assert (collect.min_simulators, collect.standby) == (1, True)
     assert collect.recycle == Recycle(after_resets=24, after_minutes=90, above_memory_bytes=400 * 2**20)
     assert (evaluate.min_simulators, evaluate.standby) == (1, False)
-    assert evaluate.recycle == Recycle(after_resets=24)
+    assert evaluate.recycle is None
+
+
+@pytest.mark.parametrize(
+    ("group", "read"),
+    [
+        ({}, None),
+        ({"driver": "webots", "image": "webots:1"}, Recycle(after_resets=24)),
+        ({"driver": "command", "image": "own:1", "command": ["own"]}, Recycle(after_resets=24)),
+        ({"recycle": {"afterResets": 24}}, Recycle(after_resets=24)),
+    ],
+    ids=["stub", "webots", "command", "stored job"],
+)
+def test_the_stub_alone_is_not_recycled_unless_the_job_says_so(make_job, group, read):
+    """Its restarts took a fifth of a training; the paper's simulator ended at the 25th reset."""
+    job = make_job(simulators=[COLLECT | group, EVALUATE])
+
+    assert read_back(job).simulators[0].recycle == read
 
 
 def test_a_simulator_that_is_never_recycled_has_no_limit(make_job):

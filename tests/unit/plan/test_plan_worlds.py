@@ -116,7 +116,8 @@ def test_only_the_replicas_that_are_asked_for_are_planned(make_job):
 
 def test_a_job_of_an_earlier_version_gets_its_own_config_map_again(make_job):
     """Those held a world a simulator; the name has a hash of every byte of it and of training.yaml."""
-    job = make_job(simulators=[group(count=2), EVALUATE])
+    stored = {"recycle": {"afterResets": 24}}  # the default then, written out by the API server
+    job = make_job(simulators=[group(count=2, **stored), EVALUATE | stored])
     planned = plan(job, LAYOUT, mounted={0: {EARLIER}})
 
     assert planned.replicas[0].config_map["metadata"]["name"] == EARLIER

@@ -121,9 +121,6 @@ class Recycle(ApiModel):
     )
 
 
-AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended there with a bus error
-
-
 class Restart(ApiModel):
     """How many faults of one simulator are survived."""
 
@@ -165,8 +162,9 @@ class SimulatorGroup(ApiModel):
     world: World = World(builtin=Builtin.ARENA)
     """The source world, from exactly one of four places."""
 
-    recycle: Recycle = AFTER_24_RESETS
-    """When a healthy simulator is started anew between two episodes. Simulators leak memory and time."""
+    recycle: Recycle | None = None
+    """When a healthy simulator is started anew between two episodes; absent: after 24 resets, or never
+    with driver `stub`, which neither leaks nor slows down."""
 
     standby: bool = False
     """True: a second simulator stands by in the same container and takes over at once when the first

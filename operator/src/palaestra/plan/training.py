@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from palaestra.api.simulators import Recycle
+from palaestra.api.simulators import Driver, Recycle, SimulatorGroup
 from palaestra.plan.replica import Replica, Simulator
 from palaestra.plan.resources import asks_for_gpu, in_bytes
 from palaestra.plan.text import as_yaml
@@ -12,6 +12,8 @@ from palaestra_sim.world import name_prefix
 
 FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
+NEVER = Recycle(after_resets=0)
+AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended there with a bus error
 
 
 def training_yaml(replica: Replica, files: Mapping[str, bytes]) -> bytes:
@@ -65,7 +67,7 @@ def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes
         "world": world_path(replica, simulator, files),
         "namesPrefix": name_prefix(simulator.identity),
     }
-    if limits := _limits(group.recycle):
+    if limits := _limits(recycling(group)):
         described["recycle"] = limits
     if group.standby:
         described["standby"] = True
@@ -75,6 +77,13 @@ def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes
     }
     described["startDeadlineSeconds"] = group.start_deadline_seconds
     return described
+
+
+def recycling(group: SimulatorGroup) -> Recycle:
+    """Return when the simulators of a group are recycled, also where the job does not say."""
+    if group.recycle is not None:
+        return group.recycle
+    return NEVER if group.driver is Driver.STUB else AFTER_24_RESETS
 
 
 def _limits(recycle: Recycle) -> dict[str, int]:
