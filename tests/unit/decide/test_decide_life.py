@@ -60,9 +60,14 @@ def test_a_config_map_that_somebody_deleted_is_made_again(training):
 
 def test_a_config_map_of_an_earlier_version_is_made_again_as_it_was(training):
     """It held each simulator's own world; its name, which the Job mounts, has a hash of them."""
-    stored = {"recycle": {"afterResets": 24}}  # the default then, written out by the API server
-    roles = {"collect": "Collect", "evaluate": "Evaluate"}
-    scene, _ = training(simulators=[{"name": name, "role": role, **stored} for name, role in roles.items()])
+    world = {"inline": '#VRML_SIM R2023b utf8\nRobot { name "robotino" controller "ros" }\n'}
+    stored = {"world": world, "recycle": {"afterResets": 24}}  # the default then, written out
+    scene, _ = training(
+        simulators=[
+            {"name": "collect", "role": "Collect", **stored},
+            {"name": "evaluate", "role": "Evaluate", **stored},
+        ]
+    )
     scene.objects["config_maps"].clear()
     volume = scene.job()["spec"]["template"]["spec"]["volumes"][0]
     volume["configMap"]["name"] = "job-0-6311dc3b59"  # what a5276f3 called it
