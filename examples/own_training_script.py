@@ -2,8 +2,9 @@
 
 It runs where the built-in loop would: the simulators of the TrainingJob are there, and every
 environment that is made takes one that has its role. A fault is not mended here.
-SIGTERM ends it after the step that is under way, with the model saved and an exit code that asks
-to be started again; started again, it goes on from there.
+It saves its model as often as the job says, and reports its steps, so that the operator sees it
+come forward. SIGTERM ends it after the step that is under way, with the model saved and an exit
+code that asks to be started again; started again, it goes on from there.
 """
 
 import os
@@ -14,11 +15,12 @@ from pathlib import Path
 
 import gymnasium
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from palaestra_trainer import environments
+from palaestra_trainer import environments, report
 from palaestra_trainer.configuration import load
 
 gymnasium.register_envs(environments)  # MoveToTargetEnv-v0
@@ -36,6 +38,28 @@ def make(role: str = "Collect") -> gymnasium.Env:
     return Monitor(gymnasium.make(task.id, role=role, reward=task.reward, **task.options))
 
 
+def save(model: PPO) -> None:
+    """Replace the saved model at once: a kill amid a save leaves the one before."""
+    model.save(run / "unfinished.zip")
+    (run / "unfinished.zip").replace(saved)
+
+
+class Progress(BaseCallback):
+    """Reports before each rollout, when the model is whole, and saves when it is time."""
+
+    def _on_training_start(self) -> None:
+        self.next_save = self.num_timesteps + job.checkpoint.every_steps
+
+    def _on_rollout_start(self) -> None:
+        report(step=self.num_timesteps)
+        if self.num_timesteps >= self.next_save:
+            save(self.model)
+            self.next_save += job.checkpoint.every_steps
+
+    def _on_step(self) -> bool:
+        return not interrupted.is_set()
+
+
 envs = DummyVecEnv([make] * len(job.with_role("Collect")))
 if saved.exists():
     model = PPO.load(saved, envs, device=job.device)
@@ -43,8 +67,9 @@ else:
     settings = {"n_steps": 512, "batch_size": 128, "gamma": 0.97, "seed": job.seed, "device": job.device}
     model = PPO("MlpPolicy", envs, tensorboard_log=str(run / "tensorboard"), **settings)
 missing = max(0, job.steps - model.num_timesteps)
-model.learn(missing, lambda *_: not interrupted.is_set(), reset_num_timesteps=False)
-model.save(saved)
+model.learn(missing, Progress(), reset_num_timesteps=False)
+save(model)
+report(step=model.num_timesteps)
 
 if interrupted.is_set():
     sys.exit(75)  # interrupted, start me again

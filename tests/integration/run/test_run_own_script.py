@@ -18,8 +18,9 @@ def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job(run):
 
     assert code == 0, output
     assert PPO.load(training.directory / "model.zip", device="cpu").num_timesteps == ROLLOUT
-    said = output.splitlines()[-3:]
+    said = output.splitlines()[-4:]
     assert "mean return" in said[0]
     assert said[0].endswith("over 2 episodes")
-    assert said[1].split() == ["run", "directory", str(training.directory)]
-    assert said[2].endswith(f"tensorboard --logdir {training.directory / 'tensorboard'}")
+    assert said[1].split() == ["steps", str(ROLLOUT)]  # as the script has reported
+    assert said[2].split() == ["run", "directory", str(training.directory)]
+    assert said[3].endswith(f"tensorboard --logdir {training.directory / 'tensorboard'}")

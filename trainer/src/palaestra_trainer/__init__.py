@@ -15,3 +15,22 @@ def load_policy(run_or_zip: str | Path) -> Policy:
     from palaestra_trainer import policies  # noqa: PLC0415 - PyTorch takes seconds to import
 
     return policies.load_policy(run_or_zip)
+
+
+def report(*, step: int, success_rate: float | None = None) -> None:
+    """Report how far a program of one's own is, for /status, /metrics and the operator.
+
+    Call it at least once in `stallDeadlineSeconds`: the operator ends a program that reported once and whose
+    step then stands still for longer. Without PALAESTRA_CONFIG, as in a notebook, nothing happens.
+
+    Args:
+        step: environment steps learned from, over all attempts; the program is complete at the job's `steps`.
+        success_rate: of the last evaluation, 0 to 1; None: as before.
+
+    Raises:
+        ValueError: the step is negative, or the rate not within 0 to 1.
+        ConfigurationError: the configuration cannot be read, or its statusAddress is in use.
+    """
+    from palaestra_trainer import reporting  # noqa: PLC0415 - what it imports takes seconds
+
+    reporting.report(step, success_rate)

@@ -58,9 +58,13 @@ class StatusServer:
         host, port = self._server.server_address[:2]
         return f"{host!s}:{port}"
 
+    def start(self) -> None:
+        """Begin to answer, until the process ends or the context is left."""
+        self._thread.start()
+
     def __enter__(self) -> Self:
         """Begin to answer."""
-        self._thread.start()
+        self.start()
         return self
 
     def __exit__(

@@ -409,7 +409,8 @@ ROWS: dict[Reason, Row] = {
         "ask for nodes that stay, or checkpoint more often",
         "`noProgressLimit`: the cluster takes pods faster than they come forward, or the trainer always "
         "exits with 75",
-        "lower `spec.trainer.checkpoint.everySteps`, or use nodes that are not taken away",
+        "lower `spec.trainer.checkpoint.everySteps`, or use nodes that are not taken away; a program of "
+        "your own (`trainer.command`) must report its steps with `palaestra_trainer.report`",
     ),
     Reason.JOB_FAILED: Row(
         "the Job failed: {words}",

@@ -1,0 +1,125 @@
+"""Programs of one's own report how far they are: each here is a process that reports and waits."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from urllib.request import urlopen
+
+import pytest
+import yaml
+
+from palaestra_sim.protocol.status import Termination, TrainerStatus
+from palaestra_trainer import report
+
+LONG_S = 60
+PROGRAM = """
+import sys
+from palaestra_trainer import report
+for line in sys.stdin:
+    report(**eval(line))
+    print("reported", flush=True)
+"""
+
+
+@pytest.fixture
+def address():
+    """An address that is free now."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return f"127.0.0.1:{listener.getsockname()[1]}"
+
+
+@pytest.fixture
+def program(tmp_path, address):
+    """Start a program with a configuration of 1000 steps; each call returns when it has reported."""
+    job = {
+        "job": "own",
+        "environment": {"id": "Task-v0"},
+        "steps": 1000,
+        "statusAddress": address,
+        "simulators": [{"name": "a-0", "group": "a", "index": 0, "role": "Collect"}],
+    }
+    (tmp_path / "training.yaml").write_text(yaml.safe_dump(job))
+    variables = {
+        "PALAESTRA_CONFIG": str(tmp_path / "training.yaml"),
+        "PALAESTRA_TERMINATION_LOG": str(tmp_path / "word"),
+    }
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM],
+        env=os.environ | variables,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+
+        def reports(**arguments):
+            process.stdin.write(f"{arguments!r}\n")
+            process.stdin.flush()
+            assert process.stdout.readline() == "reported\n"
+
+        yield reports
+        process.stdin.close()
+        assert process.wait(LONG_S) == 0
+
+
+def answer(address, path):
+    """Return what the program answers."""
+    with urlopen(f"http://{address}{path}", timeout=LONG_S) as response:
+        return response.read().decode()
+
+
+def test_a_program_that_reports_answers_as_the_built_in_loop_does(program, address):
+    """The operator reads /status, and Prometheus /metrics, of every trainer."""
+    program(step=10, success_rate=0.5)
+    program(step=20)
+
+    status = TrainerStatus.from_json(json.loads(answer(address, "/status")))
+    lines = answer(address, "/metrics").splitlines()
+    assert (status.step, status.target, status.success_rate, status.phase) == (20, 1000, 0.5, "training")
+    assert status.last_progress is not None
+    assert "palaestra_trainer_steps_total 20.0" in lines
+    assert answer(address, "/healthz") == "ok\n"
+
+
+def test_what_a_program_spends_its_time_on_is_not_known(program, address):
+    """A second that is counted under the wrong cause is worse than none."""
+    program(step=10)
+
+    assert json.loads(answer(address, "/status"))["goodput"] == {}
+    assert not [line for line in answer(address, "/metrics").splitlines() if "seconds_total{cause" in line]
+
+
+def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_path):
+    """It may end before it is asked once more."""
+    program(step=999)
+    before = (tmp_path / "word").exists()
+
+    program(step=1000, success_rate=0.75)
+
+    word = Termination.from_message((tmp_path / "word").read_text())
+    assert not before
+    assert (word.step, word.success_rate) == (1000, 0.75)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "mistake"),
+    [
+        ({"step": -1}, "step: -1 is negative"),
+        ({"step": 1, "success_rate": 95}, "95 is no share"),
+    ],
+)
+def test_a_report_of_what_cannot_be_is_refused(arguments, mistake):
+    """Percent would pass for a very good policy."""
+    with pytest.raises(ValueError, match=mistake):
+        report(**arguments)
+
+
+def test_a_report_outside_of_a_job_does_nothing(monkeypatch):
+    """The same program runs in a notebook."""
+    monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
+
+    report(step=1)

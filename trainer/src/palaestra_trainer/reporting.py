@@ -1,0 +1,60 @@
+"""How far a program of one's own is (`trainer.command`), for /status, /metrics and the operator.
+
+The built-in loop reports by itself. Without a report the operator knows no step of a program, so it cannot
+see that attempts which are preempted come forward, and ends the replica as `NoProgress`.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import replace
+from functools import cache
+
+from palaestra_sim.protocol.status import Termination
+from palaestra_trainer.configuration import CONFIG_VARIABLE, load
+from palaestra_trainer.metrics import constants
+from palaestra_trainer.progress import Counters, Progress
+from palaestra_trainer.status_server import StatusServer
+from palaestra_trainer.termination import write_last_word
+
+_lock = threading.Lock()
+
+
+class _Reported(Progress):
+    """Where a program of one's own stands; what its time is spent on is not known."""
+
+    @property
+    def phase(self) -> str:
+        return "training"
+
+    def counted(self, kept: int | None = None) -> Counters:
+        return replace(super().counted(kept), goodput={})
+
+
+def report(step: int, success_rate: float | None) -> None:
+    """Report as `palaestra_trainer.report` says."""
+    if step < 0:
+        raise ValueError(f"step: {step} is negative; give the environment steps that were learned from")
+    if success_rate is not None and not 0 <= success_rate <= 1:
+        raise ValueError(f"success_rate: {success_rate} is no share; give a number from 0 to 1")
+    if not os.environ.get(CONFIG_VARIABLE):
+        return
+    with _lock:
+        progress = _served()
+        progress.step = step
+        progress.stepped(1)
+        if success_rate is not None:
+            progress.success_rate = success_rate
+    if step >= progress.target:
+        done = "Completed: all steps are done"
+        write_last_word(Termination(step=step, reason=done, success_rate=progress.success_rate))
+
+
+@cache
+def _served() -> _Reported:
+    """Return the progress of this process, served from the first call on until the process ends."""
+    configuration = load()
+    progress = _Reported(configuration.steps, [])
+    StatusServer(configuration.status_address, progress, constants(configuration)).start()
+    return progress
