@@ -43,7 +43,7 @@ def take():
 
     yield next_name
     for each in claims:
-        each.release()
+        each.lock.release()
 
 
 def test_each_environment_has_a_simulator_of_its_own(take):
@@ -68,15 +68,17 @@ def test_a_released_simulator_can_be_claimed_again():
     configuration = make_configuration("Collect")
     first = claim(configuration, "Collect")
 
-    first.release()
-    first.release()
+    first.lock.release()
+    first.lock.release()
 
     second = claim(configuration, "Collect")
     assert second.simulator.name == "s-0"
-    second.release()
+    second.lock.release()
 
 
-def _claim_and_name(configuration):
+def _claim_and_name(configuration, folder=None):
+    if folder is not None:  # a server that starts workers has the variables of the test that started it
+        os.environ["ROS_LOG_DIR"] = str(folder)
     try:
         return claim(configuration, "Collect").simulator.name
     except ConfigurationError:
@@ -90,13 +92,13 @@ def _claim_and_die(configuration):
 
 @pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
-def test_worker_processes_have_simulators_of_their_own(take, method):
+def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
     """Each method by which libraries start their workers; a forked one must not share its parent's claim."""
     configuration = make_configuration("Collect", "Collect")
     mine = take(configuration)
 
     with ProcessPoolExecutor(1, multiprocessing.get_context(method)) as worker:
-        theirs = worker.submit(_claim_and_name, configuration).result(LONG_S)
+        theirs = worker.submit(_claim_and_name, configuration, scratch).result(LONG_S)
         assert (mine, theirs) == ("s-0", "s-1")
         with pytest.raises(ConfigurationError, match="each of them has an environment"):
             take(configuration)
@@ -109,11 +111,11 @@ def test_a_forked_worker_does_not_release_its_parents_claim():
     mine = claim(configuration, "Collect")
 
     with ProcessPoolExecutor(1, multiprocessing.get_context("fork")) as worker:
-        worker.submit(mine.release).result(LONG_S)
+        worker.submit(mine.lock.release).result(LONG_S)
         assert worker.submit(_claim_and_name, configuration).result(LONG_S) is None
 
-    assert mine.held
-    mine.release()
+    assert mine.lock.held
+    mine.lock.release()
 
 
 def test_a_killed_process_leaves_no_claim(take):

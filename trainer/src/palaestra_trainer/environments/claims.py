@@ -1,52 +1,23 @@
-"""Which process drives which simulator: a lock on one file for each, in the container's scratch folder.
-
-The kernel frees the lock with its process, however that ends. The locks are POSIX record locks, which a
-forked process does not inherit. It would inherit those of `flock`, and of the libraries above it, but a
-worker that was forked must neither share its parent's claim nor release it. Within one process a record
-lock excludes nothing, so a set has the claims of this one.
-"""
+"""Which process drives which simulator: a lock on one file for each, in the container's scratch folder."""
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import tempfile
-import threading
 from pathlib import Path
+from typing import NamedTuple
 
 from palaestra_trainer.configuration import Configuration, Role, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
-
-_held: set[tuple[int, Path]] = set()
-_held_lock = threading.Lock()
+from palaestra_trainer.locks import FileLock
 
 
-class Claim:
-    """One simulator, held by this process until `release` or its end.
+class Claim(NamedTuple):
+    """One simulator, and the lock that keeps other environments from it."""
 
-    Attributes:
-        simulator: the entry of the configuration.
-    """
-
-    def __init__(self, simulator: SimulatorConfiguration, path: Path, descriptor: int) -> None:
-        self.simulator = simulator
-        self._path = path
-        self._descriptor: int | None = descriptor
-        self._owner = os.getpid()
-
-    @property
-    def held(self) -> bool:
-        """Whether this process holds it; a process that was forked since does not."""
-        return self._descriptor is not None and self._owner == os.getpid()
-
-    def release(self) -> None:
-        """Free the simulator for another environment; safe to repeat, without effect in a forked process."""
-        with _held_lock:
-            if self.held and self._descriptor is not None:
-                os.close(self._descriptor)
-                self._descriptor = None
-                _held.discard((self._owner, self._path))
+    simulator: SimulatorConfiguration
+    lock: FileLock
 
 
 def claim(configuration: Configuration, role: Role) -> Claim:
@@ -57,40 +28,19 @@ def claim(configuration: Configuration, role: Role) -> Claim:
     """
     simulators = configuration.with_role(role)
     for simulator in simulators:
-        if claimed := _claim(simulator, _path(configuration, simulator)):
-            return claimed
+        if lock := _lock(_path(configuration, simulator)):
+            return Claim(simulator, lock)
     raise ConfigurationError(_none_left(len(simulators), role, len(configuration.simulators)))
 
 
-def _claim(simulator: SimulatorConfiguration, path: Path) -> Claim | None:
-    with _held_lock:
-        mine = (os.getpid(), path)
-        if mine in _held:  # to open and close the file once more would free the lock
-            return None
-        descriptor = _locked(path)
-        if descriptor is None:
-            return None
-        _held.add(mine)
-        return Claim(simulator, path, descriptor)
-
-
-def _locked(path: Path) -> int | None:
+def _lock(path: Path) -> FileLock | None:
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        return FileLock.acquire(path)
     except OSError as error:
         raise ConfigurationError(
             f"{path}: the lock of a simulator cannot be written ({error.strerror}); "
             "let ROS_LOG_DIR name a folder of this user's"
         ) from error
-    try:
-        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        return None
-    except OSError:
-        os.close(descriptor)
-        raise
-    return descriptor
 
 
 def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Path:

@@ -70,13 +70,13 @@ def configured_simulator(role: Role) -> Configured:
         [simulator] = connect(_alone(configuration, claimed.simulator.name))
         simulator.start()
     except BaseException:
-        claimed.release()
+        claimed.lock.release()
         raise
 
     def release() -> None:
-        if claimed.held:
+        if claimed.lock.held:
             simulator.close()
-            claimed.release()
+            claimed.lock.release()
 
     return Configured(name=simulator.name, robot=simulator.robot, scene=simulator.scene, release=release)
 

@@ -122,7 +122,7 @@ class RosSubscriber:
         self._drop()
         if self._registered:
             self._registered = False
-            # A master that is gone has forgotten us already; one that is out of its mind cannot be helped.
+            # A master that is gone has forgotten us; one that answers garbage takes no request.
             with contextlib.suppress(MasterLost, UnreadableAnswer):
                 Master(ensure_node()).unregister_subscriber(self.name, node_uri())
 

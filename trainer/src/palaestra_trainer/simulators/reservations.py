@@ -1,19 +1,17 @@
 """ROS names that no other simulator of this machine may take, from before its start to its end.
 
-A name is free if no node of it runs and no program has reserved it. A reservation is a lock of the kernel on
-a file, so it ends with the process that holds it.
+A name is free if no node of it runs and no program has reserved it.
 """
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import hashlib
 import os
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+from palaestra_trainer.locks import FileLock
 from palaestra_trainer.ros import Master
 
 
@@ -21,7 +19,7 @@ class Reservation:
     """The names that one simulator holds."""
 
     def __init__(self) -> None:
-        self._locks = contextlib.ExitStack()
+        self._locks: list[FileLock] = []
 
     def take(self, names: Iterable[str]) -> bool:
         """Reserve all of `names`; False: one of them is in use, and none is held.
@@ -38,17 +36,14 @@ class Reservation:
 
     def release(self) -> None:
         """Let others have the names."""
-        self._locks.close()
+        while self._locks:
+            self._locks.pop().release()
 
     def _lock(self, what: str) -> bool:
-        file = _folder() / hashlib.sha256(what.encode()).hexdigest()[:16]
-        lock = os.open(file, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
-        self._locks.callback(os.close, lock)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True
+        lock = FileLock.acquire(_folder() / hashlib.sha256(what.encode()).hexdigest()[:16])
+        if lock is not None:
+            self._locks.append(lock)
+        return lock is not None
 
 
 def _folder() -> Path:
