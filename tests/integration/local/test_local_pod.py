@@ -99,7 +99,7 @@ def test_a_trainer_is_waited_for_until_its_first_line(stage, first, lines):
 def test_a_failed_startup_probe_restarts_the_sidecar(stage):
     """The kubelet's rule: a program that started but does not answer gets another try."""
     file = stage.folder / "ready"
-    probe = Probe(command=("test", "-e", str(file)), period_s=0.05, timeout_s=10, failure_threshold=4)
+    probe = Probe(command=("test", "-e", str(file)), period_s=0.05, timeout_s=10, failure_threshold=40)
     script = f"event start; [ $(wc -l < {stage.folder}/events) = 2 ] && touch {file}; sleep 60"
 
     stage.run(stage.container("late", script, startup=probe), main="event run", grace_s=0.1)

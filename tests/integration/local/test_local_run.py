@@ -30,11 +30,12 @@ for simulator in config["simulators"]:
 WAIT = """\
 import os, pathlib, signal, sys
 run = pathlib.Path(os.environ["PALAESTRA_RUN"])
-signal.signal(signal.SIGTERM, lambda *_: sys.exit(75))
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM])  # one that comes before the wait is not missed
 (run / "begun").touch()
 print("waiting", file=sys.stderr)
 while True:
-    signal.pause()
+    signal.sigwait([signal.SIGTERM])
+    sys.exit(75)
 """
 START = """\
 import os, pathlib, yaml

@@ -84,7 +84,8 @@ def assert_apart(envs):
 
 def test_each_worker_of_stable_baselines3_drives_a_simulator_of_its_own(simulators):
     """SubprocVecEnv starts its workers from a server process, which is the third method."""
-    make = partial(make_environment, {name: os.environ[name] for name in ("PALAESTRA_CONFIG", "ROS_LOG_DIR")})
+    ours = {name: value for name, value in os.environ.items() if name.startswith(("PALAESTRA_", "ROS_"))}
+    make = partial(make_environment, ours)
     envs = SubprocVecEnv([make] * 2, start_method="forkserver")
     try:
         envs.seed(1)

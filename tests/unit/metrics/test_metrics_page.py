@@ -34,6 +34,7 @@ UNITLESS = {
     "palaestra_operator_queue_depth",
     "palaestra_simulator_state",
     "palaestra_simulator_up",
+    "palaestra_trainer_evaluation_episodes",
     "palaestra_trainer_evaluation_return_mean",
     "palaestra_trainer_episode_return",
     "palaestra_trainer_episode_return_mean",
