@@ -73,6 +73,8 @@ def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
 
     assert first.available()
     first.stop()
+    for robot in robots:
+        robot.close()
 
 
 def test_a_name_is_free_again_once_its_facade_is_closed(make, name):
