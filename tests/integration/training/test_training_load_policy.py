@@ -1,4 +1,4 @@
-"""A trained policy, loaded by whoever uses it."""
+"""A trained policy, loaded for use outside of its run."""
 
 import gymnasium
 import numpy as np

@@ -23,7 +23,7 @@ DEADLINE_S = 60.0
 
 @pytest.fixture
 def name():
-    """A ROS name that only this test uses, whoever shares its master."""
+    """A ROS name that only this test uses; other tests share its master."""
     return f"twin_{uuid.uuid4().hex[:8]}"
 
 

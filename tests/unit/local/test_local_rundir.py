@@ -99,7 +99,7 @@ def test_a_field_that_is_new_since_a_run_began_is_a_change_once_it_is_set(tmp_pa
 
 
 def test_a_default_of_an_older_release_that_is_left_out_now_is_no_change(tmp_path):
-    """Up to a5276f3 every group was written with afterResets: 24, which nobody had asked for."""
+    """Up to a5276f3 every group was written with afterResets: 24, a default of then."""
     before = {"name": "a", "startDeadlineSeconds": 60, "recycle": {"afterResets": 24}}
     rundir.prepare(tmp_path, record(simulators=[before]))
 
