@@ -1,0 +1,210 @@
+"""Sentences that a hurried reader must read twice, found by rule in docs, sources and configuration.
+
+Pure: text in, findings out. The rules are a list, `RULES`; code, quotes, tables, headings and questions are
+exempt. `python -m tests.contract.prose PATH...` prints what it finds.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import sys
+import tokenize
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+MOST_WORDS = 35
+WORD = re.compile(r"[A-Za-z0-9][\w'./-]*")
+# A full stop ends a sentence where a capital, a quote or a digit follows, so that "e.g. this" stays one.
+END = re.compile(r"(?<=[.!?])[)\"'”*]*\s+(?=[A-Z\"'“`(*\d])")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sentence:
+    """A sentence of running text and the line of its file on which its paragraph begins."""
+
+    line: int
+    text: str
+
+    @property
+    def is_question(self) -> bool:
+        """Whether it ends in a question mark, which exempts it."""
+        return self.text.rstrip(")\"'”*").endswith("?")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """A sentence that breaks a rule."""
+
+    path: Path
+    line: int
+    rule: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: {self.rule}: {self.text}"
+
+
+def contains(pattern: str) -> Callable[[str], bool]:
+    """Return a check for a pattern, in any case."""
+    compiled = re.compile(pattern, re.IGNORECASE)
+    return lambda text: compiled.search(text) is not None
+
+
+def is_long(text: str) -> bool:
+    """Return whether a sentence has more than `MOST_WORDS` words."""
+    return len(WORD.findall(text)) > MOST_WORDS
+
+
+RULES: dict[str, Callable[[str], bool]] = {
+    "whoever; name the program or person": contains(r"\bwho(so)?(m?ever|sever)\b"),
+    "is told; use report, log, return or show": contains(r"\b(is|are|was|were) told\b"),
+    "tells of; use report, log, return or show": contains(r"\btells (of|that|how)\b"),
+    "begins with What is, Who or That which; begin with the thing": contains(
+        r"^(what (is|are|was|were)|who|that which)\b"
+    ),
+    f"over {MOST_WORDS} words; make two sentences": is_long,
+}
+
+
+def findings(path: Path) -> list[Finding]:
+    """Return what the rules find in a file, in the order of its lines."""
+    return [
+        Finding(path=path, line=sentence.line, rule=rule, text=sentence.text)
+        for sentence in sentences(path)
+        if not sentence.is_question
+        for rule, breaks in RULES.items()
+        if breaks(sentence.text)
+    ]
+
+
+def sentences(path: Path) -> Iterator[Sentence]:
+    """Yield the sentences of running text in a file, by what its name says that it holds."""
+    text = path.read_text()
+    paragraphs = READERS.get(path.suffix, of_comments)(text)
+    for line, paragraph in paragraphs:
+        for sentence in END.split(" ".join(paragraph.split())):
+            yield Sentence(line=line, text=sentence)
+
+
+Paragraph = tuple[int, str]
+
+
+def of_markdown(text: str) -> Iterator[Paragraph]:
+    """Yield paragraphs and list items without code, tables, headings, quotes and the addresses of links."""
+    text = re.sub(r"^(```|~~~).*?^\1[^\n]*$", blank, text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"<!--.*?-->", blank, text, flags=re.DOTALL)
+    exempt = re.compile(r"\s*([#|>]|!\[|<|---)")
+    lines = [(number, "" if exempt.match(line) else line) for number, line in enumerate(text.split("\n"), 1)]
+    yield from of_lines([(number, without_code(line)) for number, line in lines])
+
+
+def of_lines(lines: Iterable[Paragraph]) -> Iterator[Paragraph]:
+    """Yield paragraphs: they end at an empty line, and at one that begins an item or a field."""
+    begins = re.compile(r"\s*([-*]|\d+\.)\s+|\s*[\w.`*\[\]/]+( \([^)]*\))?: +(?=\S)")
+    start, held = 0, ""
+    for number, line in [*lines, (0, "")]:
+        new = begins.match(line)
+        if held and (new or not line.strip()):
+            yield start, held
+            held = ""
+        if line.strip():
+            start = start if held else number
+            held += " " + (line[new.end() :] if new else line)
+
+
+def of_python(text: str) -> Iterator[Paragraph]:
+    """Yield docstrings, comments and messages: strings of three words or more."""
+    yield from of_comments(text)
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.Expr(value=ast.Constant(value=str(docstring))):
+                yield from of_docstring(node.lineno, docstring)
+            case ast.JoinedStr(values=pieces):
+                yield node.lineno, without_code("".join(map(piece, pieces)))
+            case ast.Constant(value=str(words)) if is_message(words):
+                yield node.lineno, without_code(words)
+            case _:
+                pass
+
+
+def is_message(text: str) -> bool:
+    """Return whether a string may be a sentence: one line of words, no markup."""
+    return text.count(" ") > 1 and "\n" not in text and not text.lstrip().startswith(("{", "<", "|", "#"))
+
+
+def of_docstring(line: int, text: str) -> Iterator[Paragraph]:
+    """Yield the paragraphs of a docstring, at their lines; the headings of its sections are none."""
+    yield from (
+        (line + number - 1, paragraph)
+        for number, paragraph in of_markdown(re.sub(r"^\s*\w+:$", "", text, flags=re.MULTILINE))
+    )
+
+
+def of_comments(text: str) -> Iterator[Paragraph]:
+    """Yield comments; lines of one comment belong together."""
+    lines = dict(comments(text))
+    numbers = range(1, max(lines, default=0) + 1)
+    yield from of_lines([(number, without_code(lines.get(number, ""))) for number in numbers])
+
+
+def comments(text: str) -> Iterator[Paragraph]:
+    """Yield the comments of Python, or of any text in which `#` begins one at the start of a line."""
+    try:
+        tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
+    except (tokenize.TokenError, SyntaxError):
+        found = re.finditer(r"^[ \t]*#+ ?(.*)$", text, re.MULTILINE)
+        yield from ((text.count("\n", 0, match.start(1)) + 1, match[1]) for match in found)
+        return
+    yield from (
+        (token.start[0], token.string.lstrip("#! "))
+        for token in tokens
+        if token.type == tokenize.COMMENT and not re.match(r"#!|# (noqa|type:|pyright)", token.string)
+    )
+
+
+READERS: dict[str, Callable[[str], Iterator[Paragraph]]] = {".md": of_markdown, ".py": of_python}
+
+
+def piece(node: ast.expr) -> str:
+    """Return a part of an f-string as text; a value counts as one word."""
+    return str(node.value) if isinstance(node, ast.Constant) else "x"
+
+
+def without_code(text: str) -> str:
+    """Return text with code as one word, quotes left out, and links as their text."""
+    text = re.sub(r"`[^`]*`", "x", text)
+    text = re.sub(r"[\"“][^\"”]*[\"”]", "x", text)
+    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+
+
+def blank(match: re.Match[str]) -> str:
+    """Return as many empty lines as the match has."""
+    return "\n" * match[0].count("\n")
+
+
+def main() -> None:
+    """Print the findings in the files given, and in the folders given those of text."""
+    found = 0
+    for path in files(Path(it) for it in sys.argv[1:]):
+        for finding in findings(path):
+            found += 1
+            sys.stdout.write(f"{finding}\n")
+    sys.exit(bool(found))
+
+
+def files(paths: Iterable[Path]) -> Iterator[Path]:
+    """Yield files, and those of folders whose names say that they hold text."""
+    for path in paths:
+        if path.is_dir():
+            yield from sorted(
+                it for it in path.rglob("*") if it.suffix in {".md", ".py", ".sh", ".toml", ".yaml", ".tpl"}
+            )
+        else:
+            yield path
+
+
+if __name__ == "__main__":
+    main()
