@@ -9,7 +9,7 @@ import json
 import sys
 import time
 
-from tests.bench import learning, newcomer, operator, operator_planning, parallel, runs, stepping
+from tests.bench import learning, newcomer, operator, operator_planning, parallel, plain, runs, stepping
 
 PARTS = {
     "stepping": stepping.measure,
@@ -20,6 +20,7 @@ PARTS = {
     "operator": operator.measure,
     "planning": operator_planning.measure,
     "newcomer": newcomer.measure,
+    "plain": plain.measure,
     "learning": learning.measure,
 }
 

@@ -1,0 +1,62 @@
+"""`make run` beside plain Stable-Baselines3 on the same task: what simulators, ROS and restarts cost.
+
+Plain means one process without a simulator: `fake_arena` computes the task, SB3 evaluates the policy.
+Steps, hyperparameters, evaluations and the confirmation's episodes are those of the example.
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+
+import torch
+from stable_baselines3 import DQN
+from stable_baselines3.common.callbacks import EvalCallback
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+
+from palaestra_trainer.algorithms.values import arguments
+from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.testing import fake_arena
+from tests.local_run import PALAESTRA
+from tests.soak.jobs import example
+
+JOB = "move-to-target"
+CONFIRMING = 100  # episodes: evaluation.confirmEpisodes, which the example leaves out
+
+
+def measure():
+    """Return the seconds of both, one after the other, and how many times plain training the run takes."""
+    plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain"])
+    with tempfile.TemporaryDirectory() as folder:
+        run_s = seconds_of([PALAESTRA, "run", f"manifests/examples/{JOB}.yaml", "--dir", folder])
+    return {
+        "seconds": round(run_s),
+        "plain_seconds": round(plain_s),
+        "times_plain": round(run_s / plain_s, 2),
+    }
+
+
+def seconds_of(command):
+    """Return how long a command takes."""
+    began = time.monotonic()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return time.monotonic() - began
+
+
+def train(spec):
+    """Train and evaluate as the job's `spec` says, in this process."""
+    torch.set_num_threads(1)  # as the trainer does
+    trainer = spec["trainer"]
+    evaluation, hyperparameters = trainer["evaluation"], trainer["algorithm"]["hyperparameters"]
+    one, other = (Monitor(make(*fake_arena(), **trainer["environment"]["options"])) for _ in range(2))
+    model = DQN("MlpPolicy", one, seed=spec["seed"], device="cpu", **arguments(DQN, hyperparameters))
+    evaluating = EvalCallback(
+        other, eval_freq=evaluation["everySteps"], n_eval_episodes=evaluation["episodes"], verbose=0
+    )
+    model.learn(trainer["steps"], callback=evaluating)
+    evaluate_policy(model, other, n_eval_episodes=CONFIRMING)
+
+
+if __name__ == "__main__":
+    train(example(JOB)["spec"])
