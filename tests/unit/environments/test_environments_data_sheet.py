@@ -137,7 +137,7 @@ def test_the_task_is_on_the_sheet_with_its_numbers(constant):
     assert constant in SHEET
 
 
-@pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe"])
+@pytest.mark.parametrize("word", [*(f'actions="{it}"' for it in ACTIONS), "max_steps", "observe", "time_up"])
 def test_options_are_on_the_sheet(word):
     """Where they act."""
     assert f"`{word}`" in SHEET

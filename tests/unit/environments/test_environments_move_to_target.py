@@ -62,13 +62,25 @@ def test_a_collision_ends_the_episode(make_env):
     assert reward < 0.0
 
 
-def test_time_is_up_after_max_steps_and_that_is_no_end_of_the_task(make_env):
-    """Truncated, so a learner goes on estimating; the last observation says no time is left."""
-    env = make_env(max_steps=3)
+TERMINATED, TRUNCATED = (True, False), (False, True)
 
-    steps = play(env, IN_THE_OPEN, [STOP] * 3)
 
-    assert [step[2:4] for step in steps] == [(False, False), (False, False), (False, True)]
+@pytest.mark.parametrize(
+    ("options", "end"),
+    [
+        ({"reward": "Dense"}, TRUNCATED),
+        ({"reward": "Dense", "time_up": "terminated"}, TERMINATED),
+        ({"reward": "Sparse"}, TERMINATED),
+        ({"reward": "Sparse", "time_up": "truncated"}, TRUNCATED),
+    ],
+)
+def test_time_is_up_after_max_steps_and_ends_the_episode_as_the_option_or_else_the_reward_says(
+    make_env, options, end
+):
+    """Sparse prices giving up: a value estimated beyond that step would be paid on top of the price."""
+    steps = play(make_env(max_steps=3, **options), IN_THE_OPEN, [STOP] * 3)
+
+    assert [step[2:4] for step in steps] == [(False, False), (False, False), end]
     assert steps[-1][4]["outcome"] == "time_up"
     assert [step[0][-1] for step in steps] == pytest.approx([2 / 3, 1 / 3, 0.0], abs=1e-6)
 

@@ -38,6 +38,7 @@ def test_python_may_use_the_enumeration():
         ({"movements": []}, "movements: is empty"),
         ({"movements": ["STOP", "STOP"]}, "movements: names a movement twice"),
         ({"max_steps": 0}, "max_steps: 0 leaves no time; use at least 1"),
+        ({"time_up": "done"}, "time_up: 'done' is not known; use terminated or truncated"),
         ({"steps": 7}, "steps: is not an option; use reward, observe, movements"),
     ],
     ids=lambda it: next(iter(it)) + str(next(iter(it.values()))) if isinstance(it, dict) else "",

@@ -107,9 +107,9 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     ## End of an episode
 
     Terminated: the robot stands on the target (`info["is_success"]`), or it bumped into
-    something. Truncated: `max_steps` are taken. That is no state of the task: the world
-    could go on and the robot might be about to arrive, so a learner should go on
-    estimating from there instead of taking the clock for a wall.
+    something. When `max_steps` are taken, `time_up` decides: `"truncated"` (by default with
+    Dense) lets a learner estimate what would have come, `"terminated"` (by default with
+    Sparse) makes that step the last that counts.
 
     ## Info
 
@@ -198,8 +198,9 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
             "reward_terms": terms,
             "extra_steps": extra_steps,
         }
-        truncated = outcome is Outcome.TIME_UP
-        return self._numbers_of(after), sum(terms.values()), outcome.terminal, truncated, info
+        time_up, terminates = outcome is Outcome.TIME_UP, self.options.time_up_terminates
+        terminated = outcome.terminal or (time_up and terminates)
+        return self._numbers_of(after), sum(terms.values()), terminated, time_up and not terminates, info
 
     def close(self) -> None:
         """Give back the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""

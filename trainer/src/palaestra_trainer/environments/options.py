@@ -12,6 +12,9 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import Movement
 
 ACTIONS = ("discrete", "continuous")
+TIME_UP = ("terminated", "truncated")
+# `Sparse` prices giving up, so its episode ends there. `Dense` does not: see docs/environments.md.
+TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,6 +27,7 @@ class Options:
         movements: what a discrete action chooses from, in this order.
         actions: `discrete` (one of `movements`) or `continuous` (a twist).
         max_steps: steps until time is up.
+        time_up: how an episode ends then, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -34,10 +38,16 @@ class Options:
     movements: Sequence[Movement] = tuple(Movement)
     actions: str = "discrete"
     max_steps: int = 100
+    time_up: str | None = None
 
     def __post_init__(self) -> None:
         if mistakes := list(_mistakes(self)):
             raise ConfigurationError("\n".join(mistakes))
+
+    @property
+    def time_up_terminates(self) -> bool:
+        """Whether time-up ends the episode as terminated, so that a learner estimates no value beyond it."""
+        return (self.time_up or TIME_UP_OF[self.reward]) == "terminated"
 
 
 def parse(given: Mapping[str, Any]) -> Options:
@@ -79,3 +89,5 @@ def _mistakes(options: Options) -> Iterator[str]:
         yield "movements: names a movement twice; name each once"
     if options.max_steps < 1:
         yield f"max_steps: {options.max_steps} leaves no time; use at least 1"
+    if options.time_up not in (None, *TIME_UP):
+        yield f"time_up: {options.time_up!r} is not known; use {' or '.join(TIME_UP)}"
