@@ -74,13 +74,7 @@ def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
 def _mistakes(options: Options) -> Iterator[str]:
     if options.reward not in WEIGHTS:
         yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
-    for name in options.observe:
-        if name not in PARTS:
-            yield f"observe: {name!r} is not a part; use {', '.join(PARTS)}"
-    if not options.observe:
-        yield f"observe: is empty; choose from {', '.join(PARTS)}"
-    if len(set(options.observe)) < len(options.observe):
-        yield "observe: names a part twice; name each once"
+    yield from _mistakes_of_parts(options.observe)
     if options.actions not in ACTIONS:
         yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
     if not options.movements:
@@ -91,3 +85,13 @@ def _mistakes(options: Options) -> Iterator[str]:
         yield f"max_steps: {options.max_steps} leaves no time; use at least 1"
     if options.time_up not in (None, *TIME_UP):
         yield f"time_up: {options.time_up!r} is not known; use {' or '.join(TIME_UP)}"
+
+
+def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
+    for name in names:
+        if name not in PARTS:
+            yield f"observe: {name!r} is not a part; use {', '.join(PARTS)}"
+    if not names:
+        yield f"observe: is empty; choose from {', '.join(PARTS)}"
+    if len(set(names)) < len(names):
+        yield "observe: names a part twice; name each once"
