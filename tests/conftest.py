@@ -11,9 +11,9 @@ from tests.control_plane.programs import REQUIRED, NoPrograms
 
 # Networks of this size learn faster on one thread than on several, which wait for each other; read by torch.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# A property is not about time, and machines are noisy: what is slow is told by --durations.
+# A property is not about time, and machines are noisy: --durations shows slow tests.
 settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-# The same examples each time: whoever changes something else does not meet what chance has found.
+# The same examples each time: a random example must not fail an unrelated change.
 settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True)
 settings.load_profile("repeat")
 

@@ -1,7 +1,7 @@
 """`palaestra run` as a person types it, with what tests and measurements ask of it.
 
-Everything is real: ROS master, sidecars, stubs and trainer, each a process of this machine. What is
-asked is what a person could ask: the run directory, `/status`, and the table of processes.
+Everything is real: ROS master, sidecars, stubs and trainer, each a process of this machine. Tests
+use only what a person could use: the run directory, `/status`, and the table of processes.
 """
 
 import json
@@ -146,7 +146,7 @@ class LocalRun:
         return path.read_text(errors="replace") if path.exists() else ""
 
     def faults(self):
-        """Return how many faults of each kind the trainer's log tells of."""
+        """Return how many faults of each kind are in the trainer's log."""
         return dict(Counter(FAULT.findall(self.log())))
 
     def counters(self):

@@ -9,7 +9,7 @@ PACE_S = 0.05  # an API server that is polled must have time for its work
 
 
 class TooLate(AssertionError):
-    """What was waited for did not come."""
+    """The awaited condition did not become true before the deadline."""
 
 
 def eventually(seen: Callable[[], Any], deadline_s: float = DEADLINE_S, pace_s: float = PACE_S) -> Any:

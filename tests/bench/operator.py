@@ -45,7 +45,7 @@ def measure_crowd(requests_per_s):
             crowd.wait_for_silence(plane)
             spent = cpu_seconds(running_operator) - spent
             before = requests(plane)
-            time.sleep(QUIET_S)  # what is measured is that nothing happens
+            time.sleep(QUIET_S)  # no request may arrive in this time
             return {
                 "bare_jobs_s": round(bare_s, 1),
                 "client_s": round(client_s, 1),

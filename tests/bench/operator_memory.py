@@ -1,7 +1,7 @@
 """The operator's memory: at rest, beside large jobs, beside many.
 
-The operator is a process of its own as in a pod, with an installation's rights and its image's environment;
-the control plane is real and has no nodes, so that its pods stay pending and nothing else happens.
+The operator is a separate process, as in a pod, with the rights of an installation and the environment of its
+image. The control plane is real and has no nodes: pods stay pending, and nothing else happens.
 """
 
 import re
@@ -98,7 +98,7 @@ def settle(plane, running_operator):
 
     def quiet():
         before = sum(each.counts for each in asked(plane))
-        time.sleep(SETTLED_S)  # what is measured is that nothing happens
+        time.sleep(SETTLED_S)  # no request may arrive in this time
         return sum(each.counts for each in asked(plane)) == before
 
     wait_for(leads, SETTLES_S, lambda: asked(plane)[-5:])

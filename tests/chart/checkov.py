@@ -54,7 +54,7 @@ def findings(manifests: Mapping[str, str]) -> dict[str, set[Finding]]:
 
 
 def _environment() -> Path:
-    """Return the environment, made if need be: whole or not at all, whoever else makes it meanwhile."""
+    """Return the environment. Create it atomically if it is missing: another process may do the same."""
     made = cache.folder() / f"checkov-{hashlib.sha256(LOCK.read_bytes()).hexdigest()[:12]}"
     made.parent.mkdir(parents=True, exist_ok=True)
     if not made.is_dir():

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# Print the folder that holds Kueue, made once from its Go module: `image.tar`, the manager's image under the name that its
-# registry has it by, and `chart`, what `helm install … oci://registry.k8s.io/kueue/charts/kueue` would pull: it names that
-# image, and pulls it only where a node does not have it.
+# Print the folder that holds Kueue, built once from its Go module:
+# - `image.tar`: the manager's image under its registry name.
+# - `chart`: the chart that `helm install … oci://registry.k8s.io/kueue/charts/kueue` would pull. It refers to that image;
+#   a node pulls the image only if it does not have it.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"

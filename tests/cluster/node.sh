@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Print the path of the node image that kind starts where no registry is reachable, made once: Debian trixie with systemd and
-# containerd, the Kubernetes programs built from Go modules, and the images of the control plane already unpacked.
+# Print the path of the node image that kind starts where no registry is reachable. The image is built once.
+# It holds Debian trixie with systemd and containerd, the Kubernetes programs built from Go modules, and the unpacked images
+# of the control plane.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"

@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# Build the programs of a cluster from Go modules (programs/*/go.mod), or take them out of a Debian package
-# (programs/*/debian: its path below a mirror, and its SHA-256), and print the folder that holds them.
-#   programs.sh [PROGRAM…]             all of programs/list when none is named
-#   programs.sh --built [PROGRAM…]     build nothing: exit 3, without a word, unless they are there
-# Each is kept in the cache under the content of its module, and put in place by renaming.
+# Build the programs of a cluster and print the folder that holds them. A program comes from a Go module
+# (programs/*/go.mod) or from a Debian package (programs/*/debian: its path below a mirror, and its SHA-256).
+#
+#   programs.sh [PROGRAM…]             all of programs/list if no program is named
+#
+#   programs.sh --built [PROGRAM…]     build nothing; exit 3 without output if a program is missing
+#
+# The cache key of a program is the content of its module. A program is put in place by renaming.
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"

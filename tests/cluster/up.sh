@@ -2,9 +2,11 @@
 # Bring up the cluster for the tests and print the path of its kubeconfig. Safe to repeat: a cluster that stands is left alone,
 # and what an interrupted run left behind is removed first.
 #
-# PALAESTRA_CLUSTER chooses the way: "stock" (kind's node image, by the Docker Engine at hand), "built" (engine and node image
-# made here from Debian packages and Go modules, as root), "existing" (the cluster of $KUBECONFIG, nothing is started).
-# Not set: stock where Docker and the image can be had, otherwise built.
+# PALAESTRA_CLUSTER chooses the way:
+# - "stock": kind's node image in the local Docker Engine.
+# - "built": engine and node image built here from Debian packages and Go modules, as root.
+# - "existing": the cluster of $KUBECONFIG; nothing is started.
+# If it is not set, the way is "stock" where Docker and the image are available, otherwise "built".
 set -euo pipefail
 # shellcheck source-path=SCRIPTDIR source=settings.sh
 . "$(dirname "${BASH_SOURCE[0]}")/settings.sh"

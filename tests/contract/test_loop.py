@@ -13,7 +13,7 @@ SOURCES = sorted(Path(palaestra.operator.__file__).parent.glob("*.py"))
 
 
 def test_the_loop_is_read_in_one_screen():
-    """Whoever looks after a cluster must be able to say what the operator does next."""
+    """A cluster administrator must be able to predict what the operator does next."""
     assert len(inspect.getsource(Controller.reconcile).splitlines()) <= MOST_LINES
 
 

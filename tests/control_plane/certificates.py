@@ -19,7 +19,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Authority:
-    """Who vouches for the server and its clients; its files stand in `folder`."""
+    """The certificate authority of the server and its clients; its files are in `folder`."""
 
     folder: Path
 

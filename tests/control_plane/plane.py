@@ -64,7 +64,7 @@ class ControlPlane:
     """A running control plane.
 
     Attributes:
-        folder: certificates, logs and data; removed by whoever made it.
+        folder: certificates, logs and data; the caller that made the folder removes it.
         port: of the API server, on 127.0.0.1.
         authority: signs more clients.
         kubeconfig: of an administrator.

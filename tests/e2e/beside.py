@@ -58,7 +58,7 @@ class Stories:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Take away what no test has taken; whoever waits in it finds nothing any more."""
+        """Delete the namespaces that no test has taken, with everything that runs in them."""
         for namespace in self._namespaces.values():
             namespace.delete()
 

@@ -19,7 +19,7 @@ from tests.e2e.jobs import make_job
 from tests.e2e.long_run import LongRun
 from tests.e2e.namespace import OPERATOR, SYSTEM, Namespace, unique
 
-CHOSEN = "PALAESTRA_E2E"  # set by whoever chose the cluster of $KUBECONFIG for tests
+CHOSEN = "PALAESTRA_E2E"  # set to confirm that the cluster of $KUBECONFIG is for tests
 MONITORING = "monitoring"  # the operator's --monitoring-namespace
 BEGIN_FIRST = ("long_run", "evictions", "always_interrupted")
 LATE = {  # marks, in the order of their places

@@ -30,7 +30,7 @@ class Request(NamedTuple):
 
 
 class Field(NamedTuple):
-    """A field of a TrainingJob, by a path such as `spec.simulators.0.name`, and what is told of it."""
+    """A field of a TrainingJob, by a path such as `spec.simulators.0.name`, and the expected message."""
 
     name: str
     gain: str

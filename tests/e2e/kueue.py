@@ -1,7 +1,7 @@
-"""Kueue in the cluster, as docs/queues.md tells: its commands are typed, and taken back at the end.
+"""Kueue in the cluster, as in docs/queues.md: the page's commands are run, and undone at the end.
 
-What the page has from a registry comes from Kueue's Go module here (tests/cluster/kueue.sh): the chart, and
-the image under its own name, so that a cluster which reaches the registry can pull it all the same.
+The page takes chart and image from a registry. Here Kueue's Go module provides both (tests/cluster/kueue.sh).
+The image has its registry name, so a cluster that reaches the registry can pull it as well.
 """
 
 import os

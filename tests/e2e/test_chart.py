@@ -160,7 +160,7 @@ def inside(cluster, deployment, *command):
 
 
 def assert_notebooks_are_served_to_who_has_the_token(cluster):
-    """All others are told that a server is there, which is what the kubelet asks, and where to log in."""
+    """Without the token, only the API version, which the kubelet probes, and the login page are served."""
 
     def codes(token):
         asked = ("/api", "/api/contents", "/lab")

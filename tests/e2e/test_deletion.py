@@ -1,4 +1,4 @@
-"""What is left of a TrainingJob that is deleted, and of one whose objects are."""
+"""The remains of a deleted TrainingJob, and of a TrainingJob whose objects were deleted."""
 
 import pytest
 
@@ -55,7 +55,7 @@ def test_deleted_while_it_is(phase, namespace, job):
 
     namespace.cluster.delete("trainingjobs", namespace.name, phase)
 
-    # Not sooner than its grace of 60 s goes a pod whose script was told to end before it set its trap.
+    # A pod whose script got SIGTERM before it set its trap stays for its whole grace period of 60 s.
     namespace.wait(lambda: not any(_left(namespace, kind, phase) for kind in GONE), LONG_S)
     claims = namespace.select("persistentvolumeclaims", phase)
     assert [named(claim) for claim in claims] == [f"{phase}-0-{uid}"]

@@ -64,7 +64,7 @@ def test_an_image_says_what_it_is_and_is_run_by_nobody(name, archives):
 
 @pytest.mark.after_the_kills
 def test_the_operator_s_image_is_of_this_release(namespace, cluster):
-    """Whoever reports a mistake says which release it was."""
+    """A bug report has to name the release."""
     cluster.rolled_out(SYSTEM, OPERATOR)
     pod, *_ = namespace.wait(lambda: operators(namespace))
 

@@ -1,4 +1,4 @@
-"""A run that is interrupted goes on from its last checkpoint, whoever interrupts it."""
+"""An interrupted run resumes from its last checkpoint, whatever the cause of the interruption."""
 
 import pytest
 

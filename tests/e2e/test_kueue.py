@@ -43,7 +43,7 @@ NEVER = {
 
 @dataclass(frozen=True)
 class Story:
-    """What was seen of three jobs in a queue that has room for one.
+    """The observed states of three jobs in a queue that has room for one.
 
     Attributes:
         waited: the replica of `patient` while `everyday` had the place.
@@ -98,7 +98,7 @@ def story(robots):
 
 
 def test_a_job_that_has_no_room_waits_and_its_status_has_the_words_of_kueue(story):
-    """What is short, without a right to read Workloads."""
+    """The message names the missing resource; its reader needs no permission to read Workloads."""
     assert story.waited["phase"] == "Suspended"
     assert story.short.startswith("waits in queue trainings for Kueue: ")
     assert SHORT in story.short
@@ -106,7 +106,7 @@ def test_a_job_that_has_no_room_waits_and_its_status_has_the_words_of_kueue(stor
 
 
 def test_an_urgent_job_takes_the_place_of_one_that_trains(story, robots):
-    """Its status says who took it, by the word of whoever did."""
+    """The job's status says that its queue took it back; the Workload has Kueue's reason."""
     last = story.preempted["lastAttempt"]
 
     assert story.preempted["phase"] == "Suspended"
@@ -151,7 +151,7 @@ def test_why_a_job_is_never_admitted_is_in_its_status(name, robots):
 
 
 def test_a_default_queue_is_that_of_jobs_that_name_none(robots):
-    """Kueue suspends what the spec does not; whoever resumed it would fight with Kueue over each pod."""
+    """Kueue suspends a job whose spec does not. If the operator resumed it, the two would fight over pods."""
     default = {"apiVersion": VERSION, "kind": "LocalQueue", "spec": {"clusterQueue": QUEUE}}
     robots.create("localqueues", {**default, "metadata": {"name": "default"}})
     change_queue(robots, stopPolicy="Hold")

@@ -1,4 +1,4 @@
-"""Who reaches the ports of a training pod: tried where the cluster sees to it, and computed everywhere."""
+"""Access to the ports of a training pod: tried where the cluster enforces policies, computed everywhere."""
 
 import json
 import os

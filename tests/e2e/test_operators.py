@@ -109,5 +109,5 @@ def fingerprint(namespace, kind):
 
 
 def containers(content):
-    """Return id and restarts of each container that an object's status tells of."""
+    """Return id and restarts of each container in an object's status."""
     return [(each.get("containerID"), each["restartCount"]) for each in statuses(content)]

@@ -21,12 +21,12 @@ pytestmark = [pytest.mark.looks_back, pytest.mark.timeout(600)]
 
 TRIAL = "palaestra-trial"
 UNSEEN = {
-    # Asked for beside a request, and not written down: with OwnerReferencesPermissionEnforcement, as on
-    # OpenShift, who makes an owner wait for what it owns must be allowed to change the owner's finalizers.
-    # tests/control_plane has it on, and there the operator makes nothing without this right.
+    # Checked by an admission plugin, which leaves no record. With OwnerReferencesPermissionEnforcement, as on
+    # OpenShift, a request that sets blockOwnerDeletion needs the right to update the owner's finalizers.
+    # The API server of tests/control_plane enables it; without this right the operator creates nothing there.
     (OPERATOR, Right("palaestra.dev", "trainingjobs/finalizers", "update")),
 }
-OPENED = Right("", "secrets", "get")  # by whoever binds the role for it in a namespace of theirs
+OPENED = Right("", "secrets", "get")  # granted by a person who binds the role for it in a namespace
 
 
 @pytest.fixture(scope="module")

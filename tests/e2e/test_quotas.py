@@ -1,4 +1,4 @@
-"""What a namespace may take: the refusal is a reason in the status, and ends when whoever refuses lets go."""
+"""Limits of a namespace: a refusal sets a reason in the status, which goes away when the limit does."""
 
 from dataclasses import dataclass, field
 

@@ -69,7 +69,7 @@ def moment(terminated):
 @pytest.mark.beside
 @pytest.mark.timeout(600)
 def test_no_container_can_write_its_image_or_speak_to_the_cluster(namespace, job):
-    """Whoever may make TrainingJobs, and no pods, must gain nothing by it."""
+    """A person who may create TrainingJobs, but no pods, must gain no other right by it."""
     namespace.apply(job("waits", script=WAIT))
     pod = namespace.wait_for_pod("waits", LONG_S)
 

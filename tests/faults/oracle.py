@@ -47,7 +47,7 @@ def _numbered(pods: Iterable[Object], changes: Iterable[tuple[str, Object]]) -> 
 def orphans(state: Mapping[str, Mapping[str, Object]]) -> list[str]:
     """Return what was left behind: objects whose TrainingJob or owner is gone, but for claims.
 
-    A claim outlives its TrainingJob: it holds the run. A pod that was told to go waits for its kubelet.
+    A claim outlives its TrainingJob: it holds the run. A pod that is being deleted waits for its kubelet.
     """
     living = {each["metadata"]["uid"] for kind in state.values() for each in kind.values()}
     return [

@@ -117,8 +117,8 @@ class Row:
     first: int = 1
 
 
-# Every write meets two faults: one of the first four, where it is carried out and the operator does not learn
-# so, and one of the next six, where it is not. What is read meets less often what repeats itself.
+# Every write meets two faults. After one of the first four the write has succeeded, and the operator does not
+# know; after one of the next six it has failed. Reads repeat, so they meet faults less often.
 ROWS = (
     Row(kind=Kind.KILL_AFTER, request=WRITE, stride=2, first=1),
     Row(kind=Kind.DROP, request=WRITE, stride=4, first=2),

@@ -1,7 +1,7 @@
 """A dashboard as a picture: its panels where Grafana has them, with what Prometheus answered.
 
-For the documentation, where no Grafana is at hand. What is drawn is read from the dashboard's JSON; how it
-is drawn is ours, and does not claim to be Grafana.
+For the documentation, where no Grafana is at hand. The content comes from the dashboard's
+JSON. The style is our own and does not claim to be Grafana's.
 """
 
 import itertools

@@ -1,4 +1,4 @@
-"""A Prometheus of our own, which scrapes what it is told to and answers queries.
+"""A local Prometheus that scrapes the given targets and answers queries.
 
 It is Debian's, unpacked by tests/cluster/programs.sh. The labels of a target are given here as the chart's
 PodMonitor and ServiceMonitor would give them.
@@ -36,7 +36,7 @@ class NotAnswered(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What is scraped: host and port, and its labels."""
+    """A scrape target: host and port, and its labels."""
 
     address: str
     labels: Mapping[str, str]

@@ -1,4 +1,4 @@
-"""Who is scraped, with the labels that the chart's PodMonitor and ServiceMonitor give them in a cluster."""
+"""Scrape targets, with the labels that the chart's PodMonitor and ServiceMonitor set in a cluster."""
 
 import re
 from collections.abc import Iterator

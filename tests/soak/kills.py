@@ -122,7 +122,7 @@ def end(run, moments, *, hung):
     code = int(run.until(lambda: ENDED.findall(run.output())[ends:])[0])
     run.until(lambda: len(run.attempts()) > attempts)
     step = before["step"] if before else 0
-    # What is amid a rollout is played again: four steps of this algorithm.
+    # An unfinished rollout is played again: four steps of this algorithm.
     lost = max(step - resumed_at(run) - 4, 0)
     return {"exit": code, "seconds": round(seconds, 2), "lost": lost, "hung": hung}
 

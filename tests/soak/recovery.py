@@ -57,7 +57,7 @@ def recovery(run, *, standby):
 
 
 def noticings(times):
-    """Return the seconds from each stop of the simulator's process until it is told of as hung."""
+    """Return the seconds from each stop of the simulator's process until it is counted as hung."""
     with training() as run:
         return [noticing(run) for _ in range(times)]
 

@@ -34,7 +34,7 @@ class Asked:
 
 @dataclass
 class Script:
-    """What was asked, and what will be answered; the last answer of each kind is given for ever."""
+    """Recorded requests and prepared answers; the last answer of each kind repeats."""
 
     asked: list[Asked] = field(default_factory=list)
     calls: list[Answer] = field(default_factory=list)

@@ -156,7 +156,7 @@ def test_a_leader_whose_lease_another_has_taken_stops(candidate, real, namespace
 
 
 def test_a_leader_that_ends_leaves_the_lease_to_nobody(real, namespace):
-    """And is none any more, from the moment when it was told."""
+    """The old leader stops at once, and the next one need not wait for the Lease to expire."""
     leads, follows = threading.Event(), threading.Event()
     leadership = Leadership(real, namespace, "operator", "me", duration_s=DURATION_S, renew_s=0.3)
     leadership.start(leads.set, follows.set)
@@ -178,7 +178,7 @@ def test_a_candidate_that_never_started_can_be_stopped(real, namespace):
 
 
 def test_a_lease_that_was_lost_and_regained_is_another_tenure(real, namespace):
-    """What was decided in the first must not be written in the second."""
+    """A decision of the first tenure must not be written in the second."""
     leads, follows = threading.Semaphore(0), threading.Event()
     leadership = Leadership(real, namespace, "operator", "me", duration_s=DURATION_S, renew_s=0.3)
     leadership.start(leads.release, follows.set)

@@ -160,7 +160,7 @@ def test_a_version_that_is_forgotten_again_and_again_does_not_become_a_storm(fol
     followed = follow()
     rude.script.watches = [refusal(410, "Expired")]
     followed.wait_reported("a", "b")
-    threading.Event().wait(1.0)  # what is measured is how little happens
+    threading.Event().wait(1.0)  # count the requests in this time
 
     assert 2 <= len(rude.script.of(watches=False)) <= 10
 
@@ -174,7 +174,7 @@ def test_trouble_that_lasts_is_met_with_patience(follow, rude, trouble):
     follow()
     rude.script.watches = [trouble]
     rude.script.calls = [listed("a")]
-    threading.Event().wait(1.0)  # what is measured is how little happens
+    threading.Event().wait(1.0)  # count the requests in this time
 
     assert len(rude.script.of(watches=True)) <= 10
 
@@ -210,7 +210,7 @@ def test_lists_that_fail_are_tried_until_one_succeeds(follow):
 
 
 def test_before_the_first_whole_list_nothing_is_in_step(follow):
-    """What is not there may only not be known yet."""
+    """Before the first list an empty cache does not mean that there are no objects."""
     followed = follow(lists=[hang])
 
     assert not followed.reflector.wait_synced(0.2)

@@ -8,7 +8,7 @@ MONITORS = "monitoring.podMonitor.enabled=true"
 
 
 def test_monitors_are_refused_until_the_cluster_knows_their_kinds(control_plane):
-    """docs/install.md names these words, so that whoever meets them knows what to install first."""
+    """docs/install.md quotes this error with its remedy: install the Prometheus Operator first."""
     install = ("install", "palaestra", str(CHART), f"--namespace={NAMESPACE}", "--create-namespace")
     words = 'no matches for kind "PodMonitor"'
 

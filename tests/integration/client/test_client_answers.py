@@ -265,7 +265,7 @@ def test_programs_can_catch_that_a_cluster_does_not_know_trainingjobs(server):
 
 
 def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
-    """Whoever keeps jobs in a repository makes it again at once; the one that was deleted is gone."""
+    """A GitOps controller creates it again at once; the deleted one is gone all the same."""
     script, kubeconfig = server
     anew = {"metadata": NAMED | {"uid": "another", "resourceVersion": "2"}}
     script.calls = [

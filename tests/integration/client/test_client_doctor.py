@@ -1,4 +1,4 @@
-"""The doctor before a real API server: what is not right there is told, with the remedy."""
+"""The doctor at a real API server: it reports each problem with its remedy."""
 
 from importlib.metadata import version
 

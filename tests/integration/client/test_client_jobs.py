@@ -119,7 +119,7 @@ def test_a_wait_ends_with_the_job(client, tell, later):
 
 
 def test_a_job_that_ended_otherwise_is_not_waited_for_any_longer(client, tell):
-    """The reason is told: it is what the next command would ask for."""
+    """The error contains the reason: the next command would ask for it."""
     client.apply(training_job("a"))
     tell("a", "Failed")
 

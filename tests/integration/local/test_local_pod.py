@@ -54,7 +54,7 @@ def test_a_sidecar_that_ends_is_started_again_while_the_pod_lives(stage):
 
 
 def test_a_sidecar_that_never_gets_ready_ends_the_pod_with_its_last_words(stage):
-    """Nothing waits for ever, and the person is told what the program said."""
+    """The start fails instead of waiting for ever, and the error quotes the program's output."""
     broken = stage.container("broken", "echo port 11311 is taken; exit 1", startup=ready(stage))
 
     with pytest.raises(StartFailed, match=r"broken ended 3 times .*: .*port 11311 is taken"):

@@ -178,7 +178,7 @@ def test_ctrl_c_ends_with_75_says_how_to_go_on_and_leaves_no_process(desk, event
 
 
 def test_a_second_ctrl_c_does_not_wait_for_the_trainer_and_leaves_no_process(desk, eventually):
-    """Whoever types it again has no time for a checkpoint; the simulators don't stay behind for that."""
+    """A second Ctrl-C means that there is no time for a checkpoint; the simulators must end all the same."""
     process, pids = desk.training(eventually, TRAIN.replace("sys.exit(75)", "(run / 'asked').touch()"))
     process.send_signal(signal.SIGINT)
     eventually((desk.run_directory / "asked").exists)
@@ -208,7 +208,7 @@ def test_ctrl_c_tells_a_trainer_that_fails_on_it_and_starts_no_further_replica(d
 
 
 def test_a_run_past_its_deadline_says_so_and_can_go_on(desk):
-    """Whoever set the deadline may raise it: the run itself is whole."""
+    """The deadline is the user's and may be raised: the run itself is intact."""
     desk.write(WAIT, activeDeadlineSeconds=1)
 
     code, out = desk.run()

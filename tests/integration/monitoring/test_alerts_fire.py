@@ -1,7 +1,7 @@
 """Every alert, by itself and in a real Prometheus: it fires, and it clears.
 
-What lasts minutes is tested by promtool, whose time is not ours: how long something must be wrong before it
-is told, and that two of them, which look some minutes back, clear.
+promtool, whose time is simulated, tests what lasts minutes: how long a problem must last before its alert
+fires, and that the two alerts that look some minutes back clear.
 """
 
 import signal
@@ -88,7 +88,7 @@ def test_what_a_sick_run_causes_is_told_and_taken_back(tmp_path, folder, rules):
         stopped = [
             run.pid_of(program, "sim-collect-0/") for program in ("palaestra-sidecar", "palaestra-stub")
         ]
-        for pid in stopped:  # with its sidecar, so that nobody starts it anew before it is told
+        for pid in stopped:  # with its sidecar, which would restart it before the alert fires
             send(pid, signal.SIGSTOP)
         _fires(prometheus, "PalaestraTrainingStalled")
         for pid in stopped:

@@ -146,7 +146,7 @@ def _environment(plane: ControlPlane) -> dict[str, str]:
 
 
 def wait_for(claim: Callable[[], bool], deadline_s: float, told: Callable[[], object]) -> None:
-    """Wait until a claim holds; else fail with what is told."""
+    """Wait until a claim holds; at the deadline fail with what `told` returns."""
     ends = time.monotonic() + deadline_s
     while not claim():
         assert time.monotonic() < ends, f"not within {deadline_s} s: {told()}"

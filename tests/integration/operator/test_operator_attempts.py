@@ -1,4 +1,4 @@
-"""What is kept of an attempt when its pod is gone, at a real API server, with a kubelet that is played."""
+"""The record of an attempt whose pod is gone, at a real API server, with a simulated kubelet."""
 
 import pytest
 

@@ -18,7 +18,7 @@ LEASE_S = 15.0
 
 
 def creations(control_plane, namespace):
-    """Return how many objects of each kind were created in a namespace, by whomever."""
+    """Return how many objects of each kind were created in a namespace, by any client."""
     counts = {}
     for event in control_plane.audit():
         target = event.get("objectRef", {})
@@ -142,7 +142,7 @@ def test_a_job_that_is_made_again_after_an_upgrade_has_its_old_images(place, sta
 
 
 def test_a_job_that_cannot_be_read_delays_no_other(place, start):
-    """One mistake that an API server lets through is told, and everything else goes on."""
+    """The status reports a mistake that the API server let through; the other job still starts."""
     start("--workers=1")
     place.train("wrong", trainer={"algorithm": {"name": "SAC"}})
     place.train("right")

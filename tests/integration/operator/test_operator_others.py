@@ -197,7 +197,7 @@ def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, pl
 
 
 def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_plane):
-    """Whoever edited them may have had a reason; the author of the job has to know."""
+    """The edit may have had a reason, so it stays; the author of the job has to know of it."""
     start()
     place.train()
     place.pods()

@@ -1,4 +1,4 @@
-"""What others refuse, what is not there, and what a job may not open; each is told with its reason."""
+"""Refused and missing objects, and objects that a job may not use: each has its reason in the status."""
 
 from http import HTTPStatus
 from pathlib import Path
@@ -103,7 +103,7 @@ def test_no_secret_is_looked_at_where_nobody_allowed_it(place, start, installed)
 
 
 def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, control_plane):
-    """What is not read cannot leak: by the API server's record it has answered with metadata."""
+    """Content that is not read cannot leak: the API server's audit log shows metadata answers only."""
     open_secrets(installed, place)
     place.create(SECRETS, SECRET)
     start()

@@ -88,7 +88,7 @@ def count(api: Api, resource) -> int:
 def quiet(plane, seconds):
     """Whether nothing but watches and the Lease was asked for so long."""
     before = len([each for each in asked(plane) if each.counts])
-    time.sleep(seconds)  # what is measured is that nothing happens
+    time.sleep(seconds)  # no request may arrive in this time
     return len([each for each in asked(plane) if each.counts]) == before
 
 
@@ -125,7 +125,7 @@ def test_nothing_is_asked_in_a_minute_in_which_nothing_changes(crowd, settled):
     """Watches and the Lease aside; by its own metrics and by the API server's record."""
     plane, _ = crowd
     told, recorded = settled.requests(), [each for each in asked(plane) if each.counts]
-    time.sleep(QUIET_S)  # what is measured is that nothing happens
+    time.sleep(QUIET_S)  # no request may arrive in this time
 
     assert settled.requests() - told == Counter()
     assert [each for each in asked(plane) if each.counts][len(recorded) :] == []
@@ -137,9 +137,9 @@ def test_the_operator_stays_small(settled):
 
 
 def test_one_that_follows_changes_nothing(crowd, settled, tmp_path):
-    """The work is done, whoever looks: the first ends in two seconds, the second finds nothing to do.
+    """All work is done, so the first operator ends within two seconds, and its successor writes nothing.
 
-    It has to list all that the first one saw grow, which costs more memory.
+    The successor lists all objects at once, which takes more memory than to watch them appear.
     """
     plane, api = crowd
     seconds = settled.end()

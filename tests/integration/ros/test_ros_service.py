@@ -55,7 +55,7 @@ def service(peer):
 
 @pytest.mark.parametrize("length", [0, 430, 439, 440, 449, 5_000, 100_000])
 def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service, length):
-    """What is looked for at first is short; the rest of a longer one comes in parts."""
+    """The first read is short; the rest of a longer answer comes in parts."""
     texts = []
     peer.do(lambda: peer.node.serve("text", "webots_ros/get_string", lambda _: {"value": texts.pop()}))
     ask = service("text", "webots_ros/get_string")
@@ -69,7 +69,7 @@ def test_an_answer_of_any_length_comes_whole_also_after_short_ones(peer, service
 
 @pytest.mark.parametrize("length", [0, 439, 440, 441, 5_000, 100_000])
 def test_a_request_of_any_length_arrives_whole(peer, service, length):
-    """A world is told in one request."""
+    """One request holds a whole world."""
     heard = []
     peer.do(lambda: peer.node.serve("hear", "webots_ros/set_string", lambda it: heard.append(it.value) or {}))
 

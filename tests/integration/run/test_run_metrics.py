@@ -30,7 +30,7 @@ def texts(tmp_path_factory):
         checkpoint={"everySteps": 200, "keep": 2},
     )
     with LocalRun(tmp_path_factory.mktemp("run"), job) as run:
-        run.wait_for_step(800)  # DQN learns from 40 on, and tells of it every ten episodes
+        run.wait_for_step(800)  # DQN learns from step 40 on, and logs every ten episodes
         return {
             "trainer": scrape(run.training()["statusAddress"]),
             "sidecar": scrape(HEALTH.search(run.log("sim-collect-0"))[1]),

@@ -9,7 +9,7 @@ ROLLOUT = 512  # steps that the script's PPO learns from at once
 
 
 def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job(run):
-    """What people copy must work where they run it; what is told at the end is what there is."""
+    """People copy this script, so it must work; the summary at its end must match the run directory."""
     training = run(
         "tiny", command=["python", str(SCRIPT)], steps=300, evaluation={"everySteps": 300, "episodes": 2}
     )

@@ -1,8 +1,8 @@
 """Short forms of `make soak`: what breaks amid a run does not end it.
 
-Each is a part of tests/soak in its smallest size, so that the whole proof is known to work; the figures
-of docs/reliability.md come from the whole sizes. What is equal after a resume is in
-test_run_exact_resume.py.
+Each runs a part of tests/soak in its smallest size and shows that this part works. The figures of
+docs/reliability.md come from the full sizes. The test test_run_exact_resume.py compares a resumed run with
+an uninterrupted one.
 """
 
 import os
@@ -126,7 +126,7 @@ def test_restarts_of_simulators_leave_nothing_behind():
     """Neither in the trainer nor in the sidecars."""
     with running(leaks.job()) as run:
         early, late = leaks.least(run, 4, 8), leaks.least(run, 16, 20)
-        if leaks.grown(early, late):  # what is leaked stays, what a restart needs goes
+        if leaks.grown(early, late):  # a leak stays; the memory of a restart does not
             late = leaks.least(run, 20, 40)
 
     assert leaks.grown(early, late) == []

@@ -80,7 +80,7 @@ class Sidecar:
 
     @property
     def state(self):
-        """What it tells of its simulator."""
+        """The state that it reports for its simulator."""
         status, text = self.ask("GET", "/state")
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))

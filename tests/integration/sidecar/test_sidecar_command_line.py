@@ -119,7 +119,7 @@ def test_options_come_last_on_the_simulators_command_line(sidecar) -> None:
 def test_a_simulator_has_its_signals_as_a_shell_would_give_them(sidecar) -> None:
     """An ignored SIGPIPE, as Python has it, would let a simulator write to nobody for ever.
 
-    What whoever started us ignores, as nohup does SIGHUP, stays ignored, as in a shell.
+    A signal that our parent ignores, as nohup does SIGHUP, stays ignored, as in a shell.
     """
     it = sidecar(["sh", "-c", "grep -E '^Sig(Ign|Blk)' /proc/self/status; echo up; sleep 60"])
 

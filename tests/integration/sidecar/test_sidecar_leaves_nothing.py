@@ -119,7 +119,7 @@ def test_a_killed_keeper_is_a_fault_and_leaves_no_process(sidecar, family, left,
 
 
 def test_a_sidecar_whose_log_nobody_reads_still_ends(arguments, ends, left, eventually_true) -> None:
-    """A full pipe stops whoever writes into it; the alarm does not write."""
+    """A full pipe blocks every write into it; the alarm does not write."""
     source, sink = os.pipe()
     program = "while True: print('x' * 1000)"
     process = subprocess.Popen(arguments(ends(program)), stdout=sink, stdin=subprocess.DEVNULL)

@@ -50,7 +50,7 @@ def test_both_ports_tell_the_same_state(sidecar, waits) -> None:
 
 @pytest.mark.parametrize("path", ["/start", "/ready", "/stop"])
 def test_the_health_port_takes_no_orders(sidecar, waits, path) -> None:
-    """It is open to whoever reaches the pod."""
+    """It is open to every client that reaches the pod."""
     it = sidecar(waits)
 
     status, _ = it.ask("POST", path, {"deadline_s": 0}, it.health)

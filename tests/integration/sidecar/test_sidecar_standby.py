@@ -25,7 +25,7 @@ class Two:
         self._eventually = eventually
 
     def state(self, above, address=None):
-        """What it tells of one of them."""
+        """The state that it reports for one of them."""
         status, text = self.it.ask("GET", f"{above}/state", address=address)
         assert status == 200, text
         return SimulatorState.from_json(json.loads(text))
@@ -192,7 +192,7 @@ def test_both_are_told_at_the_health_port_and_take_no_orders_there(two, waits) -
 
 
 def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
-    """A trainer that believes in one is told so at once."""
+    """A trainer that expects a standby gets an error at once."""
     status, text = sidecar(waits).ask("GET", "/standby/state")
 
     assert status == 404

@@ -12,7 +12,7 @@ IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
 
 
 def test_a_sidecar_begins_idle_and_starts_nothing_by_itself(sidecar, waits) -> None:
-    """Who starts simulators is the trainer, several at a time."""
+    """Only the trainer starts simulators, several at a time."""
     state = sidecar(waits).state
 
     assert (state.state, state.pid, state.starts, state.last_exit) == (IDLE, None, 0, None)

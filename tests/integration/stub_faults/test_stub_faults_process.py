@@ -55,7 +55,7 @@ def test_the_step_that_is_named_is_the_first_that_is_not_answered(player):
 
 
 def test_24_resets_go_well_and_the_next_ends_in_a_bus_error(player):
-    """What the paper tells of its simulator."""
+    """The paper reports this of its simulator."""
     played = player("crash:signal=SIGBUS,reset=25").play()
 
     assert played.scene.resets == 25

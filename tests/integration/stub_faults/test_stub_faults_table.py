@@ -30,7 +30,7 @@ def test_the_table_names_every_kind_of_the_language():
 
 @pytest.mark.parametrize(("fault", "report"), rows())
 def test_palaestra_reports_a_fault_as_the_table_says(player, fault, report):
-    """Whoever tests a program of their own can compare it with ours, line by line."""
+    """The author of another client can compare it with this table line by line."""
     played = player(fault).play()
 
     kind = None if played.fault is None else played.fault.kind

@@ -99,7 +99,7 @@ def test_an_answer_cut_short_cannot_be_read(connected):
 
 
 def test_a_message_cut_short_cannot_be_read(connected):
-    """As whole messages; whoever looks at the last bytes only has to look at the length too."""
+    """A reader that decodes only the last bytes of a message must check its length, too."""
     _, service = connected("wrong_shape:topic=ir1/value,step=1")
     subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range")
     subscriber.connect()

@@ -8,7 +8,7 @@ from palaestra_trainer.webots import Mode, Webots
 
 
 class Setup:
-    """A running simulator and its facades; a short patience, so that a hang is told soon."""
+    """A running simulator and its facades; a short timeout, so that a hang is detected soon."""
 
     def __init__(self, *options, world="arena", supervisor="robotino", robot=None):
         self.launcher = ProcessLauncher(world, options=options)

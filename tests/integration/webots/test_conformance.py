@@ -15,7 +15,7 @@ def test_the_simulated_robotino_conforms(arena):
 
 
 def test_its_scene_conforms(arena):
-    """What is arranged is found so, and chance follows from the seed."""
+    """The scene is as arranged, and the seed determines what is random."""
     check_scene(arena.robot, arena.scene, Pose(-1.0, 0.1, 0.5), (1.0, 0.0))
 
 

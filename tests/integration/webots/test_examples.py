@@ -1,4 +1,4 @@
-"""The scripts that people are told to run."""
+"""The scripts that the documentation asks people to run."""
 
 import json
 import os

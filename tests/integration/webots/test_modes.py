@@ -23,7 +23,7 @@ def test_a_step_while_paused_is_refused_and_the_next_context_goes_on(arena):
 
 
 def test_a_reset_while_paused_is_refused_before_it_has_begun(arena):
-    """Half a reset would be carried out by the next step, whoever asks for it."""
+    """The next step of any client would otherwise carry out half a reset."""
     with arena.webots:
         arena.scene.reset(1, Pose(-1.0, 0.0, 0.0), (1.0, 0.0))
 
@@ -93,7 +93,7 @@ def test_a_simulator_that_is_restarted_inside_of_a_context_runs(arena):
 
 
 def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(arena):
-    """Who stops it knows that it is gone; the next context starts it."""
+    """A stopped simulator cannot be paused; the next context starts it."""
     with arena.webots:
         arena.webots.stop()
     with arena.webots:
@@ -103,6 +103,6 @@ def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(aren
 
 
 def test_a_mode_that_is_refused_is_told(arena):
-    """3 was FAST until Webots R2020b; whoever believes that it runs steps for ever."""
+    """3 was FAST until Webots R2020b; a client that believes this would wait for steps for ever."""
     with pytest.raises(WrongData, match="robotino: refuses mode 3"):
         arena.webots.supervisor.set_mode(3)

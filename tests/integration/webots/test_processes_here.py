@@ -107,7 +107,7 @@ def test_a_simulator_takes_options_of_its_own(master):
 
 
 def test_a_simulator_that_is_not_known_is_refused_at_once(master):
-    """In the words of whoever would have to start it."""
+    """The error comes from `ProcessLauncher`, which would have to start it."""
     del master
 
     with pytest.raises(ConfigurationError, match="gazebo"):

@@ -206,7 +206,7 @@ def test_a_spare_that_does_not_come_up_within_its_budget_is_told_when_it_is_want
 
 
 def test_a_spare_is_waited_for_as_long_as_a_simulator_may_take_to_start(pair):
-    """Not longer: whoever waits holds up the others."""
+    """Not longer: the member that waits blocks the others."""
     it = pair("--fault=slow_start:latency_ms=600000,start=2").begin()
     it.member.restart()
     it.first.start_deadline_s = 0.5

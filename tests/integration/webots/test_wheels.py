@@ -1,4 +1,4 @@
-"""What wheels are told, and when they are told it again."""
+"""The velocities that are sent to wheels, and when they are sent again."""
 
 import math
 
@@ -28,7 +28,7 @@ class Stranger:
             self._services.get(f"wheel{wheel}_joint/set_velocity", "set_float")(value=velocity)
 
     def ask(self):
-        """Return the velocities that the wheels are told to turn at, in rad/s."""
+        """Return the commanded velocities of the wheels, in rad/s."""
         return [self._services.ask(f"wheel{wheel}_joint/get_velocity", "get_float") for wheel in range(3)]
 
     def close(self):
@@ -86,7 +86,7 @@ def test_after_a_reset_it_is_sent_again(arena, stranger):
 
 
 def test_a_reset_to_standing_is_sent_although_it_stood(arena, stranger):
-    """What was confirmed before the reset says nothing about the motors after it."""
+    """A velocity that was confirmed before the reset need not hold after it."""
     arena.robot.drive(0.0, 0.0, 0.0)
     stranger.tell(7.0)
 
@@ -107,7 +107,7 @@ def test_after_a_restart_it_is_sent_again(arena, stranger):
 
 
 def test_after_a_reconnection_it_is_sent_again(arena, stranger):
-    """Who knows what happened meanwhile."""
+    """Another client may have changed the velocity meanwhile."""
     arena.robot.drive(*CURVE)
     arena.robot.connect()
 
@@ -151,7 +151,7 @@ def test_a_motor_that_is_told_alone_is_always_told(motor, stranger):
 
 
 def test_others_have_their_turn_while_the_wheels_answer(arena):
-    """Four robots are told in one round trip's time."""
+    """Commands to four robots take the time of one round trip."""
     told = []
 
     take_turns([lambda: (arena.robot.drive(*CURVE), told.append("this")), lambda: told.append("the other")])

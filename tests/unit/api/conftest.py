@@ -38,7 +38,7 @@ def job_data() -> Callable[..., dict[str, Any]]:
 
 @pytest.fixture(scope="session")
 def problems() -> Callable[..., list[str]]:
-    """`problems({"trainer.steps": 0})`: what is said about a job with that change."""
+    """`problems({"trainer.steps": 0})`: the problems of a job with that change."""
 
     def tell(changes: dict[str, Any]) -> list[str]:
         try:

@@ -278,7 +278,7 @@ def test_the_columns_of_every_day_say_where_a_job_stands_and_why() -> None:
 
 
 def test_status_is_written_apart_and_the_short_name_is_tj() -> None:
-    """Who may edit a job may not edit what is told about it."""
+    """The right to edit a job does not include its status."""
     assert VERSION["subresources"] == {"status": {}}
     assert crd()["spec"]["names"]["shortNames"] == ["tj"]
     assert crd()["spec"]["names"]["categories"] == ["all", "palaestra"]

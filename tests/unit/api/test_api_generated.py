@@ -1,4 +1,4 @@
-"""What is committed is what the models make; what is shown to people is true."""
+"""The committed files match the models, and the documented examples are true."""
 
 import re
 
@@ -71,7 +71,7 @@ def test_the_examples_show_what_their_names_say(repository) -> None:
 
 
 def test_the_page_shows_the_smallest_example(repository) -> None:
-    """What is copied from the page works."""
+    """An example that is copied from the page works."""
     text = (repository / "docs/trainingjob.md").read_text(encoding="utf-8")
     shown = re.search(r"```yaml\n(.*?)```", text, re.DOTALL)
 
@@ -103,7 +103,7 @@ def test_every_field_has_a_row() -> None:
 
 
 def test_every_rule_stands_below_its_table() -> None:
-    """What is refused can be read before it is."""
+    """An author can read each rule before a job breaks it."""
     section = tables().split("### spec.storage\n")[1].split("###")[0]
 
     assert "- `resumeFrom`: needs existingClaim; name the claim that holds the run" in section

@@ -1,4 +1,4 @@
-"""All the mistakes of a job file, at once: what is told, what is not repeated, what is hidden."""
+"""All the mistakes of a job file at once: those that are reported, not repeated or hidden."""
 
 import pytest
 
@@ -97,7 +97,7 @@ def test_rules_of_the_spec_are_judged_under_a_wrong_name(job_data) -> None:
 
 
 def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> None:
-    """What is seen only in the second look is told as well."""
+    """The error also lists mistakes that only the second pass finds."""
     groups = [
         {"name": "a", "role": "Collect", "count": 0},
         {"name": "a", "role": "Evaluate"},

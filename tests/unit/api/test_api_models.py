@@ -109,7 +109,7 @@ def test_a_quantity_is_a_whole_number_or_a_text(written, read, job_data) -> None
 
 
 def test_a_status_is_read_with_its_times_and_replicas(job_data) -> None:
-    """What the operator wrote is understood by whoever reads the job back."""
+    """A client can parse the status that the operator wrote."""
     seen = "2026-01-31T12:00:00Z"
     replica = {
         "index": 0,

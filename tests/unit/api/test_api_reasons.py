@@ -48,7 +48,7 @@ def test_a_row_is_one_line_of_a_table(reason) -> None:
 
 
 def test_operations_has_a_row_for_each_reason(repository) -> None:
-    """Whoever reads a reason in a status finds there what to do."""
+    """A reader of a status looks up its reason there and finds what to do."""
     text = (repository / "docs" / "operations.md").read_text()
 
     assert table() in text

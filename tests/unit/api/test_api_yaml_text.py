@@ -40,7 +40,7 @@ def test_a_scalar_is_what_a_cluster_takes_it_for(text, value) -> None:
 
 
 def test_anchors_and_merges_are_followed() -> None:
-    """What is written twice may be written once; what is nearer wins."""
+    """An anchor avoids repetition; the nearest value wins."""
     text = "a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\nc: {<<: [{x: 5}, *a]}\n"
 
     assert read(text, "job.yaml") == {

@@ -33,7 +33,7 @@ ALWAYS = {
     "CKV2_K8S_6": Accepted("It listens on no port, so there is nothing to close.", (TRIAL,)),
 }
 BY_DEFAULT = {
-    "CKV_K8S_43": Accepted("Digests are those of whoever pushed the images: values.", (OPERATOR, TRIAL)),
+    "CKV_K8S_43": Accepted("The registry determines the digests, so they are values.", (OPERATOR, TRIAL)),
     "CKV_K8S_15": Accepted(
         "Images of a release never change, and nodes without a registry hold them.", (OPERATOR, TRIAL)
     ),

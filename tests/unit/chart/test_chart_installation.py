@@ -66,7 +66,7 @@ def test_the_operator_is_that_of_the_release(made):
 
 
 def test_the_definition_is_that_of_the_models(made):
-    """Whoever changes the models records it anew."""
+    """A change of the models requires a new recording of the definition."""
     assert made["CustomResourceDefinition", "trainingjobs.palaestra.dev"] == crd()
 
 

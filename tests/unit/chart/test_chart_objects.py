@@ -120,14 +120,14 @@ def test_the_account_of_the_trial_can_be_left_out(made):
 
 @every_mode
 def test_no_right_is_a_wildcard_and_none_that_is_bound_reads_secrets(made, mode):
-    """What is used is known, verb by verb; Secrets are for a person to open."""
+    """The operator's requests are known verb by verb; only a person grants access to Secrets."""
     assert not [right for right in rules(roles(made(mode)).values()) if "*" in "".join(right)]
     assert bound(made(mode))
     assert not [right for right in rules(bound(made(mode))) if "secrets" in right]
 
 
 def test_a_list_of_namespaces_needs_no_right_in_the_cluster(made):
-    """Who may not make a ClusterRole can install it, but for the CustomResourceDefinition."""
+    """Without the right to create ClusterRoles all but the CustomResourceDefinition can be installed."""
     assert not [each for each in made("namespaced") if each["kind"] in CLUSTER_WIDE]
     assert {key for key in roles(made("namespaced")) if key[1] != NAMESPACE} == {
         (name, namespace)
@@ -208,7 +208,7 @@ def test_an_image_is_never_the_latest(made):
 
 @every_mode
 def test_the_trial_is_a_job_that_the_api_takes(one, mode):
-    """It would be refused in the cluster of whoever runs `helm test`."""
+    """Otherwise `helm test` would fail in the user's cluster."""
     namespace = MODES[mode].get("watchNamespaces", [NAMESPACE])[0]
 
     text = one(mode, "ConfigMap", "palaestra-trial")["data"]["job.yaml"]
@@ -244,7 +244,7 @@ def test_more_than_one_operator_is_spread_and_survives_a_drain(made, one):
 
 @every_mode
 def test_selectors_find_the_pods_that_they_are_for(made, mode):
-    """A Service without pods is told by nobody."""
+    """Kubernetes reports no error for a Service without pods."""
     labels = {
         each["metadata"]["name"]: each["spec"]["template"]["metadata"]["labels"]
         for each in made(mode)
@@ -297,7 +297,7 @@ def test_tensorboard_shows_the_links_that_trainers_make(chosen, shown):
 
 
 def test_the_token_of_the_notebooks_is_in_no_object(one):
-    """It stays in its Secret, and comes as a file that the server alone is told of."""
+    """It stays in its Secret, which is mounted as a file; only the server gets the path."""
     pod = one("offline", "Deployment", "palaestra-jupyter")["spec"]["template"]["spec"]
     [server] = pod["containers"]
 

@@ -89,7 +89,7 @@ def test_a_wrong_value_is_refused_with_its_place(path, value, below):
     ],
 )
 def test_values_that_do_not_go_together_are_refused(values, told):
-    """What is misspelt, and what needs another value, is told as well."""
+    """Misspelled values, and values that need another one, are refused as well."""
     assert told in refusal(values)
 
 

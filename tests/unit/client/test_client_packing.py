@@ -67,7 +67,7 @@ def test_a_member_that_would_land_elsewhere_is_refused(tmp_path, name):
 
 @pytest.mark.parametrize("kind", [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE, tarfile.CHRTYPE])
 def test_what_is_no_file_is_refused(tmp_path, kind):
-    """What is written through a link later would land elsewhere."""
+    """A later file that is written through a link would land outside the folder."""
     member = tarfile.TarInfo("link")
     member.type, member.linkname = kind, "/etc/passwd"
 
@@ -86,7 +86,7 @@ def test_what_was_cut_off_is_no_archive(tmp_path):
 
 
 def test_the_word_at_the_end_is_waited_for(tmp_path):
-    """A tar ends before the command does: whether that succeeded is told last."""
+    """A tar ends before its command does: the exit code comes last."""
 
     def chunks():
         yield from archive(tarfile.TarInfo("a"))

@@ -57,7 +57,7 @@ def test_it_has_the_trainers_image_and_its_nodes(pod):
 
 
 def test_it_ends_by_itself_and_goes_with_the_job(pod):
-    """Whoever made it may be killed before it is deleted."""
+    """The client that made it may be killed before it deletes it."""
     [owner] = pod["metadata"]["ownerReferences"]
 
     assert pod["spec"]["activeDeadlineSeconds"] == 600
@@ -82,5 +82,5 @@ def test_the_template_is_left_as_it_was(job, template):
 
 
 def test_the_run_directory_is_the_trainers(template):
-    """Nothing is passed twice: it is what the trainer was told."""
+    """The path is read from the trainer's own configuration and not passed a second time."""
     assert run_directory(template) == f"/var/lib/palaestra/{UID}/0"

@@ -82,7 +82,7 @@ class E2e:
 
     @property
     def calls(self):
-        """What was called, in order."""
+        """The recorded calls, in order."""
         return self._calls.read_text().split() if self._calls.exists() else []
 
     def stands(self, *, by_e2e):
@@ -108,7 +108,7 @@ def e2e(tmp_path):
 
 @pytest.mark.parametrize("code", ["0", "1"])
 def test_the_cluster_goes_however_the_tests_end(e2e, code):
-    """And whoever called it is told how."""
+    """And the caller gets the exit code of the tests."""
     assert e2e.run(code) == int(code)
 
     assert e2e.calls == ["up.sh", "tests", "down.sh"]
@@ -150,7 +150,7 @@ def test_a_script_that_is_held_up_was_interrupted_nevertheless(e2e):
 
 
 def test_images_that_cannot_be_built_end_it_without_a_test(e2e, tmp_path):
-    """What was brought up meanwhile goes too."""
+    """The cluster that was started meanwhile is removed, too."""
     (tmp_path / "tools/images.sh").write_text("#!/bin/sh\nexit 1\n")
 
     assert e2e.run() == 1

@@ -1,4 +1,4 @@
-"""Who may lead, and until when: a given clock, no API server."""
+"""The tenure of a leader, and its end: a given clock, no API server."""
 
 from hypothesis import given
 from hypothesis import strategies as st

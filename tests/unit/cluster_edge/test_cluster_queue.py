@@ -39,7 +39,7 @@ class Workers(RuleBasedStateMachine):
 
     @rule(seconds=st.floats(min_value=0, max_value=10))
     def time_passes(self, seconds):
-        """What is due is owed."""
+        """A key whose time has come is owed."""
         self.now += seconds
 
     @rule()
@@ -124,7 +124,7 @@ def test_closing_sends_every_worker_home_at_once():
 
 
 def test_nothing_is_handed_out_after_closing():
-    """What is left is done by the next leader, who looks at everything anyway."""
+    """The next leader does the rest: it reconciles every object anyway."""
     queue = WorkQueue()
     queue.add("a")
     queue.close()

@@ -22,7 +22,7 @@ def dashboard(request):
 
 
 def test_a_panel_asks_a_question_and_says_what_to_do(dashboard):
-    """Whoever looks at it at night has not built it."""
+    """A person on call at night has not built the dashboard."""
     for panel in panels(dashboard):
         assert panel["title"].endswith("?")
         assert len(panel["description"]) > 60, panel["title"]

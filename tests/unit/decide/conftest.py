@@ -1,7 +1,7 @@
 """A scene: one TrainingJob, what an API server holds of it, and clocks that only tests move.
 
-`scene.step()` is one pass of the loop. What is decided is carried out on the scene's own objects, as an
-API server would; what Kubernetes does by itself (pods, ends of Jobs) a test says with the scene's verbs.
+`scene.step()` is one pass of the loop. It carries out decisions on the scene's own objects, as an API server
+would. A test plays Kubernetes' own part (pods, ends of Jobs) with the scene's verbs.
 """
 
 from collections.abc import Callable

@@ -114,5 +114,5 @@ def test_a_status_that_cannot_be_read_is_left_alone(status):
     ],
 )
 def test_jobs_of_other_controllers_and_of_nobody_are_left_alone(spec, metadata, ours):
-    """What is being deleted gets no new children."""
+    """A job that is being deleted gets no new children."""
     assert managed_here(raw(spec, **metadata)) is ours

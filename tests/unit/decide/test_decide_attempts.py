@@ -1,4 +1,4 @@
-"""What is kept of the last attempt: why it ended, its last lines and its faults, when its pod is gone."""
+"""The record of the last attempt: why it ended, its last lines and its faults, when its pod is gone."""
 
 import pytest
 
@@ -18,7 +18,7 @@ def disrupted(decision):
 
 
 def test_the_first_attempt_has_none_before_it(training):
-    """What is not known is absent."""
+    """The first attempt has no predecessor, so the field is absent."""
     scene, _ = training()
 
     assert scene.replica().last_attempt is None
@@ -163,7 +163,7 @@ def delete(scene, pod):
 @pytest.mark.parametrize("take", [evict, preempt, lose_with_its_node, remove, delete])
 @pytest.mark.parametrize("looks", [True, False], ids=["seen", "seen late"])
 def test_a_disruption_is_counted_and_told_once_and_is_no_failure(training, take, looks):
-    """Whoever took the pod, and whether or not somebody looked before the next one was there."""
+    """For every cause, and also if the operator does not look until the next pod is there."""
     scene, pod = training(backoffLimit=0)
     take(scene, pod)
     told = disrupted(scene.settle(5)) if looks else []
@@ -270,7 +270,7 @@ def test_a_suspended_attempt_ended_by_suspension(training):
 
 
 def test_an_attempt_that_kueue_took_back_says_so(make_scene):
-    """Kueue suspends the Job of whoever has to make room; the trainer has saved."""
+    """Kueue suspends the Job that has to make room; the trainer has saved."""
     scene = make_scene(scheduling={"queueName": "robots"})
     scene.kueue = True
     scene.settle()

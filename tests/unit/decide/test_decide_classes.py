@@ -112,7 +112,7 @@ def test_a_wait_for_nothing_that_has_a_name_is_bounded_too(accepted):
 
 @pytest.mark.parametrize("before_s", [0, 1, 59])
 def test_a_reason_that_a_kubelet_does_not_show_for_a_moment_is_the_reason_all_the_same(accepted, before_s):
-    """One that has just been restarted has forgotten it; whoever reads the status has to mend the image."""
+    """A restarted kubelet has forgotten it for a moment; the user still has to fix the image."""
     scene = accepted(startTimeoutSeconds=100)
     pod = scene.new_pod()
     scene.container(pod, "trainer", waiting="ImagePullBackOff: not found")

@@ -106,7 +106,7 @@ def test_a_new_process_believes_a_trainer_that_tells_how_long_it_stands(training
 
 
 def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training):
-    """What was not written yet is lost, so that the deadline gets longer by it."""
+    """Time that was not written yet is lost, which extends the deadline."""
     scene, pod = training(activeDeadlineSeconds=100)
     scene.poll(pod, step=1)
     scene.settle(60)
@@ -121,7 +121,7 @@ def test_active_time_is_kept_by_the_status_and_goes_on_in_a_new_process(training
 
 @pytest.mark.parametrize("ago_s", [0, HOUR_S])
 def test_a_lost_node_is_waited_for_from_the_first_sight_of_a_deletion(training, ago_s):
-    """The API server's clock may be an hour behind ours; the pod's grace is told as seconds."""
+    """The API server's clock may be an hour behind ours; the pod's grace period is given in seconds."""
     scene, pod = training()
     scene.server_s -= ago_s
     scene.delete(pod, 60)

@@ -98,7 +98,7 @@ def test_a_pod_that_is_seen_late_is_not_needed_either(training):
 
 
 def test_what_happened_while_nobody_looked_is_counted(training, last_word):
-    """The failed pods stay; the run directory's record tells of those that do not."""
+    """The failed pods stay; the run directory's record holds those that do not."""
     scene, pod = training()
     scene.end(pod, 70, last_word())
     scene.count_failures(1)
@@ -233,7 +233,7 @@ def test_a_pod_that_was_taken_before_a_queue_suspended_the_job_is_a_disruption(t
 
 
 def test_a_pod_may_be_seen_before_its_job_tells_of_the_resumption(training):
-    """The two come by two watches; what is told later is not counted again for the pod after that one."""
+    """They come by two watches; a resumption that is seen late must not count for the pod after that one."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.pass_(15)
@@ -416,7 +416,7 @@ ENDS = ("failure", "taken", "deleted", "suspended")
 def test_the_counts_are_those_of_what_happened(accepted, lives):
     """Each pod of a replica ends somehow, and an operator looks after some of them only.
 
-    What is deleted while nobody looks leaves its trace in the run directory's record.
+    A pod that is deleted between two passes is still in the run directory's record.
     """
     scene = accepted(backoffLimit=100)
     truth = dict.fromkeys(ENDS, 0)

@@ -197,7 +197,7 @@ def test_a_world_that_goes_away_later_does_not_matter_to_a_running_job(make_scen
 
 
 def test_a_label_that_was_taken_away_keeps_a_new_pod_from_it(make_scene):
-    """What was not created yet is held like before; the replicas that run go on."""
+    """Objects that do not exist yet are held as before; running replicas go on."""
     scene = make_scene(simulators=WORLD, replicas=2)
     scene.there[("ConfigMap", "worlds")] = config_map({"hall.wbt": WORLD_TEXT})
     scene.settle()

@@ -79,7 +79,7 @@ def test_a_config_map_of_an_earlier_version_is_made_again_as_it_was(training):
 
 
 def test_only_a_replica_that_lacks_an_object_is_planned(accepted):
-    """What is planned anew for nothing takes the time of other jobs."""
+    """Planning a complete replica again would take time from other jobs."""
     scene = accepted(replicas=3)
     scene.objects["config_maps"].pop(1)
     job = accept(scene.raw)
@@ -272,7 +272,7 @@ def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
 
 
 def test_a_suspension_that_kueue_does_not_heed_is_told(training):
-    """It is Kueue's to decide in a queue, whoever chose the queue."""
+    """In a queue Kueue decides, also if the queue is only the namespace's default."""
     scene, _ = training()
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"
     scene.raw["spec"]["suspend"] = True

@@ -252,7 +252,7 @@ def test_an_ephemeral_run_is_named_in_a_condition(accepted):
 
 
 def test_each_action_and_each_change_is_one_event(make_scene):
-    """Creating the objects of a replica is one; nothing is told twice."""
+    """Creating all objects of a replica is one event, and no event repeats."""
     scene = make_scene()
 
     told = [(each.reason.value, each.replica) for each in scene.settle().events]

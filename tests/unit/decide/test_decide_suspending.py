@@ -182,7 +182,7 @@ def to_be_resumed(make_scene, kind, name, spec):
 @pytest.mark.parametrize("annotated", [True, False])
 @pytest.mark.parametrize(("kind", "name", "spec"), USES)
 def test_a_job_is_not_resumed_with_what_is_for_jobs_no_more(make_scene, annotated, kind, name, spec):
-    """Its next pod is a new one, and whoever took the label away meant it for new ones."""
+    """A removed label applies to new pods, and the next pod of the job is a new one."""
     scene = to_be_resumed(make_scene, kind, name, spec)
     scene.there[(kind, name)] = open_to_jobs(kind, name, {})
     if not annotated:

@@ -1,4 +1,4 @@
-"""What is wrong with a replica that goes on: shown at once, in the words of whoever knows."""
+"""Problems of a replica that goes on: shown at once, in the words of the component that reports them."""
 
 import pytest
 

@@ -91,7 +91,7 @@ def test_a_place_may_be_chosen_in_any_form_of_numbers(form):
 
 
 def test_both_may_be_chosen_even_if_they_are_near():
-    """Whoever chooses both knows why, for instance to try the last centimetres."""
+    """A caller that chooses both has a reason, for instance to test the last centimeters."""
     task = chosen_task(np.random.default_rng(0), {"start": Pose(0.0, 0.0, 0.0), "target": (0.1, 0.0)})
 
     assert task.target == (0.1, 0.0)

@@ -48,7 +48,7 @@ def test_it_slides_along_a_wall_and_says_so():
 
 
 def test_a_bump_is_over_once_the_robot_is_free():
-    """The bumper tells of the last step, not of the past."""
+    """The bumper reports the last step only."""
     robot, scene = fake_arena()
     scene.reset(0, Pose(1.72, 0.0, 0.0), (0.0, 0.0))
     robot.move(Movement.FORWARD)
@@ -101,7 +101,7 @@ def test_infrared_sees_a_cylinder_on_the_left_with_the_sensors_on_the_left():
     heading_rad=st.floats(-math.pi, math.pi, exclude_min=True),
 )
 def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed, moves, heading_rad):
-    """Whatever it is told: the body stays out of walls and cylinders, distances within 3..40 cm."""
+    """For every movement the body stays out of walls and cylinders, and distances stay within 3..40 cm."""
     robot, scene = fake_arena()
     scene.reset(seed, Pose(0.0, 0.0, heading_rad), (0.0, 0.0))
 

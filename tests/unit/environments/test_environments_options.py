@@ -1,4 +1,4 @@
-"""What a job file may say about the task, and what it is told when it is wrong."""
+"""The options of the task in a job file, and the errors for wrong ones."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def test_a_reward_is_made_of_known_terms(reward):
 
 
 def test_terms_are_reported_weighted():
-    """What is plotted by name adds up to what was learned from."""
+    """The terms that are plotted add up to the reward that the policy learns from."""
     step = transition(1.0, 0.9, Outcome.REACHED)
 
     terms = reward_terms("Dense", step)

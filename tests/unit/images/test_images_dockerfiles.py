@@ -55,7 +55,7 @@ def test_an_image_has_debian_trixie_as_its_base_unless_another_is_named(instruct
 
 
 def test_every_use_of_apt_is_without_recommendations_and_cleans_up(instructions):
-    """What is left in a layer stays in the image, also when a later one deletes it."""
+    """A file in a layer stays in the image, even if a later layer deletes it."""
     runs = [run for run in values(instructions, "RUN") if "apt-get" in run]
 
     assert runs
@@ -109,7 +109,7 @@ def test_the_labels_say_what_is_inside(instructions, recipe):
 
 
 def test_no_dockerfile_copies_or_adds(instructions):
-    """What is mounted leaves no layer; what were copied would stay in one."""
+    """A mounted file leaves no layer; a copied file would stay in one."""
     assert not {"COPY", "ADD"} & {instruction for instruction, _ in instructions}
 
 

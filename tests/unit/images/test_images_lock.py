@@ -80,7 +80,7 @@ def test_a_lock_of_another_form_is_refused_with_the_line():
 
 @given(st.lists(st.sampled_from(["palaestra", "palaestra-sim", "palaestra-trainer"]), unique=True))
 def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages):
-    """What is written can be read, so nothing is lost or invented on the way."""
+    """The written text parses to the same pins: nothing is lost or added."""
     pins = {pin.name: pin for pin in LOCK if "python_full_version <" not in (pin.marker or "")}
     for pin in parse(share(LOCK, packages, "x86_64")):
         assert pin.hashes == pins[pin.name].hashes

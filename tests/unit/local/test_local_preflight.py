@@ -1,4 +1,4 @@
-"""What is wrong with a machine or a job is found before anything is started."""
+"""Problems of a machine or a job are found before anything is started."""
 
 import pytest
 
@@ -64,7 +64,7 @@ def test_a_suspended_job_is_refused(request_for):
     ],
 )
 def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec, problem, monkeypatch):
-    """Whoever wrote the job can mend it."""
+    """The author of the job can fix it."""
     monkeypatch.setenv("PATH", "")
 
     assert any(each.startswith(problem) for each in preflight.programs_exist(request_for(**spec)))

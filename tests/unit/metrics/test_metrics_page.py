@@ -24,7 +24,7 @@ HOMES = {
     "trainer": ("palaestra_trainer_", "palaestra_simulator_"),
     "sidecar": ("palaestra_sidecar_", "palaestra_simulator_"),
 }
-# What is a unit here, or says that there is none; what ends otherwise counts things that it names.
+# Endings that are a unit, or that stand for none; a name with another ending counts the things that it names.
 ENDS = ("_seconds", "_bytes", "_ratio", "_steps", "_info", "_per_second", "_total")
 UNITLESS = {
     "palaestra_jobs",

@@ -50,5 +50,5 @@ def raw_pod(raw_job: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.fixture
 def look(raw_job: dict[str, Any]) -> Callable[..., Observed]:
-    """`look(pods=[...])`: what is observed of the job; its Job is there, unless `jobs` says otherwise."""
+    """`look(pods=[...])`: the observation of the job; its Job exists unless `jobs` replaces it."""
     return lambda **objects: observe(_make_job(), Objects(**({"jobs": [raw_job]} | objects)))

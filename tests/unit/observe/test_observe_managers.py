@@ -1,4 +1,4 @@
-"""Who wrote a field, by managedFields of which nothing is believed."""
+"""The writer of a field, read from managedFields that may hold anything."""
 
 import pytest
 

@@ -85,7 +85,7 @@ def test_the_words_of_others_are_one_line_and_cut(look, raw_pod):
     ],
 )
 def test_conditions_say_why(look, raw_pod, condition, field, value):
-    """Of the scheduler, of whoever took the pod, of the kubelet."""
+    """The scheduler, the component that removed the pod and the kubelet each set a condition."""
     raw_pod["status"]["conditions"] = [condition]
 
     assert getattr(pod(look, raw_pod), field) == value
@@ -121,7 +121,7 @@ def test_a_termination_message_is_cut_where_kubernetes_cuts_it(look, raw_pod):
 
 
 def test_the_memory_limit_is_that_of_the_pods_spec(look, raw_pod):
-    """Whoever is told that a container was killed for its memory wants to know at how much."""
+    """The message about a container that was killed for its memory names this limit."""
     limits = {each.name: each.memory_limit for each in pod(look, raw_pod).containers}
     raw_pod["spec"]["containers"][0]["resources"] = {"limits": "garbage"}
 

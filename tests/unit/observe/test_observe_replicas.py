@@ -81,7 +81,7 @@ def test_an_answer_belongs_to_the_pod_that_gave_it(look, raw_pod):
     ],
 )
 def test_the_end_of_a_job_is_in_its_conditions(look, raw_job, conditions, end):
-    """What is certain is enough; a lost node keeps the last pod from ending."""
+    """The early conditions are enough: a lost node keeps the last pod from ending."""
     raw_job["status"] = {"conditions": conditions}
 
     assert look(jobs=[raw_job]).replicas[0].job.end is end
@@ -178,7 +178,7 @@ def test_what_is_kept_in_memory_shows_the_same(look, raw_job, raw_pod):
 
 
 def test_a_pod_is_the_replicas_by_the_uid_of_its_job(look, raw_pod):
-    """Whoever may make pods may give them our labels."""
+    """A user with the right to create pods may give them our labels."""
     raw_pod["metadata"]["ownerReferences"] = [{"kind": "Job", "name": "job-0", "uid": "another"}]
 
     replica = look(pods=[raw_pod]).replicas[0]

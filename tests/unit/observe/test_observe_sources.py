@@ -11,7 +11,7 @@ def test_a_job_of_defaults_refers_to_nothing(make_job):
 
 
 def test_worlds_secrets_and_claims_are_named_with_their_fields(make_job):
-    """Whoever has to mend something wants to know where it is asked for."""
+    """To fix a missing object, the author has to know which field refers to it."""
     job = make_job(
         simulators=[
             {"name": "a", "role": "Collect", "world": {"configMap": {"name": "worlds", "key": "a.wbt"}}},

@@ -1,4 +1,4 @@
-"""What was decided on a cache that lags is not done: a read and preconditions say so."""
+"""Decisions from a stale cache are not carried out: a read and preconditions detect them."""
 
 import pytest
 

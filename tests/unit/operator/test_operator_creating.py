@@ -1,4 +1,4 @@
-"""What is done about an object whose name is taken."""
+"""Creating an object whose name is taken."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What is only compared for people must not end the operator."""
+"""A comparison that only informs people must not end the operator."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""What was refused is remembered until it was made; what passes by itself is no news."""
+"""A refusal is remembered until the request succeeds; errors that pass by themselves are ignored."""
 
 import pytest
 
@@ -22,7 +22,7 @@ WEBHOOK = "Internal error occurred: failed calling webhook x"
     ],
 )
 def test_what_a_person_has_to_mend_is_told_until_it_was_made(error):
-    """By replica, in the words of whoever refused."""
+    """By replica, in the words of the API server or webhook that refused."""
     denials = Denials()
 
     denials.learn(KEY, UID, {1: error})
@@ -41,7 +41,7 @@ def test_what_a_person_has_to_mend_is_told_until_it_was_made(error):
     ],
 )
 def test_what_passes_by_itself_changes_nothing(error):
-    """Neither is it told, nor is what was told before forgotten."""
+    """Such an error is not reported, and an earlier one is not forgotten."""
     denials = Denials()
 
     denials.learn(KEY, UID, {1: error})

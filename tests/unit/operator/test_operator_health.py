@@ -18,7 +18,7 @@ PHASES = [("robots", "Running"), ("robots", "Running"), ("home", "Failed")]
 
 @pytest.fixture
 def told():
-    """What is wrong by now; empty: nothing."""
+    """The current problems; empty if there is none."""
     return []
 
 

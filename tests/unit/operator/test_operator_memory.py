@@ -109,7 +109,7 @@ def test_nothing_stays_of_a_job_that_is_gone():
     strangers.meet(KEY, UID, "job-1")
     for _ in range(2):
         looking.look(job)
-    assert cluster.asked == 1, "who resumed the Job is read once for each change"
+    assert cluster.asked == 1, "the manager that resumed the Job is read once for each change"
 
     looking.forget(KEY)
 

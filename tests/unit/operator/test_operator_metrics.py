@@ -97,7 +97,7 @@ def test_an_end_for_a_reason_that_ends_nothing_is_counted_as_unknown(metrics):
 
 
 def test_a_job_that_was_refused_has_no_replicas_to_count(metrics):
-    """Its status tells of it."""
+    """Its status reports the refusal."""
     metrics.written(job(), {"phase": "Failed"})
 
     assert value(metrics, "palaestra_job_time_to_running_seconds_count") == 0

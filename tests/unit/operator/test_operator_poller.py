@@ -20,7 +20,7 @@ WAIT_S = 10.0
 
 
 class Trainer(socketserver.ThreadingTCPServer):
-    """Answers every connection with the same bytes, and then says nothing for as long as it is told."""
+    """Answers every connection with the same bytes, and then sends nothing for the given time."""
 
     daemon_threads = True
     block_on_close = False
@@ -141,7 +141,7 @@ def test_silent_pods_delay_nobody():
 
 
 def test_who_stops_answering_becomes_unknown_again():
-    """What was true once is no sign of life; stalled is for the trainer to say."""
+    """An old answer is no sign of life; only the trainer reports that it stalled."""
     with trainer(OK + BODY) as pod, polling(pod.target()) as poller:
         pod.asked(1)
         before = set(poller.known())

@@ -74,7 +74,7 @@ def test_a_job_that_is_made_again_begins_every_wait_anew():
 
 
 def test_nothing_is_remembered_of_the_time_before_this_operator_led():
-    """What was waited for then may have come and gone while another led."""
+    """An awaited change may have come and gone while another operator led."""
     records = Records()
     records.keep(KEY, "first", WAITS)
 

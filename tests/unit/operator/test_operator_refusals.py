@@ -208,7 +208,7 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     ids=["no node", "runs", "pulls images", "deleted"],
 )
 def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
-    """Its own status tells of that."""
+    """Its own status has the reason."""
     refusals = Refusals(server, lambda: server.now)
     refusals.of(KEY, UID, [], [pod])
     server.now += PATIENCE_S

@@ -1,4 +1,4 @@
-"""Who is asked when: pods that hold their questions up cost each other places, and nobody else."""
+"""The schedule of polls: slow pods take places from each other only."""
 
 import heapq
 from collections import defaultdict

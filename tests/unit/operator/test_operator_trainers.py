@@ -87,7 +87,7 @@ def test_a_trainer_whose_objects_go_is_asked_no_more(trainers):
 
 
 def test_a_job_that_does_not_belong_to_the_training_job_makes_no_trainers(trainers):
-    """Who may create Jobs could else let the operator ask a thousand pods."""
+    """A user with the right to create Jobs could otherwise make the operator poll a thousand pods."""
     trainers.job(named("job-r0", "job-uid", "stranger"), exists=True)
     trainers.pod(pod(), exists=True)
 

@@ -1,4 +1,4 @@
-"""Who may write when, and the merge patch of a status: what it changes, and what it leaves alone."""
+"""The right to write, and the merge patch of a status: what it changes, and what it leaves alone."""
 
 import pytest
 from hypothesis import given

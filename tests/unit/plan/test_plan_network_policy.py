@@ -1,4 +1,4 @@
-"""Who may talk to the pods of a job."""
+"""Access to the pods of a job."""
 
 import pytest
 

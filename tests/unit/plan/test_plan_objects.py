@@ -21,7 +21,7 @@ def test_a_job_is_a_policy_and_for_each_replica_a_config_map_a_claim_and_a_job(i
 
 
 def test_names_are_deterministic_and_no_two_objects_of_a_kind_share_one(in_cluster):
-    """Safety from names: whoever plans again makes the same objects, and is refused."""
+    """A second plan has the same names, so the API server refuses to create its objects twice."""
     first, second = in_cluster(replicas=3), in_cluster(replicas=3)
     names = [(each["kind"], each["metadata"]["name"]) for each in first.objects]
 

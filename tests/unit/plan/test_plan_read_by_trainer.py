@@ -56,7 +56,7 @@ def test_no_evaluation_is_written_as_zero_and_read_as_zero(make_job):
     ],
 )
 def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
-    """What is absent has its default in the trainer alone."""
+    """Only the trainer has defaults for absent fields."""
     job = make_job(trainer={"algorithm": {"name": "PPO"} | written})
 
     assert read_back(job).algorithm.normalize == read

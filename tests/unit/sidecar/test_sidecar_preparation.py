@@ -134,7 +134,7 @@ def test_a_missing_world_is_named(tmp_path) -> None:
 
 
 def test_a_world_that_does_not_fit_is_not_there_at_all(source, tmp_path) -> None:
-    """Half a world would be run by whoever comes next."""
+    """The next start would run half a world."""
     (tmp_path / "work" / "collect-1.wbt").mkdir(parents=True)
 
     with pytest.raises(SidecarError, match=r"^--work: .*: Is a directory; give a folder with room$"):

@@ -306,7 +306,7 @@ def test_a_last_word_of_any_length_fits_in_a_termination_message(messages, data)
 
 
 def test_a_long_log_does_not_drive_out_the_faults() -> None:
-    """Whoever reads it wants to see both."""
+    """A reader of the last word needs both."""
     fault = FaultRecord(
         time="2025-01-31T12:00:00Z", simulator="collect-0", kind="dead", fact="x" * 150, step=7
     )

@@ -32,7 +32,7 @@ def is_linear(path):
 
 @pytest.mark.parametrize(("path", "type_name"), [row for row in rows() if not is_linear(row[0])])
 def test_every_service_of_the_table_is_served_with_its_type(robot, path, type_name):
-    """Types with the same md5 are told apart by name only, by `rosservice type`."""
+    """`rosservice type` distinguishes types of the same md5 by name only."""
     service, _ = robot.services[path]
 
     assert service.name == type_name
@@ -55,7 +55,7 @@ def test_a_rotational_motor_has_no_services_for_force(robot):
 
 
 def test_the_device_list_is_advertised_last(robot):
-    """Whoever finds it finds everything: the best probe for readiness."""
+    """Once it is there, all other services are there: it is the best readiness probe."""
     assert list(robot.services)[-1] == "robot/get_device_list"
 
 

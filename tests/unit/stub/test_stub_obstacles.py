@@ -78,7 +78,7 @@ def test_a_ray_towards_the_middle_meets_the_shape(obstacle, x, y):
 
 @given(obstacle=obstacles, x=places, y=places)
 def test_a_ray_away_from_the_shape_does_not_turn_round(obstacle, x, y):
-    """What is behind isn't seen."""
+    """A sensor does not see obstacles behind it."""
     assume(obstacle.gap(x, y) > 1e-3)
 
     assert cast(obstacle, x, y, math.atan2(y - obstacle.y, x - obstacle.x)) == 10.0

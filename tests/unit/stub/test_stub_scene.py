@@ -1,4 +1,4 @@
-"""Worlds: what is read from them, and what is refused, by line and column."""
+"""Worlds: the content that is read, and refusals with line and column."""
 
 import math
 import pickle

@@ -100,7 +100,7 @@ def test_the_front_sensor_tells_volts_at_a_wall(simulation):
 
 
 def test_the_bumper_tells_every_touch_since_it_was_read(simulation):
-    """A touch in the first of six basic steps is not missed, and is told once."""
+    """A touch in the first of six basic steps is not missed, and is reported once."""
     robot = simulation.robots[0]
     robot.body.place(1.76, 0.0, 0.0)
     drive(simulation, 0.5, 0.0, 0.0)

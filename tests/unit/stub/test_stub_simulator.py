@@ -97,7 +97,7 @@ def test_revert_is_the_old_name_of_reload(ros, start):
 
 
 def test_a_reload_reads_the_file_again(ros, start):
-    """What was edited meanwhile is there; the mode stays."""
+    """It applies changes of the file and keeps the mode."""
     simulator = start(mode=Mode.FAST)
     text = simulator.world_path.read_bytes()
     simulator.world_path.write_bytes(text.replace(b"basicTimeStep 32", b"basicTimeStep 16"))
@@ -195,7 +195,7 @@ def test_quit_ends_pending_steps_without_success(two_robots):
 
 
 def test_quitting_twice_keeps_the_first_status(ros, start):
-    """Whoever is second comes too late."""
+    """The second request comes too late."""
     simulator = start()
     robot = ros.node("robotino")
 

@@ -1,4 +1,4 @@
-"""`time_step`: what is accepted, when it is answered, and who waits for whom."""
+"""`time_step`: accepted values, the time of the answer, and which controller waits for which."""
 
 import pytest
 from hypothesis import given

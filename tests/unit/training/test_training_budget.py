@@ -33,7 +33,7 @@ def test_the_message_tells_flapping_from_an_accident():
 
 
 def test_a_budget_of_nothing_bears_nothing():
-    """Whoever sets restart.limit to 0 wants to see the first fault."""
+    """With restart.limit 0 the first fault ends the run."""
     budget = RestartBudget("collect-0", Care(restart_limit=0))
 
     with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 0 restarts within 600 s .* \(last: robotino: "):

@@ -115,7 +115,7 @@ def test_a_fault_at_once_truncates_nothing():
 
 @pytest.mark.parametrize("steps", [0, 1, 3, 4, 7])
 def test_a_replay_buffer_goes_back_to_where_it_stood(steps):
-    """What was stored since is stored again, at the same places, before anything is sampled."""
+    """Later transitions are stored again at the same positions before anything is sampled."""
     buffer = replay(size=8)
     for number in range(steps):
         add(buffer, [2 * number, 2 * number + 1], [True, True])

@@ -522,7 +522,7 @@ class Bomb:
 
 
 def test_nothing_in_a_model_is_unpickled(trained, tmp_path):
-    """Whoever may write to a volume may not run code in the trainer."""
+    """Write access to a volume must not allow code execution in the trainer."""
     model = trained(steps=0).model
     model.save(tmp_path / "model.zip")
     with zipfile.ZipFile(tmp_path / "model.zip", "a") as archive:

@@ -16,7 +16,7 @@ WRONG = "job: x\nsteps: 0\nenvironment: {id: A-v0}\nsimulators: []\n"
 
 @pytest.fixture(autouse=True)
 def nothing_given(monkeypatch):
-    """Forget what the shell of whoever runs the tests has set."""
+    """Remove the variables that the developer's shell may have set."""
     for name in ("PALAESTRA_CONFIG", "PALAESTRA_RUN", "PALAESTRA_TERMINATION_LOG"):
         monkeypatch.delenv(name, raising=False)
 

@@ -1,4 +1,4 @@
-"""What a training.yaml may say, and how its mistakes are told."""
+"""The content of a training.yaml, and the errors for its mistakes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_what_is_dumped_is_read_back_as_the_same():
 
 
 def test_all_mistakes_are_told_at_once():
-    """Whoever mends one mistake at a time starts a pod for each."""
+    """Each attempt to fix a mistake costs a new pod."""
     wrong = MINIMAL | {"steps": 0, "evaluation": {"episodes": 0}, "seed": -1}
 
     with pytest.raises(ConfigurationError) as caught:
@@ -102,7 +102,7 @@ def test_an_unknown_field_is_logged_with_its_place_and_ignored():
 
 
 def test_an_unknown_field_hides_no_mistake_of_another():
-    """What is wrong beside it is refused as ever, also what only the whole can show."""
+    """Other mistakes are refused as always, including those that involve several fields."""
     with pytest.raises(ConfigurationError, match="none has role Collect"):
         parse(MINIMAL | {"ofTomorrow": 1, "simulators": [MINIMAL["simulators"][0] | {"role": "Evaluate"}]})
 

@@ -1,4 +1,4 @@
-"""Numbers that are none: where they are looked for, and how they are told."""
+"""NaN and infinity: where they are looked for, and how they are reported."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_one_wrong_number_in_any_tensor_is_found_and_named(model, name, number):
 
 
 def test_a_refusal_names_step_loss_and_tensors(model):
-    """Whoever reads it knows where to look, and what to change."""
+    """The message shows where to look and what to change."""
     made = model("PPO")
     made.logger.record("train/value_loss", math.inf)
     with torch.no_grad():

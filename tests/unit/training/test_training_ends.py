@@ -128,7 +128,7 @@ def test_a_run_that_moves_is_left_alone():
 
 
 def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
-    """The one thing that helps whoever has to find out why."""
+    """The stacks are the only clue to the cause."""
     program = (
         "import threading; from palaestra_trainer.watchdog import Watchdog\n"
         "def hang(): threading.Event().wait(60)\n"

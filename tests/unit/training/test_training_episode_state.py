@@ -132,7 +132,7 @@ def test_a_log_keeps_actions_as_they_are(action):
 
 
 def test_continuous_actions_are_kept_by_row():
-    """Whoever drives with velocities has several numbers an action."""
+    """An action of velocities has several numbers."""
     log = ActionLog()
     space = spaces.Box(-1.0, 1.0, (3,), np.float32, seed=1)
     wanted = [space.sample() for _ in range(20)]

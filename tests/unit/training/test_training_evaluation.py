@@ -80,7 +80,7 @@ def test_an_evaluation_can_be_given_up_between_episodes(make_member):
 
 @pytest.mark.parametrize("first", [True, False])
 def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
-    """Whoever presses Ctrl-C does not want to see the other half of them."""
+    """After Ctrl-C the other half of the episodes must not be played."""
     broken = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=0))
     other = make_member("evaluate-1")
     keepers = [broken, Keeper(other)] if first else [Keeper(other), broken]
@@ -92,7 +92,7 @@ def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
 
 
 def test_the_episodes_of_a_broken_simulator_move_to_the_others(make_member):
-    """Whoever waits for the evaluation does not wait for the repair."""
+    """The evaluation must not wait for the restart."""
     broken = make_member("evaluate-0", steps=[1], held=True)
     other = make_member("evaluate-1")
 

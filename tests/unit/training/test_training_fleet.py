@@ -29,7 +29,7 @@ DEADLINE_S = 5.0
 
 
 class Told(Nobody):
-    """A watcher that keeps what it was told."""
+    """A watcher that records its calls."""
 
     def __init__(self):
         self.told = []
@@ -118,7 +118,7 @@ def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_flee
 
 
 def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member, monkeypatch):
-    """Who waits for the first step sees which of them it is, before a deadline makes a fault of it."""
+    """The log names the late simulator before its deadline makes a fault of it."""
     monkeypatch.setattr("palaestra_trainer.simulators.fleet.LONG_S", 0.0)
     released = threading.Event()
     member = make_member("collect-0")

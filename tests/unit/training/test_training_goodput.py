@@ -19,7 +19,7 @@ from palaestra_trainer.waits import count_wait, waited_s
 
 
 class Clock:
-    """A clock that is set by hand, and a thread that waits while it is told to."""
+    """A clock that is set by hand, and a thread that waits for as long as a test asks it to."""
 
     def __init__(self):
         self.now = 1000

@@ -1,4 +1,4 @@
-"""What is known of an attempt that was killed."""
+"""The record of an attempt that was killed."""
 
 from __future__ import annotations
 

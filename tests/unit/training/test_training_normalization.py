@@ -67,7 +67,7 @@ def of(running):
 
 @pytest.mark.parametrize(("observations", "rewards"), [(True, True), (False, True), (True, False)])
 def test_without_faults_it_is_stable_baselines3s_own(make_env, observations, rewards):
-    """To the last bit: whoever knows VecNormalize knows this."""
+    """Equal to the last bit: the documentation of VecNormalize holds here."""
     wanted = Normalize(observations=observations, rewards=rewards, clip_observations=1.5, clip_rewards=1.2)
     ours = ValidNormalize(make_env(), wanted, GAMMA)
     theirs = VecNormalize(
@@ -156,7 +156,7 @@ def test_the_replay_buffer_holds_what_was_seen(make_normal):
 
 
 def test_a_policy_is_shown_what_it_learned_from(make_env):
-    """Whoever asks it has observations as they are."""
+    """A caller of the policy has raw observations."""
     env = make_env()
     env.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)  # a number tells more than a movement
     normalizing = Algorithm(name="PPO", hyperparameters=HYPERPARAMETERS["PPO"], normalize=Normalize())

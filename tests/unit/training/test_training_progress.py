@@ -1,4 +1,4 @@
-"""How far the run is, and who is told."""
+"""The progress of a run, and its reports."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def test_recycling_is_no_restart(progress):
 
 
 def test_a_simulator_is_ready_when_it_is_up_and_not_when_all_are(progress):
-    """Whoever asks which one is late must not be told of the others."""
+    """The status must show which simulator is late."""
     progress.started("collect-0")
 
     states = {each.name: each.state for each in progress.status().simulators}
@@ -321,7 +321,7 @@ def test_status_is_the_protocol_s(progress):
 
 
 def test_metrics_are_the_same_numbers(progress):
-    """What is unknown is absent."""
+    """Unknown values are absent."""
     progress.collected(7, [{"episode": {"r": 2.0, "l": 3}}])
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
     with StatusServer("127.0.0.1:0", progress) as server:

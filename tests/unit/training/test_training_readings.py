@@ -1,4 +1,4 @@
-"""What is read out of a sensor's messages, and what is refused."""
+"""The values that are read from a sensor's messages, and the messages that are refused."""
 
 import struct
 

@@ -101,7 +101,7 @@ def test_memory_is_not_asked_for_where_it_has_no_limit(clock):
 
 
 def test_the_first_limit_that_is_reached_is_the_reason(clock):
-    """It is told in the log, so that somebody can raise it."""
+    """The log names it, so that a user can raise the right limit."""
     limits = Recycle(after_resets=24, after_minutes=1, above_memory_bytes=MIB)
     wear = Wear(limits, Memory(2 * MIB), clock)
     clock.now_s += 60.0

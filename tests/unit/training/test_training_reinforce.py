@@ -107,7 +107,7 @@ def test_an_update_has_whole_episodes_of_the_current_policy(make_model):
 
 
 def test_training_ends_at_the_first_episode_end_after_the_last_step(make_model):
-    """What was begun is finished, and no more is begun."""
+    """The current episode is finished, and no other begins."""
     model, batches = make_model(episodes_per_update=1000)
 
     model.learn(10)

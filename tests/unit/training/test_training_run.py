@@ -147,7 +147,7 @@ def test_what_is_wrong_is_told_before_a_simulator_is_made(play, job, last_word, 
 
 
 def test_members_that_are_missing_are_told(job, directory, last_word):
-    """Whoever makes them forgot one."""
+    """The function that makes them left one out."""
     code = training.run(job(), directory, lambda _: [])
 
     assert code == 2

@@ -1,4 +1,4 @@
-"""What is in a run directory, and that it is old or new, never half."""
+"""The files of a run directory: each is the old or the new one, never half of one."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def test_the_best_policy_is_confirmed_at_the_end_and_the_last_one_is_kept(play, 
 
 
 def test_an_evaluation_keeps_its_episodes(play, job, directory):
-    """Who doubts a rate looks at the episodes, and plays one of them again by its seed."""
+    """A user who doubts a rate can look at its episodes and repeat one by its seed."""
     play(job(), report=lambda seed, reached: {"is_success": reached, "outcome": f"of-{seed}"})
 
     line = next(read_lines(directory.evaluations))

@@ -42,7 +42,7 @@ def test_results_come_in_the_order_of_the_works(pauses):
 
 @given(st.lists(st.integers(1, 4), min_size=2, max_size=5))
 def test_everyone_has_a_first_turn_before_anyone_has_a_second(pauses):
-    """Whoever is asked first is read first, and all are asked before one is awaited."""
+    """Answers are read in the order of the requests, and all requests are sent before the first wait."""
     turns = []
 
     def work(place):
@@ -156,7 +156,7 @@ def test_an_answer_that_stays_away_is_left_to_whoever_asked_first(connections):
 
 
 def test_a_wait_of_all_is_nobody_s_turn(connections):
-    """It counts as waiting for simulators, and as part of every step that waits, whoever was asked before."""
+    """It counts as waiting for simulators and as part of each waiting step, whichever was asked first."""
     began, waited = time.perf_counter(), waited_s()
     found = []
 
@@ -173,7 +173,7 @@ def test_a_wait_of_all_is_nobody_s_turn(connections):
 
 
 def test_the_slow_wait_beside_each_other_too(connections):
-    """A step of fifty milliseconds takes that long, whoever was asked before."""
+    """A step of fifty milliseconds takes that long, whichever simulator was asked first."""
     began, waited = time.perf_counter(), waited_s()
     found = []
 
@@ -204,7 +204,7 @@ def test_when_patience_is_over_nobody_is_waited_for(connections):
 
 
 def test_of_several_errors_the_first_work_s_is_raised(connections):
-    """Whoever answered first, so that a run that is repeated fails in the same way."""
+    """Whichever simulator answered first: a repeated run must fail in the same way."""
 
     def fail(place):
         if place == 0:

@@ -202,7 +202,7 @@ def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
 
 
 def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_member):
-    """A simulator may take a minute to come up; whoever evicts the pod gives it half of that."""
+    """A simulator may take a minute to start; an eviction allows half of that."""
 
     def check():
         raise Interrupted("SIGTERM received")
@@ -483,7 +483,7 @@ def test_members_step_at_the_same_time(make_env, make_member):
 
 @pytest.mark.parametrize("members", [1, 2])
 def test_resting_reaches_every_member(make_env, make_member, members):
-    """Resting simulators leave the processor to whoever learns."""
+    """Paused simulators leave the processor to the learner."""
     made = [make_member(f"collect-{index}") for index in range(members)]
     env = make_env(*made)
 
@@ -522,7 +522,7 @@ def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_membe
 
 
 def test_observations_by_name_are_stacked_by_name(make_env, make_member):
-    """Whoever has a camera has a Dict."""
+    """The observation of a robot with a camera is a Dict."""
 
     class Named(Wrapper):
         observation_space = spaces.Dict({"place": spaces.Box(-1.0, 1.0, (2,), np.float32)})

@@ -1,4 +1,4 @@
-"""What `palaestra describe` tells of a job, line by line."""
+"""The lines that `palaestra describe` prints about a job."""
 
 from datetime import timedelta
 

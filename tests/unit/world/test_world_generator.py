@@ -29,7 +29,7 @@ def generated(world: Make, identity: RunIdentity) -> Callable[..., str]:
 
 @pytest.fixture
 def refusal(world: Make, identity: RunIdentity) -> Callable[..., str]:
-    """Return what tells how a world is refused."""
+    """Return a function that returns the refusal of a world."""
 
     def tell(text: str, *, relative_addresses: bool = False) -> str:
         with pytest.raises(WorldError) as caught:
@@ -116,7 +116,7 @@ def robot(arguments: str, name: str = "robotino") -> str:
         pytest.param(
             r'controllerArgs ["a\b \"c\""]',
             r'controllerArgs ["--name=NAME" "--synchronize" "a\b \"c\""]',
-            id="what is kept is kept as written",
+            id="kept arguments stay as written",
         ),
         pytest.param(
             'customData "--clock"',

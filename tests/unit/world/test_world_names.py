@@ -24,7 +24,7 @@ identities = st.builds(
 
 
 def test_a_name_says_whose_it_is(identity: RunIdentity) -> None:
-    """Whoever reads `rosnode list` sees job, replica, simulator and robot."""
+    """A reader of `rosnode list` sees job, replica, simulator and robot."""
     name = ros_name(identity, "robotino")
 
     assert re.fullmatch("move_to_target_r0_collect_1a_robotino_[0-9a-f]{6}", name)
@@ -68,7 +68,7 @@ def test_a_standby_beside_a_simulator_has_a_name_of_its_own(identity: RunIdentit
 
 
 def test_the_same_job_created_again_has_other_names(identity: RunIdentity) -> None:
-    """What is left of the first one must not be taken for the second."""
+    """Remains of the first job must not be taken for the second."""
     assert ros_name(identity, "robotino") != ros_name(replace(identity, uid="7a20"), "robotino")
 
 

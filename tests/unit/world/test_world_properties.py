@@ -139,7 +139,7 @@ def test_generating_twice_changes_nothing(source: bytes, *, clock: bool) -> None
     b'Robot { name "r" controller "ros" controllerArgs [ "--name=a"  # c\n"--name=a" "--clock" ] } '
 )
 def test_taking_the_clock_away_later_is_the_same_as_never_allowing_it(source: bytes) -> None:
-    """Who generates first doesn't matter."""
+    """The order of the two generations does not matter."""
     allowed = generate(source, IDENTITY, clock=True)
 
     assert generate(allowed, IDENTITY, clock=False) == generate(source, IDENTITY, clock=False)

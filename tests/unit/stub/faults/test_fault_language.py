@@ -41,7 +41,7 @@ def test_blanks_and_new_lines_stand_between_faults():
 
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_makes_its_own_class(name):
-    """Nothing is told apart by a text later on."""
+    """Code distinguishes faults by class, not by their text."""
     text = f"{name}:latency_ms=1" if KINDS[name].needs else name
 
     assert type(one(text)) is KINDS[name].make
@@ -120,7 +120,7 @@ def test_a_value_may_be_no_number():
     ],
 )
 def test_a_wrong_fault_is_told_with_its_place_its_fact_and_a_remedy(text, words):
-    """Whoever wrote it can mend it without looking anything up; a lone colon does no harm."""
+    """Its author can fix it without the documentation; a trailing colon does no harm."""
     if words is None:
         assert one(text).trigger == Trigger(event=Event.STEP)
         return

@@ -10,7 +10,7 @@ from palaestra_sim.world import builtin
 
 @pytest.fixture
 def read():
-    """`read("--fault", "crash", PALAESTRA_STUB_FAULTS="hang")`: what is ordered."""
+    """`read("--fault", "crash", PALAESTRA_STUB_FAULTS="hang")`: the requested faults."""
 
     def make(*arguments, **environment):
         parser = argparse.ArgumentParser()
