@@ -1,6 +1,6 @@
 """Record the generated files anew: `python -m tests.golden`.
 
-    tests/golden/<example>.<layout>.yaml    the whole plan of each manifests/examples/*.yaml
+    tests/golden/<example>.<layout>.yaml    the plan of each manifests/examples/*.yaml, worlds by checksum
     manifests/crd.yaml, docs/trainingjob.md what the API is made of
     docs/trainingjob.md                     the default hyperparameters of the algorithms
     docs/metrics.md                         every metric that the programs declare
@@ -11,15 +11,18 @@
 A new example needs no new test: its plans are recorded here and compared by test_golden.py.
 """
 
+import hashlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from palaestra.api import load
 from palaestra.api.generated import generated_files
 from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
 from palaestra.plan.text import as_yaml
+from palaestra_sim.world import builtin
 from tests.chart import installation, readme
 from tests.control_plane.programs import NoPrograms
 from tools import dashboards
@@ -29,6 +32,7 @@ from tools.metrics import page as metrics
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "manifests" / "examples"
 IMAGES = Images.of_release("0.0.0")  # of no release, so that a release changes no plan
+SHIPPED = ("arena",)
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 
 
@@ -42,7 +46,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
         }
         for name, layout in layouts.items():
             path = ROOT / "tests" / "golden" / f"{example.stem}.{name}.yaml"
-            yield path, as_yaml(plan(job, layout).objects)
+            yield path, as_yaml(with_worlds_named(plan(job, layout).objects))
     for name, text in generated_files(ROOT).items():
         yield ROOT / name, text
     yield ROOT / hyperparameters.PAGE, hyperparameters.page((ROOT / hyperparameters.PAGE).read_text())
@@ -52,6 +56,24 @@ def recorded() -> Iterator[tuple[Path, str]]:
     yield readme.PATH, readme.text()
     with suppress(NoPrograms):  # whoever changes the chart has Helm; all others leave the file as it is
         yield installation.PATH, installation.text()
+
+
+def with_worlds_named(objects: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the objects with one line for each world, so that a plan can be read."""
+    return [
+        {**planned, "data": {key: named(key, text) for key, text in planned["data"].items()}}
+        if "data" in planned
+        else planned
+        for planned in objects
+    ]
+
+
+def named(key: str, text: str) -> str:
+    """Return name, length and checksum of a world, any other text as it is."""
+    if not key.endswith(".wbt"):
+        return text
+    name = next((name for name in SHIPPED if builtin(name) == text.encode()), "the job's own world")
+    return f"{name}, {len(text):,} characters, sha256 {hashlib.sha256(text.encode()).hexdigest()}"
 
 
 def main() -> int:
