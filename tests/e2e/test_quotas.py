@@ -125,15 +125,15 @@ def one_place(cluster):
 
 
 @pytest.mark.parametrize("name", REFUSALS)
-def test_what_is_refused_is_told_in_the_words_of_whoever_refuses(name, refused):
-    """There is no pod to look at: only the Job's events, or the answer to the operator, tell of it."""
+def test_the_status_quotes_the_refusal(name, refused):
+    """There is no pod: only the Job's events, or the API server's answer to the operator, have the reason."""
     assert refused[name]["phase"] == "Pending"
     assert REFUSALS[name].words in refused[name]["message"]
     assert refused[name]["attempt"] == 0
 
 
 @pytest.mark.usefixtures("classes", "one_place")
-def test_a_job_that_the_scheduler_takes_off_its_node_is_told_so_and_comes_back(namespace, job):
+def test_a_job_that_the_scheduler_preempts_gets_an_event_and_comes_back(namespace, job):
     """A PriorityClass makes room without a queue as well; that is a disruption and no failure."""
     namespace.apply(job("everyday", script=WAITS_ONCE, simulator=IN_PLACE, backoffLimit=0))
     namespace.wait_for_pod("everyday")

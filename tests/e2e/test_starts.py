@@ -76,7 +76,7 @@ def test_a_job_starts_when_its_world_appears(namespace, job):
     assert namespace.wait_for_end("waits", LONG_S) == "Succeeded"
 
 
-def test_a_pod_that_no_node_takes_is_told_in_the_scheduler_s_words(namespace, job):
+def test_the_status_of_an_unschedulable_pod_quotes_the_scheduler(namespace, job):
     """Nothing fails: a node may come."""
     namespace.apply(job("no-node", script=WAIT, scheduling=NOWHERE))
 

@@ -34,7 +34,7 @@ def child(namespace, name):
     return {"apiVersion": "batch/v1", "kind": "Job", "metadata": metadata, "spec": {"template": template}}
 
 
-def test_the_version_is_told(real):
+def test_the_version_of_the_api_server_is_returned(real):
     """Proof that credentials and certificates work."""
     assert real.version().startswith("v1.")
 

@@ -59,7 +59,7 @@ def test_an_exit_code_comes_with_what_the_command_said(rude):
     assert failed.value.code == 7
 
 
-def test_a_program_that_is_not_there_is_told_in_the_runtimes_words(rude):
+def test_a_missing_program_raises_an_error_with_the_runtimes_words(rude):
     """It has no exit code."""
     rude.script.calls = [command(NOT_STARTED)]
 

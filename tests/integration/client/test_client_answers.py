@@ -126,7 +126,7 @@ def test_a_trial_prints_why_its_replica_waits(server, tmp_path, monkeypatch, cap
 
 
 @pytest.mark.parametrize(("phase", "code"), [("Succeeded", 0), ("Failed", 1)])
-def test_a_trial_that_cannot_be_deleted_for_now_is_told_beside_its_verdict(tried, capsys, phase, code):
+def test_a_trial_that_cannot_be_deleted_for_now_is_reported_beside_its_verdict(tried, capsys, phase, code):
     """An API server that restarts says nothing about the installation."""
     assert tried(phase, refusal(503, "ServiceUnavailable")) == code
 
@@ -189,7 +189,7 @@ def test_one_job_is_asked_for_once(server, capsys, answer, code, said):
         *("suspend trial", "resume trial", "delete trial", "fetch trial", "try FILE"),
     ],
 )
-def test_a_cluster_that_does_not_know_trainingjobs_is_told_with_how_to_install_them(
+def test_the_error_for_a_cluster_without_trainingjobs_shows_how_to_install_them(
     server, tmp_path, capsys, command
 ):
     """The API server's own answer is `404 page not found`, and no job's name is to blame."""

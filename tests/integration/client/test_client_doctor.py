@@ -47,7 +47,7 @@ def verdicts(findings):
     return {what: each.verdict.value for what, each in findings.items()}
 
 
-def test_a_cluster_without_nodes_storage_and_operator_is_told_so(found):
+def test_missing_nodes_storage_and_operator_are_reported(found):
     """Each with its remedy; what is right there is right."""
     findings = found()
 
@@ -80,7 +80,7 @@ def test_the_command_ends_with_1_if_anything_is_wrong(typed, place):
     assert any(line.strip().startswith("-> install Palaestra") for line in out)
 
 
-def test_an_api_server_that_does_not_answer_is_all_that_is_told(tmp_path, capsys):
+def test_an_api_server_that_does_not_answer_is_the_only_finding(tmp_path, capsys):
     """Everything else would be the same line again."""
     kubeconfig = tmp_path / "kubeconfig"
     kubeconfig.write_text(
@@ -148,7 +148,7 @@ def install(place, *, replicas=1, **container):
     )
 
 
-def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
+def test_the_finding_about_an_operator_that_is_not_ready_names_its_image(found, place):
     """Its log says why."""
     install(place)
 
@@ -160,8 +160,8 @@ def test_an_operator_that_is_not_ready_is_told_with_its_image(found, place):
     assert "service account chosen may not" in findings["operator's rights"].fact
 
 
-def test_an_operator_that_is_scaled_to_0_is_told_so_with_the_command_that_scales_it(found, place):
-    """It has no pod whose log would say why nothing happens, and nobody can lead."""
+def test_the_finding_about_an_operator_at_0_replicas_has_the_command_that_scales_it(found, place):
+    """It has no pod whose log would explain the problem, and no leader."""
     install(place, replicas=0)
 
     findings = found()
@@ -172,7 +172,7 @@ def test_an_operator_that_is_scaled_to_0_is_told_so_with_the_command_that_scales
     assert told[0].fact.startswith(f"is scaled to 0 in {place.name}")
 
 
-def test_a_namespace_that_does_not_exist_is_told_with_how_to_make_or_choose_one(place):
+def test_the_finding_about_a_missing_namespace_shows_how_to_make_or_choose_one(place):
     """RBAC would grant rights in it all the same, and a dry run there only says that it is not found."""
     site = Site(api=place.api, namespace="nosuch", operator_namespace=place.name)
 

@@ -270,7 +270,7 @@ def test_the_first_pod_is_not_robbed_of_its_volume_either(scene):
     assert scene.asked("POST", "/pods") == []
 
 
-def test_a_run_that_went_with_its_pod_is_told_so(scene):
+def test_the_error_for_a_run_that_went_with_its_pod_names_the_field(scene):
     """There is no claim to mount."""
     scene.ephemeral = True
 
@@ -278,7 +278,7 @@ def test_a_run_that_went_with_its_pod_is_told_so(scene):
         scene.fetch()
 
 
-def test_a_pod_that_does_not_start_is_told_with_the_reason_and_deleted(scene):
+def test_a_pod_that_does_not_start_is_deleted_and_the_error_has_the_reason(scene):
     """The words are the kubelet's."""
     scene.reader = {"phase": "Pending", "containerStatuses": [{"state": {"waiting": WAITING}}]}
 

@@ -96,7 +96,7 @@ def test_what_a_job_is_fixed_on_cannot_be_applied_anew(client):
         client.apply(training_job("a", seed=2))
 
 
-def test_a_job_that_is_not_there_is_told_with_the_way_to_find_it(client):
+def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
     """A wrong namespace is the usual cause."""
     for ask in (client.get, client.suspend, client.delete, client.events):
         with pytest.raises(
@@ -227,7 +227,7 @@ def test_a_replica_without_a_pod_has_no_log(client):
         list(client.logs("a", deadline_s=SOON_S))
 
 
-def test_a_log_that_is_gone_with_its_pod_is_told(client, tell):
+def test_reading_a_log_that_went_with_its_pod_is_an_error(client, tell):
     """Its last lines are kept in the status."""
     client.apply(training_job("a"))
     pod = {"name": "a-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}

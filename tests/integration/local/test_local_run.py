@@ -254,8 +254,8 @@ def test_verbose_shows_every_log_with_the_name_of_its_container(desk):
     assert "[trainer] hello from the trainer" in out
 
 
-def test_a_failure_is_told_with_its_last_lines_and_its_log(desk):
-    """Nobody has to know where logs are to see why a run failed."""
+def test_a_failure_prints_its_last_lines_and_the_path_of_its_log(desk):
+    """A user sees why a run failed without looking for the log."""
     desk.write("raise SystemExit('no such reward')")
 
     code, out = desk.run()

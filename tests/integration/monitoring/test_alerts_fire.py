@@ -72,7 +72,7 @@ def test_no_alert_is_without_a_case_in_which_it_fires_and_one_in_which_it_does_n
     assert {case["alertname"] for case in cases if not case["exp_alerts"]} == names
 
 
-def test_what_a_sick_run_causes_is_told_and_taken_back(tmp_path, folder, rules):
+def test_the_alerts_about_a_sick_run_fire_and_clear(tmp_path, folder, rules):
     """Slow simulators, no checkpoint, a budget that runs out, and simulators that nobody mends."""
     job = make_job(**SICK)
     job["spec"]["stallDeadlineSeconds"] = 30
@@ -96,7 +96,7 @@ def test_what_a_sick_run_causes_is_told_and_taken_back(tmp_path, folder, rules):
         _clears(prometheus, "PalaestraTrainingStalled")
 
 
-def test_operators_that_do_not_lead_or_are_gone_are_told_and_taken_back(folder, rules, place, start):
+def test_alerts_fire_without_a_leader_and_without_an_operator(folder, rules, place, start):
     """The second waits for the Lease of the first, which dies as in a power failure."""
     first = start(elect=True)
     address(first)

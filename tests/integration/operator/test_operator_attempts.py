@@ -82,7 +82,7 @@ def lose(place, pod):
 
 
 @pytest.mark.parametrize("take", [evict, lose])
-def test_a_disruption_is_counted_and_told_and_is_no_failure(take, place, start):
+def test_a_disruption_is_counted_and_reported_and_is_no_failure(take, place, start):
     """With a backoffLimit of 0 the next pod is made all the same."""
     start()
     place.train(backoffLimit=0)
@@ -108,8 +108,8 @@ def others(place, pod):
     return [each for each in place.pods() if each["metadata"]["uid"] != pod["metadata"]["uid"]]
 
 
-def test_a_simulator_that_was_killed_for_its_memory_is_told_with_its_limit(place, start):
-    """Its container runs again at once, so nothing else would tell it from a crash."""
+def test_a_simulator_that_was_killed_for_its_memory_is_reported_with_its_limit(place, start):
+    """Its container restarts at once, so it would otherwise look like a crash."""
     start()
     group = {"name": "collect", "role": "Collect", "resources": {"limits": {"memory": "512Mi"}}}
     place.train(simulators=[group, {"name": "evaluate", "role": "Evaluate"}])
@@ -125,8 +125,8 @@ def test_a_simulator_that_was_killed_for_its_memory_is_told_with_its_limit(place
     assert replica(place)["phase"] == "Running"
 
 
-def test_a_volume_that_cannot_be_mounted_is_told(place, start):
-    """Only an event on the pod does; by its own status it starts."""
+def test_a_volume_that_cannot_be_mounted_is_reported(place, start):
+    """Only an event on the pod reports it; by its status the pod only starts."""
     start()
     place.train()
     [pod] = place.pods()
@@ -164,8 +164,8 @@ def test_a_pod_that_no_kubelet_heals_is_evicted_and_counted_once(place, start):
     assert place.get(JOBS, "job-0").get("status", {}).get("failed", 0) == 0
 
 
-def test_a_disruption_budget_is_heeded_and_told(place, start):
-    """Somebody wants the pod to stay; it is tried again until they do not."""
+def test_a_disruption_budget_is_respected_and_reported(place, start):
+    """The budget's owner wants the pod to stay; the eviction is retried until the budget allows it."""
     start()
     place.train()
     [pod] = place.pods()

@@ -154,7 +154,7 @@ def test_a_job_of_another_controller_is_left_alone(place, start):
     assert place.status("theirs")["observedGeneration"] == 0
 
 
-def test_a_world_that_is_missing_is_told_and_the_job_starts_when_it_is_there(place, start):
+def test_a_missing_world_is_reported_and_the_job_starts_when_it_is_there(place, start):
     """Order of `kubectl apply` does not matter."""
     start()
     place.train(**world_of("world"))
@@ -179,8 +179,8 @@ def test_a_world_without_the_label_for_jobs_is_not_opened(place, start):
     assert place.all(JOBS, "job") == []
 
 
-def test_a_name_that_is_taken_is_told_and_the_job_starts_when_it_is_free(place, start):
-    """A Job of somebody else is neither used nor touched."""
+def test_a_taken_name_is_reported_and_the_job_starts_when_it_is_free(place, start):
+    """A Job of another owner is neither used nor changed."""
     start()
     place.create(JOBS, stranger("job-0"))
 

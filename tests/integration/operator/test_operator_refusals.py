@@ -44,8 +44,8 @@ def limited(place, obj):
     eventually(lambda: place.get(QUOTAS, "none-left").get("status", {}).get("hard"))
 
 
-def test_pods_that_are_refused_are_told_in_the_words_of_the_api_server(place, start):
-    """Only the Job's events tell; nobody thinks of looking there."""
+def test_the_status_quotes_the_api_server_that_refuses_pods(place, start):
+    """Otherwise only the Job's events would have the reason, and users do not look there."""
     limited(place, quota(pods=True))
     start()
 
@@ -73,7 +73,7 @@ def test_the_quota_of_the_examples_bounds_the_training_jobs_of_a_namespace(place
         place.train("second")
 
 
-def test_a_claim_that_is_refused_is_told_and_made_when_there_is_room(place, start):
+def test_a_refused_claim_is_reported_and_made_when_there_is_room(place, start):
     """A quota on volumes is spent sooner than one on pods."""
     limited(place, quota(persistentvolumeclaims=True))
     start()
@@ -146,8 +146,8 @@ def kueue(installed):
     eventually(lambda: not installed.serves("kueue.x-k8s.io"))
 
 
-def test_a_queue_without_kueue_is_told_until_there_is_one(place, start, request):
-    """Otherwise the job would be Suspended for ever, and nobody would know why."""
+def test_a_queue_without_kueue_is_reported_until_kueue_is_there(place, start, request):
+    """Otherwise the job would be Suspended for ever without a reason."""
     start()
     place.train(scheduling={"queueName": "robots"})
     eventually(lambda: place.condition("Accepted").get("reason") == "NoKueue")

@@ -52,7 +52,7 @@ def test_with_nothing_new_the_old_value_stays(ranges):
     assert ranges.newest("old") == "old"
 
 
-def test_a_message_that_does_not_come_is_told_in_time(peer, ranges):
+def test_a_message_that_does_not_come_raises_an_error_in_time(peer, ranges):
     """The connection stays, since a message may be late."""
     with pytest.raises(SimulatorHung):
         ranges.next()
@@ -69,7 +69,7 @@ def test_a_killed_publisher_is_dead(peer, ranges):
         ranges.next()
 
 
-def test_a_topic_nobody_publishes_is_told_at_once(peer):
+def test_a_topic_without_a_publisher_raises_an_error_at_once(peer):
     """The sensor was never enabled."""
     with pytest.raises(SimulatorDead, match="no node publishes"):
         RosSubscriber(f"/{peer.name}/ir2/value", "sensor_msgs/Range").connect()

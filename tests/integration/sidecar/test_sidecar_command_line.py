@@ -55,7 +55,7 @@ def test_a_mistake_is_one_line_and_nothing_is_started(world, arguments, line) ->
     assert told.stderr.count("\n") == 1
 
 
-def test_a_broken_world_is_told_with_its_place(tmp_path) -> None:
+def test_the_error_for_a_broken_world_has_line_and_column(tmp_path) -> None:
     """Line and column, as a compiler does."""
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nRobot { name \n}\n")

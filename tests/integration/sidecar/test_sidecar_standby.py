@@ -156,7 +156,7 @@ def test_the_log_says_whose_line_it_is(two, waits) -> None:
     it.it.until_said("palaestra-sidecar: b: stopping: killed at its deadline")
 
 
-def test_a_simulator_is_told_its_slot(two) -> None:
+def test_the_environment_of_a_simulator_has_its_slot(two) -> None:
     """A program that needs a port of its own can choose by it."""
     it = two("import os; print('up', os.environ['PALAESTRA_SIMULATOR_SLOT'])")
 
@@ -181,7 +181,7 @@ def test_the_metrics_tell_the_two_apart(two, waits) -> None:
     assert float(values['rss_bytes{slot="b"}']) > 4e6
 
 
-def test_both_are_told_at_the_health_port_and_take_no_orders_there(two, waits) -> None:
+def test_the_health_port_shows_both_and_takes_no_orders(two, waits) -> None:
     """People and the operator see the one that stands by, too."""
     it = two(waits)
     it.start(SECOND)
@@ -199,8 +199,8 @@ def test_without_the_option_there_is_no_second_one(sidecar, waits) -> None:
     assert "/standby" not in json.loads(text)["error"]
 
 
-def test_the_memory_of_a_simulator_is_told_while_it_is_ready(sidecar, family) -> None:
-    """Of all its processes. Before that it is asked for its state fifty times a second."""
+def test_the_memory_of_a_simulator_is_reported_while_it_is_ready(sidecar, family) -> None:
+    """It is the memory of all its processes. Before that the state is read fifty times a second."""
     it = sidecar(family)
     before = it.start().rss_bytes
 

@@ -33,7 +33,7 @@ def test_a_life_that_goes_well(sidecar, waits) -> None:
     assert (ended.pid, ended.starts, ended.faults) == (None, 1, 0)
 
 
-def test_a_simulator_is_told_which_start_it_is(sidecar) -> None:
+def test_the_environment_of_a_simulator_has_the_number_of_its_start(sidecar) -> None:
     """One that fails by chance must not fail at the same step again and again."""
     it = sidecar("import os; print('start', os.environ['PALAESTRA_SIMULATOR_START'])")
 

@@ -186,8 +186,8 @@ def test_what_is_written_wrongly_is_refused_before_anything_starts(stub, text, w
     assert not stub.registered()
 
 
-def test_without_a_count_the_life_is_drawn_and_told(stub):
-    """So that what a restarted process does is not the same again, and can still be repeated."""
+def test_without_a_count_the_life_is_drawn_and_printed(stub):
+    """A restarted process must not repeat the same faults, and a run must be repeatable."""
     first, second = (stub("--fault=crash:probability=0.5").stderr.readline() for _ in range(2))
 
     assert "drawn" in first

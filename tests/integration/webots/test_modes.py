@@ -102,7 +102,7 @@ def test_a_simulator_that_is_stopped_inside_of_a_context_need_not_be_paused(aren
     assert arena.webots.observer.mode() is Mode.PAUSE
 
 
-def test_a_mode_that_is_refused_is_told(arena):
+def test_a_refused_mode_raises_an_error(arena):
     """3 was FAST until Webots R2020b; a client that believes this would wait for steps for ever."""
     with pytest.raises(WrongData, match="robotino: refuses mode 3"):
         arena.webots.supervisor.set_mode(3)

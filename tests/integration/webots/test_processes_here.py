@@ -64,8 +64,8 @@ def test_a_killed_script_leaves_no_simulator(master):
     assert not simulator.exists()
 
 
-def test_what_went_wrong_inside_is_told_and_not_that_the_simulator_is_gone(arena):
-    """The context manager cannot pause what is dead, and must not hide why."""
+def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone(arena):
+    """The context manager cannot pause a dead simulator, and must not hide the cause."""
 
     def fail():
         with arena.webots:
@@ -114,7 +114,7 @@ def test_a_simulator_that_is_not_known_is_refused_at_once(master):
         Webots("robotino", "arena", driver="gazebo")
 
 
-def test_a_simulator_that_does_not_come_is_told_by_its_deadline(master):
+def test_a_simulator_that_does_not_start_raises_an_error_at_its_deadline(master):
     """Another name than the world's is never answered."""
     del master
     webots = Webots("nobody", "arena", start_deadline_s=1.0)

@@ -12,8 +12,8 @@ from palaestra_trainer.robots.robotino import Robotino, metres
 START = Pose(-1.5, 0.0, 0.0)
 
 
-def test_it_drives_where_it_is_told(arena):
-    """Half a metre a second for a second, less what the motors take to get there."""
+def test_it_drives_as_commanded(arena):
+    """Half a meter per second for one second, less the distance lost to acceleration."""
     arena.scene.reset(1, START, (1.0, 0.0))
 
     arena.robot.move(Movement.FORWARD)

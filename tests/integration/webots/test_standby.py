@@ -167,7 +167,7 @@ def test_a_spare_that_is_not_ready_yet_is_waited_for(pair):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_spare_that_broke_is_told_and_the_restart_after_that_goes_well(pair, number):
+def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number):
     """Each is a fault of its own, and nothing waits for more than one start."""
     it = pair().begin()
     os.kill(pid_of(it.second), number)
@@ -192,7 +192,7 @@ def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
     assert it.first.sidecar.state().starts == 3
 
 
-def test_a_spare_that_does_not_come_up_within_its_budget_is_told_when_it_is_wanted(pair):
+def test_a_spare_that_does_not_start_within_its_budget_fails_the_restart_that_needs_it(pair):
     """The simulator that works goes on until then."""
     it = pair("--fault=start_refused:start=2", care=Care(restart_limit=0))
     it.member.start()

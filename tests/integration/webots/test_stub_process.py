@@ -74,7 +74,7 @@ def test_without_a_master_it_says_so_and_ends(stub):
     assert "no ROS master at http://localhost:1" in process.stderr.read()
 
 
-def test_a_world_that_is_none_is_told_with_line_and_column(master, tmp_path):
+def test_the_error_for_an_invalid_world_has_its_line(master, tmp_path):
     """The person who wrote it can mend it."""
     del master
     world = tmp_path / "broken.wbt"
@@ -86,7 +86,7 @@ def test_a_world_that_is_none_is_told_with_line_and_column(master, tmp_path):
     assert "broken.wbt:3:" in result.stderr
 
 
-def test_a_world_with_several_refusals_is_told_in_whole_and_summed_up_in_the_last_line(master, tmp_path):
+def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(master, tmp_path):
     """A sidecar reports the last line, and a person reads the rest."""
     del master
     world = tmp_path / "forest.wbt"

@@ -64,8 +64,8 @@ def test_a_velocity_that_did_not_change_is_not_sent_again(arena, stranger):
     assert stranger.ask() == [7.0, 7.0, 7.0]
 
 
-def test_only_those_wheels_are_told_that_change(arena, stranger):
-    """Ahead and back are the same for the wheel at the rear: it stands."""
+def test_only_the_velocities_that_change_are_sent(arena, stranger):
+    """The rear wheel stands, whether the robot drives ahead or back."""
     arena.robot.drive(*AHEAD)
     stranger.tell(7.0)
 
@@ -140,8 +140,8 @@ def test_a_velocity_that_was_refused_is_sent_again_with_a_new_position(motor, st
     assert stranger.ask()[0] == -2.0
 
 
-def test_a_motor_that_is_told_alone_is_always_told(motor, stranger):
-    """It is in nobody's simulation, so that no reset would tell it."""
+def test_a_single_motor_always_sends_its_velocity(motor, stranger):
+    """It belongs to no simulation, so no reset would make it send its velocity again."""
     motor.set_velocity(2.0)
     stranger.tell(7.0)
 

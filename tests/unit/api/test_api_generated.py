@@ -79,7 +79,7 @@ def test_the_page_shows_the_smallest_example(repository) -> None:
     assert shown[1] == (repository / "manifests/examples/minimal.yaml").read_text(encoding="utf-8")
 
 
-def test_the_page_s_mistakes_are_told_in_those_words(repository, problems) -> None:
+def test_the_page_quotes_the_real_messages(repository, problems) -> None:
     """Examples of messages are messages."""
     text = (repository / "docs/trainingjob.md").read_text(encoding="utf-8")
 

@@ -124,7 +124,7 @@ def test_what_every_object_needs_is_asked_for(key, job_data) -> None:
         validate(data)
 
 
-def test_another_kind_of_object_is_told_as_one(job_data) -> None:
+def test_an_object_of_another_kind_is_reported_only_as_such(job_data) -> None:
     """A Deployment has a hundred fields that are not ours; none of them is the mistake."""
     data = {**job_data(), "apiVersion": "apps/v1", "kind": "Deployment", "spec": {"template": {}}}
 
@@ -164,7 +164,7 @@ def test_a_document_that_is_no_mapping_is_refused(text, fact) -> None:
     assert told(text) == (f"job.yaml: {fact}; begin it with apiVersion: palaestra.dev/v1alpha1",)
 
 
-def test_a_file_that_is_no_yaml_is_told_with_its_place() -> None:
+def test_the_error_for_a_file_that_is_no_yaml_has_line_and_column() -> None:
     """Line and column, both from 1."""
     problem = told("spec:\n  trainer: [1, 2\n")[0]
 

@@ -79,7 +79,7 @@ def test_a_job_lies_in_the_namespace_default_and_has_no_uid(least) -> None:
     assert (least.metadata.namespace, least.metadata.uid) == ("default", None)
 
 
-def test_nobody_has_told_anything_about_a_new_job(least) -> None:
+def test_a_new_job_has_an_empty_status(least) -> None:
     """A status is what was observed, so a job that was only read has none."""
     status = least.status
 

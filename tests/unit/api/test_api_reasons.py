@@ -56,7 +56,7 @@ def test_operations_has_a_row_for_each_reason(repository) -> None:
     assert all(f"| {reason} |" in text for reason in Reason)
 
 
-def test_a_page_without_its_marks_is_told_so() -> None:
-    """Nobody would miss a table that is silently not made."""
+def test_a_page_without_its_marks_raises_an_error() -> None:
+    """A table that is silently left out would not be noticed."""
     with pytest.raises(ValueError, match=r"no <!-- generated from the reasons.*; put both in"):
         page("# Operations")

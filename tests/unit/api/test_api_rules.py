@@ -283,7 +283,7 @@ RULES = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_rule_is_told_in_one_line(name, problems) -> None:
+def test_a_broken_rule_is_reported_in_one_line(name, problems) -> None:
     """Path, fact and remedy, and nothing that merely follows from it."""
     changes, line = BROKEN[name]
 

@@ -139,7 +139,7 @@ SENTENCES = [
 
 
 @pytest.mark.parametrize(("changes", "line"), SENTENCES, ids=[line[:60] for _, line in SENTENCES])
-def test_a_mistake_is_told_with_path_fact_and_remedy(changes, line, problems) -> None:
+def test_an_error_has_path_fact_and_remedy(changes, line, problems) -> None:
     """One mistake, one line, and all that its author needs to mend it."""
     assert problems(changes) == [line]
 
@@ -151,7 +151,7 @@ def test_a_path_with_a_key_that_is_no_word_shows_it_in_brackets(problems) -> Non
     ]
 
 
-def test_a_key_that_is_too_long_is_told_at_its_map(problems) -> None:
+def test_a_key_that_is_too_long_is_reported_at_its_map(problems) -> None:
     """The key is the path, so the path says which."""
     line = problems({"scheduling.podLabels": {LONG: "a"}})[0]
 
@@ -174,7 +174,7 @@ def test_line_breaks_in_a_value_or_a_key_do_not_break_the_line(problems) -> None
     assert "\n" not in line
 
 
-def test_a_wrong_time_is_told_with_an_example(job_data) -> None:
+def test_the_error_for_a_wrong_time_has_an_example(job_data) -> None:
     """A status comes from programs, whose authors read the message too."""
     with pytest.raises(SpecErrors, match=r'^status.startTime: "noon" is not a time; write it as'):
         validate(job_data() | {"status": {"startTime": "noon"}})

@@ -77,7 +77,7 @@ def test_anchors_and_merges_are_followed() -> None:
         ),
     ],
 )
-def test_what_cannot_be_read_is_told_with_line_and_column(text, problem) -> None:
+def test_the_error_for_text_that_cannot_be_read_has_line_and_column(text, problem) -> None:
     """Both counted from 1, as editors count."""
     with pytest.raises(NotYaml) as caught:
         read(text, "job.yaml")

@@ -316,8 +316,8 @@ def test_the_alerts_are_those_of_the_file(one):
     assert one("monitored", "PrometheusRule", "palaestra")["spec"] == rules_of_file
 
 
-def test_runbooks_are_links_where_the_chart_is_told_the_address():
-    """The project's files are read where somebody keeps them."""
+def test_runbooks_are_links_if_a_value_has_the_address():
+    """The address depends on where the project's files are hosted."""
     address = "https://git.example.com/palaestra/blob/main"
     rule = {"enabled": True, "runbooks": address}
 

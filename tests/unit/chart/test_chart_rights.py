@@ -59,7 +59,7 @@ def test_a_right_is_granted_by_a_binding_and_not_by_a_role_alone():
     assert granted([bound, alone, binding(bound)], "robots", "operator") == {READ}
 
 
-def test_roles_of_one_name_are_told_apart_by_their_namespaces():
+def test_roles_of_one_name_are_distinguished_by_their_namespaces():
     """Each list of namespaces has a role of this name in every one of them."""
     here, there = role("jobs", "robots"), role("jobs", "drones", "delete")
 
@@ -90,8 +90,8 @@ def test_a_request_is_the_use_of_a_right():
     assert list(uses(log)) == [Use("robots", "operator", right, allowed=True, reason=WHY)]
 
 
-def test_whoever_applies_what_is_not_there_yet_uses_two_rights():
-    """An API server asks for both, and writes down one."""
+def test_applying_an_object_that_does_not_exist_yet_uses_two_rights():
+    """An API server checks both and logs one."""
     verbs = {code: [use.right.verb for use in uses(entry("patch", code=code))] for code in (200, 201)}
 
     assert verbs == {200: ["patch"], 201: ["patch", "create"]}

@@ -107,7 +107,7 @@ def test_crd_prints_a_custom_resource_definition(capsys):
 
 
 @pytest.mark.parametrize("command", ["run", "plan"])
-def test_a_wrong_job_is_told_with_all_its_mistakes(command, tmp_path, fails, monkeypatch):
+def test_all_mistakes_of_a_wrong_job_are_printed(command, tmp_path, fails, monkeypatch):
     """Five mistakes, five lines, and nothing is started or written."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "wrong.yaml"

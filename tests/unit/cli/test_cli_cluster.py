@@ -49,7 +49,7 @@ def test_a_context_that_is_not_there_is_named(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("option", ["-n", "--namespace=lab", "--context", "--kubeconfig"])
-def test_an_option_of_kubectls_before_the_command_is_told_where_it_goes(option, monkeypatch, capsys):
+def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, monkeypatch, capsys):
     """As people type it for kubectl; argparse took the namespace for a command that does not exist."""
     monkeypatch.setattr("sys.argv", ["/usr/bin/kubectl-palaestra"])
 

@@ -85,7 +85,7 @@ def test_a_lock_is_not_passed_on_to_what_is_started(shell):
     assert result.stdout.strip() == "free"
 
 
-def test_what_is_left_of_a_cluster_is_told(run, tmp_path):
+def test_the_remains_of_a_cluster_are_an_error(run, tmp_path):
     """Removing a cluster ends with this check: a process or a folder that stays is an error."""
     state = tmp_path / "cache/kind"
     state.mkdir(parents=True)
@@ -132,7 +132,7 @@ def test_asking_for_built_programs_builds_nothing(run):
         (["./programs.sh", "etcd"], {"PATH": "/usr/bin:/bin"}, "Go is missing. Install Go"),
     ],
 )
-def test_a_mistake_is_told_with_its_remedy(run, command, environment, message):
+def test_an_error_has_a_remedy(run, command, environment, message):
     """The thing, the fact, the remedy."""
     if "Go" in message and shutil.which("go", path="/usr/bin:/bin"):
         pytest.skip("Go is installed beside the system's programs")

@@ -66,8 +66,8 @@ def test_the_images_that_a_node_names_are_brought_along(tmp_path):
     assert named <= image_names(tmp_path)
 
 
-def test_kubeadm_is_told_the_etcd_that_is_brought_along(tmp_path):
-    """Its own default is another one."""
+def test_kubeadm_is_configured_with_the_bundled_etcd(tmp_path):
+    """Its own default is another version."""
     tag = re.search(r"imageTag: ([\w.-]+)\}", (CLUSTER / "node/kind-patches.yaml").read_text())[1]
 
     assert f"registry.k8s.io/etcd:{tag}" in image_names(tmp_path)

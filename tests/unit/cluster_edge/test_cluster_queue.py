@@ -142,7 +142,7 @@ def test_success_makes_the_next_failure_the_first():
     assert queue.retry("a") == 1
 
 
-def test_the_time_that_a_name_waited_is_told():
+def test_the_time_that_a_name_waited_is_reported():
     """Latency of the queue is a metric."""
     now, waited = [0.0], []
     queue = WorkQueue(waited=waited.append, clock=lambda: now[0])

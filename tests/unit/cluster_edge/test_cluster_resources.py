@@ -75,7 +75,7 @@ def test_each_refusal_has_its_error(code, reason, error):
     assert (found.code, found.message) == (code, "m")
 
 
-def test_a_namespace_that_is_being_deleted_is_told_from_a_missing_right():
+def test_a_terminating_namespace_is_distinguished_from_a_missing_right():
     """Both are 403 and Forbidden; the one passes with the namespace, the other waits for a person."""
     causes = [{"reason": "NamespaceTerminating", "message": "namespace lab is being terminated"}]
 

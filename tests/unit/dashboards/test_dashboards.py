@@ -62,7 +62,7 @@ def test_a_query_uses_no_variable_that_its_dashboard_lacks(dashboard):
             assert "$" not in filled(target["expr"], values), panel["title"]
 
 
-def test_everything_that_is_asked_for_is_told():
+def test_every_metric_that_is_queried_is_documented():
     """A metric that was renamed leaves an empty panel and an alert that never fires."""
     told = set(OURS.findall(METRICS.read_text()))
     asked = [question.expr for question in questions("30s", "1h")] + [rule["expr"] for rule in alerts()]

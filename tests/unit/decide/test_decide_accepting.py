@@ -31,7 +31,7 @@ def test_a_right_job_is_read_with_its_generation_and_its_status():
     assert (job.metadata.generation, job.status.phase) == (3, "Running")
 
 
-def test_what_only_the_models_see_is_told_with_its_field():
+def test_a_mistake_that_only_the_models_find_is_reported_with_its_field():
     """An API server cannot look into free objects."""
     problem = refused(raw(SAC))
 

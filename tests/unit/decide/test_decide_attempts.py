@@ -67,7 +67,7 @@ def test_a_trainer_that_could_write_no_last_word_leaves_the_end_of_its_log(train
     assert last(scene) == (1, 137, "TrainerFailed")
 
 
-def test_restarts_that_only_a_poll_told_of_are_kept_at_once(accepted, simulator):
+def test_restarts_that_only_a_poll_reported_are_kept_at_once(accepted, simulator):
     """Also where the trainer had ended when its pod was first seen; a second look finds nothing new."""
     scene = accepted(backoffLimit=5)
     pod = scene.running_pod()
@@ -162,7 +162,7 @@ def delete(scene, pod):
 
 @pytest.mark.parametrize("take", [evict, preempt, lose_with_its_node, remove, delete])
 @pytest.mark.parametrize("looks", [True, False], ids=["seen", "seen late"])
-def test_a_disruption_is_counted_and_told_once_and_is_no_failure(training, take, looks):
+def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, take, looks):
     """For every cause, and also if the operator does not look until the next pod is there."""
     scene, pod = training(backoffLimit=0)
     take(scene, pod)

@@ -47,7 +47,9 @@ def end(scene, pod):
         ),
     ],
 )
-def test_what_a_kubelet_tries_again_ends_nothing_and_is_told(training, last_word, container, state, reason):
+def test_a_container_that_a_kubelet_retries_ends_nothing_and_is_reported(
+    training, last_word, container, state, reason
+):
     """On the second pod of a run at step 3,000,000 a registry is away for a day."""
     scene, pod = training()
     scene.end(pod, 75, last_word(step=3_000_000))
@@ -70,7 +72,7 @@ def test_a_name_that_no_image_can_have_is_final(accepted):
     assert stops(scene.step()) == ["ImagePull"]
 
 
-def test_a_simulator_that_does_not_start_is_told_and_is_the_trainers_to_judge(training, simulator):
+def test_a_simulator_that_does_not_start_is_reported_and_left_to_the_trainer(training, simulator):
     """It has a budget of faults; the operator ends nothing by its own clock."""
     scene, pod = training()
     told = {"phase": "starting", "simulators": (simulator(state="failed", last_fault="did not come up"),)}
@@ -191,7 +193,7 @@ def test_a_pod_that_is_marked_and_lives_is_evicted_again(accepted):
     assert scene.replica().reason == "TrainerNotStarted"
 
 
-def test_a_disruption_budget_that_allows_no_eviction_is_told(accepted):
+def test_a_disruption_budget_that_allows_no_eviction_is_reported(accepted):
     """It is tried again; nothing is deleted past a budget."""
     scene = accepted()
     scene.budget = True

@@ -176,7 +176,7 @@ def kills(scene):
     return [each.times for each in scene.replica().memory_kills]
 
 
-def test_kills_are_told_apart_by_pod_and_run_whatever_their_nodes_say(training):
+def test_kills_are_distinguished_by_pod_and_run_and_not_by_the_clocks_of_nodes(training):
     """The second node's clock is behind: its kill would be older than the last one."""
     scene, pod = training()
     kill(scene, pod, 0)

@@ -186,7 +186,7 @@ def test_pods_that_are_taken_without_progress_are_capped(accepted, last_word):
     assert (pods, scene.replica().attempt) == (6, 6)
 
 
-def test_pods_that_fill_their_storage_again_and_again_are_told_so(accepted):
+def test_pods_that_fill_their_storage_again_and_again_are_reported_with_the_cause(accepted):
     """An eviction is no failure to Kubernetes, whatever its cause."""
     scene = accepted()
     while scene.status.phase is not Phase.FAILED:

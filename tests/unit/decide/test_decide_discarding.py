@@ -21,7 +21,7 @@ def over(make_scene):
     return scene
 
 
-def test_it_is_marked_then_told_then_deleted(over):
+def test_it_is_marked_then_reported_then_deleted(over):
     """Each step stands in the cluster before the next, whatever happens to the operator in between."""
     marked, told, deleted = (over.step().actions for _ in range(3))
 

@@ -271,7 +271,7 @@ def test_a_queue_that_kueue_gave_a_job_is_heeded_too(accepted):
     assert scene.replica().message == "waits in queue default for Kueue"
 
 
-def test_a_suspension_that_kueue_does_not_heed_is_told(training):
+def test_a_suspension_that_kueue_ignores_is_reported(training):
     """In a queue Kueue decides, also if the queue is only the namespace's default."""
     scene, _ = training()
     scene.job()["metadata"]["labels"]["kueue.x-k8s.io/queue-name"] = "default"

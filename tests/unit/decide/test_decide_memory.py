@@ -35,7 +35,7 @@ def kills(scene):
     return [(each.container, each.times, each.limit) for each in scene.replica().memory_kills]
 
 
-def test_a_simulator_that_is_back_at_once_is_told_of_all_the_same(scene_and_pod):
+def test_a_memory_kill_of_a_simulator_that_is_back_at_once_is_reported(scene_and_pod):
     """On cgroup v2 its whole container dies, and the first restart does not wait."""
     scene, pod = scene_and_pod
     kill(scene, pod)

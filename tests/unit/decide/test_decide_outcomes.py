@@ -64,8 +64,8 @@ def test_a_spent_backoff_limit_tells_of_the_last_failure(accepted, last_word):
     assert scene.replica().restarts.trainer == 2
 
 
-def test_a_trainer_that_was_killed_for_its_memory_is_told_so(training):
-    """Exit code 137 alone says nothing to anybody; the limit does."""
+def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(training):
+    """Exit code 137 alone does not explain the end; the limit does."""
     scene, pod = training(trainer={"resources": {"limits": {"memory": "2Gi"}}})
     scene.end(pod, 137, reason="OOMKilled")
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -76,8 +76,8 @@ def test_a_trainer_that_was_killed_for_its_memory_is_told_so(training):
     assert "killed for its memory (limit 2Gi, 1 so far); raise spec.trainer" in scene.replica().message
 
 
-def test_a_simulator_that_hung_each_time_is_told_from_a_run_that_stood_still(training, last_word):
-    """The exit code is the same; the last word tells whose fault it was."""
+def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(training, last_word):
+    """The exit code is the same; the last word names the cause."""
     scene, pod = training()
     scene.end(pod, 82, last_word(reason="SimulatorHung: collect-0: no answer within 600 s"))
     scene.end_job("Failed", 0, "BackoffLimitExceeded")
@@ -89,7 +89,7 @@ def test_a_simulator_that_hung_each_time_is_told_from_a_run_that_stood_still(tra
 
 
 @pytest.mark.parametrize("word", ["StorageFull", "DiskFull"])
-def test_a_full_volume_is_told_with_its_remedy(training, last_word, word):
+def test_a_full_volume_is_reported_with_its_remedy(training, last_word, word):
     """Also in the word of an older release."""
     scene, pod = training(backoffLimit=0)
     scene.end(pod, 1, last_word(reason=f"{word}: checkpoints/5: disk full"))
@@ -120,7 +120,7 @@ def test_a_reason_of_an_older_release_is_read_as_what_it_is_called_now(training,
 
 
 @pytest.mark.parametrize("word", [True, False])
-def test_a_trainer_that_stalled_each_time_is_told_so(training, last_word, word):
+def test_a_trainer_that_stalled_each_time_is_reported(training, last_word, word):
     """Its watchdog ends it with 82."""
     scene, pod = training(stallDeadlineSeconds=60)
     scene.end(pod, 82, last_word(reason="Stalled: collect-0 hangs") if word else "")
@@ -132,7 +132,7 @@ def test_a_trainer_that_stalled_each_time_is_told_so(training, last_word, word):
     assert scene.replica().message == f"{what}; read the stacks in the trainer's log"
 
 
-def test_an_eviction_for_storage_is_told_in_the_kubelets_words(training):
+def test_the_message_about_an_eviction_for_storage_quotes_the_kubelet(training):
     """The pod's own status has them."""
     scene, pod = training()
     words = "Usage of EmptyDir volume exceeds the limit; ephemeral-storage"
@@ -145,8 +145,8 @@ def test_an_eviction_for_storage_is_told_in_the_kubelets_words(training):
     assert words in scene.replica().message
 
 
-def test_whoever_else_ended_the_job_is_quoted(training):
-    """As a person who has set a deadline on the Job."""
+def test_another_failure_of_the_job_is_quoted(training):
+    """A person may have set a deadline on the Job."""
     scene, _ = training()
     scene.objects["pods"].clear()
     scene.end_job("Failed", 0, "DeadlineExceeded", "Job was active longer than specified deadline")

@@ -103,7 +103,7 @@ def test_the_end_of_an_attempt_has_no_words_about_the_next(queued, last_word):
     assert queued.replica().last_attempt.message == TAKEN + AGAIN
 
 
-def test_that_nobody_was_asked_is_told_once(queued):
+def test_a_workload_that_was_not_read_is_reported_once(queued):
     """As of pods that are missing: the operator asks about 4,000 Jobs at most.
 
     Only the Workload has the reason: `kubectl describe` of the Job or the TrainingJob does not show it.

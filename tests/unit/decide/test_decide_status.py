@@ -76,7 +76,7 @@ def test_the_interval_of_the_success_rate_is_kept_as_the_rate_is(training):
     assert (interval.low, interval.high, interval.episodes) == (0.7, 1.0, 20)
 
 
-def test_simulators_and_checkpoints_are_told(training, simulator):
+def test_the_status_lists_simulators(training, simulator):
     """With their last faults, on one line."""
     scene, pod = training()
     scene.poll(pod, simulators=(simulator(state="failed", last_fault="collect-0:\ngone", restarts=2),))
@@ -89,8 +89,8 @@ def test_simulators_and_checkpoints_are_told(training, simulator):
     )  # fmt: skip
 
 
-def test_where_the_time_went_and_what_broke_is_told(training, simulator):
-    """In whole seconds, as far as the trainer tells; one of an older release does not."""
+def test_the_status_shows_goodput_and_faults(training, simulator):
+    """In whole seconds, if the trainer reports them; that of an older release does not."""
     scene, pod = training()
     scene.poll(pod, step=1)
     scene.settle()
@@ -152,7 +152,7 @@ def test_a_status_of_two_replicas_stays_small(accepted, simulator):
     assert len(json.dumps(scene.raw["status"]).encode()) < 40_000
 
 
-def test_a_checkpoint_is_told_with_its_step_and_its_time(training):
+def test_the_status_has_step_and_time_of_the_last_checkpoint(training):
     """As the trainer wrote it; a time that no calendar of ours has is none."""
     scene, pod = training()
     scene.poll(pod, last_checkpoint=CheckpointStatus(step=5, time="2026-01-31T11:59:00+01:00"))
@@ -192,7 +192,7 @@ def messages(scene):
     return {each.type.value: each.message for each in scene.status.conditions}
 
 
-def test_why_a_job_waits_is_told_in_full_by_the_condition_running_and_to_kstatus(accepted):
+def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits(accepted):
     """`kubectl describe` printed the same 300 characters four times, and hid what counts."""
     scene = accepted()
     scene.container(scene.new_pod(), "trainer", waiting="ImagePullBackOff: no such image")
@@ -210,7 +210,7 @@ def test_why_a_job_waits_is_told_in_full_by_the_condition_running_and_to_kstatus
     }
 
 
-def test_why_a_job_failed_is_told_in_full_by_the_condition_failed_and_to_kstatus(accepted, last_word):
+def test_only_the_conditions_failed_and_stalled_say_in_full_why_a_job_failed(accepted, last_word):
     """As above; `palaestra watch` and the event read it there."""
     scene = accepted()
     scene.end(scene.running_pod(), 81, last_word(reason="Diverged: NaN"))

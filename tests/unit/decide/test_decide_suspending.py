@@ -39,8 +39,8 @@ def test_a_job_that_somebody_else_suspends_is_left_suspended(training):
     )
 
 
-def test_who_suspended_a_job_is_told_as_an_event(training, reasons):
-    """Somebody waits for a job that does not move."""
+def test_a_suspension_by_another_manager_emits_an_event(training, reasons):
+    """A user waits for a job that does not move."""
     scene, _ = training()
     by_kueue(scene, suspend=True)
     scene.objects["pods"].clear()
@@ -48,8 +48,8 @@ def test_who_suspended_a_job_is_told_as_an_event(training, reasons):
     assert Reason.SUSPENDED in reasons(scene.settle())
 
 
-def test_a_suspension_by_nobody_knows_whom_is_told_as_such(training):
-    """An API server need not keep who wrote what."""
+def test_a_suspension_by_an_unknown_manager_is_reported_as_such(training):
+    """An API server need not record the manager of a field."""
     scene, _ = training()
     scene.job()["spec"]["suspend"] = True
     scene.objects["pods"].clear()
@@ -59,7 +59,7 @@ def test_a_suspension_by_nobody_knows_whom_is_told_as_such(training):
     assert scene.replica().message.startswith("suspended by somebody else, ")
 
 
-def test_a_job_that_somebody_else_resumes_is_left_running_and_told(training):
+def test_a_job_that_another_manager_resumes_is_left_running_and_reported(training):
     """It is admitted by its queue, although its author has suspended it."""
     scene, _ = training(suspend=False)
     scene.raw["spec"]["suspend"] = True
@@ -280,7 +280,7 @@ def test_a_job_that_is_resumed_before_its_pod_has_ended_does_not_run(training, l
     assert (scene.replica().restarts.suspension, scene.replica().restarts.disruption) == (1, 0)
 
 
-def test_a_suspended_pod_on_a_lost_node_is_told_as_lost(training):
+def test_a_suspended_pod_on_a_lost_node_is_reported_as_lost(training):
     """It saves nothing any more; the Node object has to go before the job can be resumed."""
     scene, pod = training()
     scene.raw["spec"]["suspend"] = True

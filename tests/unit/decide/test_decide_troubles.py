@@ -27,8 +27,8 @@ def refused(scene, words, **event):
         'Error creating: pods "job-0-x" is forbidden: minimum cpu usage per Container is 1',
     ],
 )
-def test_pods_that_are_refused_are_told_in_the_api_servers_words(accepted, words):
-    """Quota, Pod Security, a webhook, a LimitRange: nothing but an event on the Job tells."""
+def test_the_message_about_refused_pods_quotes_the_api_server(accepted, words):
+    """Quota, Pod Security, a webhook, a LimitRange: only an event on the Job has the reason."""
     scene = accepted()
     refused(scene, words)
 
@@ -51,8 +51,8 @@ def test_an_old_refusal_does_not_count(accepted):
     assert scene.replica().reason == "Training"
 
 
-def test_no_node_is_told_in_the_schedulers_words(accepted):
-    """They name what is short."""
+def test_the_message_about_an_unschedulable_pod_quotes_the_scheduler(accepted):
+    """Its words name the missing resource."""
     scene = accepted()
     pod = scene.new_pod()
     words = "0/3 nodes are available: 3 Insufficient nvidia.com/gpu."
@@ -124,7 +124,7 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
     )
 
 
-def test_between_two_pods_it_is_told_how_the_last_one_failed(training, last_word):
+def test_between_two_pods_the_message_says_how_the_last_one_failed(training, last_word):
     """With the trainer's own last word."""
     scene, pod = training()
     scene.end(pod, 70, last_word(reason="Unexpected: KeyError"))
@@ -137,7 +137,7 @@ def test_between_two_pods_it_is_told_how_the_last_one_failed(training, last_word
     assert [(each.type.value, each.reason.value) for each in decision.events] == [("Warning", "Retrying")]
 
 
-def test_without_a_last_word_the_end_of_the_log_is_told(training):
+def test_without_a_last_word_the_message_quotes_the_end_of_the_log(training):
     """Kubernetes puts it into the termination message."""
     scene, pod = training()
     scene.end(pod, 1, "Traceback (most recent call last):\n  ...\nMemoryError\n")
@@ -181,8 +181,8 @@ def test_a_trainer_that_stopped_and_nobody_says_why_is_interrupted(training, las
     assert "(exit code 75, MasterLost: it does not answer)" in scene.replica().message
 
 
-def test_a_full_volume_is_told_while_it_is_tried_again(training, last_word):
-    """Somebody may make room before the last try."""
+def test_a_full_volume_is_reported_between_retries(training, last_word):
+    """A user may free some space before the last retry."""
     scene, pod = training()
     scene.end(pod, 1, last_word(reason="StorageFull: /run: no space left on device"))
 
@@ -191,8 +191,8 @@ def test_a_full_volume_is_told_while_it_is_tried_again(training, last_word):
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "StorageFull")
 
 
-def test_a_volume_that_does_not_come_is_told_in_the_clusters_words(accepted):
-    """Nothing but an event on the pod tells; for Kubernetes it only starts."""
+def test_the_message_about_a_volume_that_does_not_come_quotes_the_cluster(accepted):
+    """Only an event on the pod has the cause; by its status the pod only starts."""
     scene = accepted()
     pod = scene.new_pod()
     words = 'Multi-Attach error for volume "pvc-1": still attached to node-2'
@@ -225,8 +225,8 @@ def test_while_its_simulators_start_a_trainer_does_not_train(training):
 
 
 @pytest.mark.parametrize("about", [0, None], ids=["of the replica", "of the whole job"])
-def test_an_object_that_is_refused_is_told_in_the_api_servers_words(make_scene, about, reasons):
-    """A claim over its quota has no Job whose events could tell."""
+def test_the_message_about_a_refused_object_quotes_the_api_server(make_scene, about, reasons):
+    """A claim over its quota has no Job whose events could have the reason."""
     scene = make_scene()
     scene.step()
     scene.denied = {about: 'persistentvolumeclaims "job-0" is forbidden: exceeded quota: volumes'}
@@ -243,7 +243,7 @@ def test_an_object_that_is_refused_is_told_in_the_api_servers_words(make_scene, 
     assert scene.replica().reason == "Starting"
 
 
-def test_what_one_replica_is_refused_is_not_told_of_another(make_scene):
+def test_a_refusal_of_one_replica_is_not_reported_for_another(make_scene):
     """Room for one claim is room for one replica."""
     scene = make_scene(replicas=2)
     scene.step()

@@ -97,7 +97,7 @@ def test_a_definition_with_more_in_it_is_the_same():
     assert difference(ours["spec"], found["spec"], "spec") is None
 
 
-def test_a_definition_of_another_release_is_told_with_the_place():
+def test_the_place_where_another_release_s_definition_differs_is_returned():
     """The first that is not as it is here."""
     ours = crd()
     found = deepcopy(ours)

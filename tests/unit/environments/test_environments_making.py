@@ -119,7 +119,7 @@ def test_a_reward_that_nothing_accepts_is_refused(made):
     assert "environment.reward: Hall-v0 has no argument reward" in refused(made, Hall, reward="Sparse")
 
 
-def test_all_options_that_do_not_fit_are_told_at_once(made):
+def test_all_options_that_do_not_fit_are_reported_at_once(made):
     """With the nearest name."""
 
     class Needy(Hall):
@@ -332,6 +332,6 @@ def test_a_simulator_s_fault_passes(made):
         (spaces.Dict({"a": spaces.Discrete(2)}), {"a": 1}, ""),
     ],
 )
-def test_a_mismatch_is_told_in_words(space, observation, fact):
-    """Nothing where there is none."""
+def test_a_mismatch_is_described_in_words(space, observation, fact):
+    """The result is empty if nothing differs."""
     assert mismatch(space, observation) == fact

@@ -49,7 +49,7 @@ def test_a_wrong_option_is_refused_with_fact_and_remedy(given, message):
         parse(given)
 
 
-def test_all_mistakes_are_told_at_once():
+def test_all_mistakes_are_reported_at_once():
     """A line for each, so that a file is mended in one go."""
     with pytest.raises(ConfigurationError) as caught:
         parse({"reward": "Rich", "actions": "none", "max_steps": -1})

@@ -92,7 +92,7 @@ def test_a_robot_without_its_scene_is_refused():
         make(robot=FakeRobotino())
 
 
-def test_a_wrong_option_is_told_before_a_simulator_is_asked_for():
+def test_a_wrong_option_raises_an_error_before_a_simulator_is_requested():
     """Starting one takes seconds and another process."""
 
     def never() -> tuple[FakeRobotino, FakeScene]:

@@ -56,7 +56,7 @@ def test_a_claim_outlives_its_job():
     assert orphans({"PersistentVolumeClaim": {"job-0": claim}}) == []
 
 
-def test_a_pod_that_was_told_to_go_is_its_kubelets():
+def test_a_pod_that_is_being_deleted_is_left_to_its_kubelet():
     """On a lost node it stays for ever, whatever an operator does."""
     going = pod("a")
     going["metadata"]["deletionTimestamp"] = "2026-01-31T12:00:00Z"

@@ -36,7 +36,7 @@ def test_this_machine_can_run_the_minimal_job(request_for):
     assert not request.runs.exists()
 
 
-def test_a_missing_ros_is_told_with_what_to_install(request_for, monkeypatch, tmp_path):
+def test_the_error_for_a_missing_ros_names_what_to_install(request_for, monkeypatch, tmp_path):
     """Not as a traceback of the trainer, a minute later."""
     monkeypatch.setenv("PATH", str(tmp_path))
 
@@ -70,7 +70,7 @@ def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec
     assert any(each.startswith(problem) for each in preflight.programs_exist(request_for(**spec)))
 
 
-def test_a_broken_world_file_is_told_with_line_and_column(request_for, tmp_path):
+def test_the_error_for_a_broken_world_file_has_line_and_column(request_for, tmp_path):
     """Its sidecar would find it too, but in a log."""
     world = tmp_path / "broken.wbt"
     world.write_text("#VRML_SIM R2023b utf8\nWorldInfo {\n  basicTimeStep [\n}\n")
@@ -89,7 +89,7 @@ def test_a_world_file_that_is_right_passes(request_for, tmp_path):
     assert not list(preflight.worlds_are_right(request_for(**collecting(world={"file": str(world)}))))
 
 
-def test_a_missing_world_file_is_told_with_its_path(request_for):
+def test_the_error_for_a_missing_world_file_has_its_path(request_for):
     """And with the system's own words."""
     [problem] = preflight.worlds_are_right(request_for(**collecting(world={"file": "/no/such.wbt"})))
 
@@ -104,8 +104,8 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
         preflight.check(request_for())
 
 
-def test_every_problem_is_told_at_once(request_for, monkeypatch):
-    """Nobody wants to mend a job one line at a time."""
+def test_all_problems_are_reported_at_once(request_for, monkeypatch):
+    """An author fixes all problems of a job in one go."""
     monkeypatch.setattr(preflight, "LEAST_FREE", 2**62)
 
     with pytest.raises(Refused) as refused:

@@ -208,7 +208,7 @@ def test_what_was_refused_is_of_the_replica_or_of_all(make_job):
     assert [each.denied for each in of_all.replicas] == ["no policy"] * 2
 
 
-def test_a_volume_that_does_not_come_is_told_by_the_events_of_its_pod(look, raw_pod):
+def test_a_volume_that_does_not_come_is_read_from_the_events_of_its_pod(look, raw_pod):
     """The last of those that speak of volumes, while the pod waits for them."""
 
     def event(reason, words, second, uid="pod-1"):

@@ -41,7 +41,7 @@ def test_long_words_are_bounded_and_on_one_line():
     assert words.startswith("a b a b")
 
 
-def test_a_job_without_a_workload_is_told_what_to_check():
+def test_the_message_for_a_job_without_a_workload_names_what_to_check():
     """Kueue writes nothing about a Job that it does not manage."""
     assert why_not_admitted([]) == NO_WORKLOAD
 

@@ -21,7 +21,7 @@ WEBHOOK = "Internal error occurred: failed calling webhook x"
         TooManyRequests(429, "TooManyRequests", BUDGET),
     ],
 )
-def test_what_a_person_has_to_mend_is_told_until_it_was_made(error):
+def test_a_refusal_that_a_person_has_to_fix_is_kept_until_the_request_succeeds(error):
     """By replica, in the words of the API server or webhook that refused."""
     denials = Denials()
 

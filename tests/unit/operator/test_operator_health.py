@@ -80,7 +80,7 @@ def test_what_the_operator_counts(line, ask):
     assert line in ask("/metrics")[1].splitlines()
 
 
-def test_an_address_that_is_taken_is_told_with_the_option():
+def test_the_error_for_a_taken_address_names_the_option():
     """Two operators on one machine."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
         where = taken.getsockname()[:2]

@@ -104,8 +104,8 @@ def test_a_job_that_was_refused_has_no_replicas_to_count(metrics):
 
 
 @pytest.mark.parametrize(("leads", "jobs"), [(True, 2), (False, None)])
-def test_jobs_are_told_by_the_operator_that_leads(metrics, leads, jobs):
-    """So that a sum over all operators counts each once."""
+def test_only_the_operator_that_leads_exports_jobs(metrics, leads, jobs):
+    """A sum over all operators must count each job once."""
     phases = [("robots", "Running"), ("robots", "Running")]
     metrics.watch(
         depth=lambda: 0, leads=lambda: leads, phases=lambda: phases, waits=list, outdated=lambda: None

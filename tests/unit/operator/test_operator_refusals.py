@@ -132,7 +132,7 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
     assert looks < 5 * 1500
 
 
-def test_beyond_the_bound_nobody_is_asked_and_that_is_told(server):
+def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
     """Those that are remembered keep their place, so that each gets its answer."""
     refusals = Refusals(server, lambda: server.now)
     for number in range(REMEMBERED):

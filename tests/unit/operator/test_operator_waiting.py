@@ -47,6 +47,6 @@ def test_a_job_without_a_status_has_no_replica_that_waits():
     assert waits({}) == ()
 
 
-def test_what_is_waited_for_is_told_as_a_warning():
+def test_every_reason_to_wait_is_a_warning():
     """An alert counts them: each has a remedy in the table of reasons."""
     assert all(ROWS[reason].warning and ROWS[reason].remedy for reason in WAITING)

@@ -209,7 +209,7 @@ def test_a_default_never_contradicts_what_a_job_asks_for(wanted, planned):
 STANDBY = [{"name": "collect", "role": "Collect", "standby": True}, {"name": "evaluate", "role": "Evaluate"}]
 
 
-def test_a_sidecar_is_told_that_a_second_simulator_stands_by(in_cluster):
+def test_a_sidecar_gets_an_option_for_a_second_simulator_that_stands_by(in_cluster):
     """It makes that one's world and names itself, of the world that it is given."""
     planned = containers(in_cluster(simulators=STANDBY))
 

@@ -136,7 +136,7 @@ def test_names_are_those_that_earlier_versions_wrote(make_job):
     ]
 
 
-def test_the_trainer_and_the_sidecar_are_told_the_same_world(in_cluster):
+def test_the_trainer_and_the_sidecar_get_the_same_world(in_cluster):
     """training.yaml says where the world is that the simulator runs."""
     planned = in_cluster()
     told = [each["world"] for each in training(planned)["simulators"]]
@@ -166,7 +166,7 @@ def test_a_config_map_is_given_by_who_can_read_it(make_job):
         plan(job, LAYOUT)
 
 
-def test_a_broken_world_is_told_with_its_field_line_and_column(in_cluster):
+def test_the_error_for_a_broken_world_has_field_line_and_column(in_cluster):
     """A person sees the world's text in the job, and has to find the place."""
     broken = ARENA.replace("basicTimeStep 32", "basicTimeStep {")
 

@@ -34,7 +34,7 @@ class Shown(Collector):
         }
 
 
-def test_a_counter_is_told_by_its_labels():
+def test_the_samples_of_a_counter_have_its_labels():
     """In their order; its name is the one that was declared."""
     colours = Label(name="colour", values=("red", "blue"))
     family = Family(name="balls_total", kind=Kind.COUNTER, meaning="Balls.", labels=(colours,))

@@ -62,7 +62,7 @@ def test_only_one_simulator_keeps_the_clock(source, tmp_path) -> None:
     assert b"--clock" not in silent.read_bytes()
 
 
-def test_the_robots_are_told_by_the_names_that_they_have(source, tmp_path) -> None:
+def test_the_robots_are_listed_by_the_names_that_they_have(source, tmp_path) -> None:
     """The trainer learns them from /state and never makes a name itself."""
     world = preparation.named(source(), tmp_path, IDENTITY, clock=True)
 
@@ -72,8 +72,8 @@ def test_the_robots_are_told_by_the_names_that_they_have(source, tmp_path) -> No
     assert robots == (RobotName(robot="robotino", ros_name=name, supervisor=True),)
 
 
-def test_a_robot_without_a_name_is_not_told() -> None:
-    """The controller would make one of its process, which nobody can know before."""
+def test_a_robot_without_a_name_is_not_listed() -> None:
+    """The controller would derive a name from its process, which cannot be known before."""
     nameless = b'#VRML_SIM R2023b utf8\nRobot { name "r" controller "ros" }\n'
 
     assert preparation.described(nameless, "world") == ()

@@ -22,7 +22,7 @@ def test_a_new_motor_holds_its_position(robot):
     assert robot.get("wheel0_joint/get_velocity") == pytest.approx(137.46)
 
 
-def test_the_velocity_told_is_the_commanded_one(robot):
+def test_get_velocity_returns_the_commanded_velocity(robot):
     """Not the measured speed: for that there are position sensors."""
     robot.call("wheel0_joint/set_position", value=INF)
     robot.call("wheel0_joint/set_velocity", value=5.0)
@@ -123,7 +123,7 @@ def test_in_position_control_the_shaft_turns_to_its_target_and_stays(robot):
     assert sensor[-1] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_motor_accelerates_no_faster_than_told(motor):
+def test_a_motor_accelerates_no_faster_than_its_limit(motor):
     """-1, the default, is without limit."""
     motor.set_position(INF)
     motor.set_velocity(4.0)

@@ -66,8 +66,8 @@ def test_it_can_be_driven_without_ros(simulation):
         max_size=8,
     )
 )
-def test_a_velocity_told_again_is_as_if_it_were_told_once(ways):
-    """The trainer's facade spares what did not change; a run stays the same, bit by bit."""
+def test_sending_a_velocity_again_changes_nothing(ways):
+    """The trainer's facade does not send unchanged velocities; a run must stay the same bit by bit."""
 
     def moments(told_again):
         simulation = Simulation.load(builtin("arena"))

@@ -78,7 +78,7 @@ def test_defaults_are_hyperparameters_of_the_class(name):
     assert check(Algorithm(name=name, hyperparameters=dict(ALGORITHMS[name].arena))).cls
 
 
-def test_mistyped_hyperparameters_are_told_all_at_once_with_the_nearest_name():
+def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name():
     """Before a simulator is started for nothing."""
     wrong = {"learning_rat": 1, "gama": 0.9, "zzz": 0}
 
@@ -101,7 +101,7 @@ def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
         check(Algorithm(name="DQN", hyperparameters={name: 1}))
 
 
-def test_an_unknown_algorithm_is_told_with_the_nearest_name():
+def test_the_error_for_an_unknown_algorithm_has_the_nearest_name():
     """The operator checks it too, but a person may write the file."""
     with pytest.raises(ConfigurationError, match=r"algorithm.name: DQM .* did you mean DQN"):
         check(Algorithm(name="DQM"))

@@ -79,8 +79,8 @@ def test_the_first_steps_are_never_slow():
     assert not any(pace.slow(1.0 + number) for number in range(10))
 
 
-def test_a_simulator_that_has_become_slower_is_not_told_for_ever():
-    """After fifty steps that is what it is."""
+def test_a_simulator_that_has_become_slower_is_not_reported_for_ever():
+    """After fifty steps the new pace counts as normal."""
     pace = Pace()
     for _ in range(200):
         pace.slow(0.004)

@@ -108,7 +108,7 @@ def test_what_is_missing_is_named_and_nothing_made(program, arguments, fact, cap
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_wrong_configuration_is_told_before_a_learning_library_is_imported(tmp_path):
+def test_a_wrong_configuration_is_refused_before_a_learning_library_is_imported(tmp_path):
     """Three seconds are long for a typing mistake."""
     (tmp_path / "training.yaml").write_text(WRONG)
     program = (

@@ -67,7 +67,7 @@ def test_what_is_dumped_is_read_back_as_the_same():
     assert parse(yaml.safe_load(dump(configuration))) == configuration
 
 
-def test_all_mistakes_are_told_at_once():
+def test_all_mistakes_are_reported_at_once():
     """Each attempt to fix a mistake costs a new pod."""
     wrong = MINIMAL | {"steps": 0, "evaluation": {"episodes": 0}, "seed": -1}
 
@@ -121,8 +121,8 @@ def test_simulators_that_do_not_fit_together_are_refused(simulators, fact):
         parse(MINIMAL | {"simulators": simulators})
 
 
-def test_a_missing_file_is_told_with_the_variable_that_names_it(tmp_path, monkeypatch):
-    """The message is all that somebody sees who started the program by hand."""
+def test_the_error_for_a_missing_file_has_the_variable_that_names_it(tmp_path, monkeypatch):
+    """A person who started the program by hand sees only the message."""
     monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "none.yaml"))
 
     with pytest.raises(ConfigurationError, match=r"none.yaml: cannot be read .* PALAESTRA_CONFIG"):

@@ -90,8 +90,8 @@ def test_a_signal_is_noted_and_raised_at_the_next_check():
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-def test_whoever_listened_before_listens_again():
-    """Pytest, for one."""
+def test_the_handler_that_was_set_before_is_set_again():
+    """Pytest, for example, has a handler."""
     before = signal.getsignal(signal.SIGINT)
 
     with Interruption():
@@ -100,7 +100,7 @@ def test_whoever_listened_before_listens_again():
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_a_stall_is_told_and_ends_the_process():
+def test_a_stall_is_reported_and_ends_the_process():
     """After the deadline, not before, and with its own code."""
     left, words = threading.Event(), []
     codes = []
@@ -143,7 +143,7 @@ def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
     assert "in hang" in ended.stderr
 
 
-def test_a_full_disk_is_told_also_when_the_system_names_no_file():
+def test_a_full_disk_is_reported_also_when_the_system_names_no_file():
     """A write that fails knows its descriptor only."""
     end = end_of(OSError(errno.ENOSPC, "full"))
 

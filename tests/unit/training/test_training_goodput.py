@@ -179,8 +179,8 @@ def test_every_second_belongs_to_exactly_one_cause(course):
 
 
 @given(st.lists(moves, max_size=6), st.lists(st.sampled_from(Cause), min_size=6, max_size=6))
-def test_whoever_asks_amid_a_cause_sees_no_cause_shrink(course, causes):
-    """A counter that shrinks is one that began anew, says Prometheus; only a step under way is missing."""
+def test_no_cause_shrinks_for_a_reader_amid_a_cause(course, causes):
+    """Prometheus takes a counter that shrinks for a restart; only the step under way is missing."""
     clock = Clock()
     goodput, began = clock.ledger(), clock.now
     before = goodput.seconds()

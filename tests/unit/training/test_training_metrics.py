@@ -89,8 +89,8 @@ def test_success_in_training_is_that_of_the_last_hundred_episodes(progress):
     assert values(progress, "palaestra_trainer_episode_success_ratio") == {(): 0.25}
 
 
-def test_an_evaluation_is_told_until_the_next(progress):
-    """With how many there were."""
+def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
+    """With the number of evaluations."""
     for success in (True, False):
         played = Episode(seed=1, total_reward=2.0, length=3, success=success)
         progress.evaluated(Evaluation(episodes=(played,), faults=0, steps_lost=0, seconds=0.1))
@@ -106,8 +106,8 @@ def test_an_evaluation_is_told_until_the_next(progress):
     assert values(progress, "palaestra_trainer_evaluation_length_mean_steps") == {(): 3}
 
 
-def test_what_tensorboard_is_told_is_told_here(progress):
-    """Of it losses, exploration and learning rate, and nothing under a name that is not declared."""
+def test_figures_for_tensorboard_are_metrics_too(progress):
+    """Losses, exploration and learning rate are; a name that is not declared is not."""
     logged = Logged(progress.figures)
     logged.write({"train/loss": 0.5, "train/n_updates": 4, "rollout/exploration_rate": 0.3}, {}, 7)
     logged.write({"train/learning_rate": 0.001, "train/my_own_loss": 1.0, "train/loss": 0.25}, {}, 8)
@@ -117,7 +117,7 @@ def test_what_tensorboard_is_told_is_told_here(progress):
     assert values(progress, "palaestra_trainer_learning_rate") == {(): 0.001}
 
 
-def test_faults_and_restarts_are_told_of_each_simulator_by_cause(progress):
+def test_faults_and_restarts_are_counted_by_simulator_and_cause(progress):
     """A restart has the cause of the fault that it mended; wear is none."""
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
     progress.fault("collect-0", SimulatorHung("collect-0", "silent"))
@@ -147,7 +147,7 @@ def test_simulators_are_counted_by_how_they_stand(progress):
     }  # fmt: skip
 
 
-def test_what_is_played_is_told_of_each_simulator(progress, make_member, clock):
+def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
     """Steps with their time, episodes, and what is left of the restarts; simulated time if it is known."""
     keeper = Keeper(make_member(), Care(restart_limit=4), progress, clock)
     progress.figures.meters = {"collect-0": keeper.meter}
@@ -221,8 +221,8 @@ def test_a_run_tells_of_its_checkpoints_and_losses(train):
     assert played.keys() == {("collect-0",), ("evaluate-0",)}
 
 
-def test_a_run_that_goes_on_is_not_told_before_it_is_known_how_far_it_is(job, directory, train):
-    """A counter that begins at 0 and jumps has grown, to Prometheus: here nothing could be served at all."""
+def test_a_resumed_run_exports_nothing_before_its_step_is_known(job, directory, train):
+    """Prometheus takes a jump from 0 for growth. Here the port is in use, and nothing is served at all."""
     saved = train().step
     with socket.create_server(("127.0.0.1", 0)) as taken:
         configuration = job("DQN", statusAddress=f"127.0.0.1:{taken.getsockname()[1]}")
@@ -249,7 +249,7 @@ def test_a_checkpoint_that_a_full_disk_refuses_is_counted(train, monkeypatch):
     assert values(progress, "palaestra_trainer_checkpoint_size_bytes") == {}
 
 
-def test_what_a_run_is_held_to_is_told_too(progress, job):
+def test_the_limits_of_a_run_are_metrics_too(progress, job):
     """An alert compares with it: no checkpoint for three intervals, idle for most of the deadline."""
     configuration = job(checkpoint={"everySteps": 50}, stallDeadlineSeconds=90)
 

@@ -66,7 +66,7 @@ def test_speed_is_that_of_the_last_half_minute(progress, clock):
     assert progress.steps_per_second() == pytest.approx(10.0)
 
 
-def test_a_fault_is_told_of_its_simulator(progress):
+def test_a_fault_is_reported_for_its_simulator(progress):
     """Which one, in which state, and why."""
     progress.started("collect-0")
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
@@ -223,7 +223,7 @@ def test_a_simulator_that_breaks_again_and_again_is_flapping_until_it_is_steady(
     assert (once, thrice, later) == (False, True, False)
 
 
-def test_a_simulator_that_was_given_up_is_told_and_no_longer_missed(progress):
+def test_a_simulator_that_was_given_up_is_reported_and_no_longer_missed(progress):
     """The run goes on without it."""
     progress.started("evaluate-0")
     progress.given_up("collect-0")
@@ -234,8 +234,8 @@ def test_a_simulator_that_was_given_up_is_told_and_no_longer_missed(progress):
     assert progress.down() == []
 
 
-def test_a_spare_is_told_as_it_is_at_that_moment(progress):
-    """Without one there is nothing to tell."""
+def test_the_status_has_the_current_state_of_a_spare(progress):
+    """Without a spare the field is absent."""
     spare = ["starting"]
     progress.has_standby("collect-0", lambda: spare[0])
     first = progress.status().simulators
@@ -344,7 +344,7 @@ def test_probes_are_answered(progress):
             get(server, "/other")
 
 
-def test_a_port_in_use_is_told_as_such(progress):
+def test_a_port_in_use_is_reported_as_such(progress):
     """Two trainers on one laptop."""
     with (
         StatusServer("127.0.0.1:0", progress) as server,
@@ -354,7 +354,7 @@ def test_a_port_in_use_is_told_as_such(progress):
 
 
 @pytest.mark.parametrize("address", ["203.0.113.1:9090", "127.0.0.1:99999", "no.such.host.invalid:1"])
-def test_an_address_that_is_not_ours_is_told_as_such(progress, address):
+def test_an_address_that_is_not_ours_is_reported_as_such(progress, address):
     """The message carries the system's own."""
     with pytest.raises(ConfigurationError, match="cannot be listened on"):
         StatusServer(address, progress)

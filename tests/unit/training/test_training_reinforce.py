@@ -174,7 +174,7 @@ def test_a_callback_can_end_training(make_model):
 
 
 @pytest.mark.parametrize(("option", "value"), [("baseline", "mean"), ("episodes_per_update", 0)])
-def test_wrong_hyperparameters_are_told_by_name(make_model, option, value):
+def test_the_error_for_a_wrong_hyperparameter_names_it(make_model, option, value):
     """They come from a file."""
     with pytest.raises(ValueError, match=option):
         make_model(**{option: value})

@@ -56,7 +56,7 @@ def test_simulators_that_repeat_themselves_are_where_they_were(make_env, saved):
     assert warnings == []
 
 
-def test_a_simulator_that_does_not_repeat_itself_is_told_and_gone_on_from(make_env, saved):
+def test_training_warns_of_a_simulator_that_does_not_repeat_itself_and_goes_on(make_env, saved):
     """Physics engines seldom do; the policy must see what is, not what was."""
     env = make_env()
     env.seed(2)

@@ -138,7 +138,7 @@ def test_a_lost_master_ends_the_run_with_75(play, job, directory, last_word):
         ({"statusAddress": "127.0.0.1:99999"}, "statusAddress"),
     ],
 )
-def test_what_is_wrong_is_told_before_a_simulator_is_made(play, job, last_word, changes, fact):
+def test_a_mistake_is_reported_before_a_simulator_is_made(play, job, last_word, changes, fact):
     """With 2: trying again cannot help."""
     code, members = play(job(**changes))
 
@@ -146,7 +146,7 @@ def test_what_is_wrong_is_told_before_a_simulator_is_made(play, job, last_word, 
     assert fact in last_word().reason
 
 
-def test_members_that_are_missing_are_told(job, directory, last_word):
+def test_missing_members_are_reported(job, directory, last_word):
     """The function that makes them left one out."""
     code = training.run(job(), directory, lambda _: [])
 

@@ -62,7 +62,7 @@ def test_the_link_holds_wherever_the_claim_is_mounted(start, volume):
     assert shown(elsewhere) == {"corridor-0d1f3e5a/0": elsewhere / UID / "0" / "tensorboard"}
 
 
-def test_jobs_of_one_name_and_their_replicas_are_told_apart(start, volume):
+def test_jobs_of_one_name_and_their_replicas_are_distinguished(start, volume):
     """A job that was deleted and made again has a new UID."""
     for uid, replica in ((UID, 0), (UID, 1), (OTHER, 0)):
         assert start(uid, replica) == []

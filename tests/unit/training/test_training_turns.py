@@ -106,8 +106,8 @@ def test_an_interruption_ends_the_others_where_they_stand():
     assert told == ["cleaned up"]
 
 
-def test_whoever_has_an_answer_goes_before_those_who_have_none(connections):
-    """A simulator that is slow holds up nobody but itself."""
+def test_a_work_with_an_answer_goes_before_those_without(connections):
+    """A slow simulator delays only itself."""
     (slow, answers_slowly), (quick, answers_quickly) = connections
     told = []
 
@@ -141,7 +141,7 @@ def test_of_several_answers_the_first_that_was_asked_for_is_read_first(connectio
     assert told == [0, 1]
 
 
-def test_an_answer_that_stays_away_is_left_to_whoever_asked_first(connections):
+def test_an_answer_that_stays_away_is_left_to_the_work_that_asked_first(connections):
     """It knows its deadline, and what its simulator's silence means."""
     told = []
 

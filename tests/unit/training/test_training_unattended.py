@@ -50,7 +50,7 @@ def test_training_begins_without_a_simulator_that_does_not_come_up(play, pool, d
     assert members["collect-0"].env.seeds == []
 
 
-def test_an_evaluation_has_all_its_episodes_whoever_is_left(play, pool, directory):
+def test_an_evaluation_has_all_its_episodes_whichever_simulator_is_left(play, pool, directory):
     """The simulator that measures may be the one that breaks."""
     faults = {"evaluate-0": {"steps": range(3, 1000)}}
 

@@ -82,7 +82,7 @@ def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
     assert rewards[0] == 1.0
 
 
-def test_a_time_limit_is_told_from_an_end(make_env, make_member):
+def test_a_time_limit_is_distinguished_from_an_end(make_env, make_member):
     """The value of what would have come is bootstrapped after a limit only."""
     env = make_env(make_member())
     env.reset()
@@ -279,7 +279,7 @@ def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_e
     assert env.snapshot()[0].episode == 5
 
 
-def test_every_kind_of_fault_is_told_by_its_name_and_once(make_env, make_member):
+def test_every_kind_of_fault_is_reported_by_its_name_and_once(make_env, make_member):
     """A person who reads the counts looks for different causes."""
     faults = {1: SimulatorHung("x", "slow"), 2: WrongData("x", "NaN")}
     env = make_env(make_member(steps=faults))
@@ -411,7 +411,7 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
     assert member.resets == 2
 
 
-def test_a_recycling_is_told_once_a_minute_with_the_number_of_all(make_member, clock):
+def test_recycling_is_logged_once_a_minute_with_the_number_of_all(make_member, clock):
     """A line every few seconds hides those that matter; the first says that the limits work."""
     keeper = Keeper(make_member(recycle_after=1), clock=clock)
 

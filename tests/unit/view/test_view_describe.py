@@ -12,7 +12,7 @@ def told(job):
     return [line.strip() for line in describe(job, CREATED, NOW)]
 
 
-def test_a_running_job_is_told_from_spec_to_last_attempt():
+def test_a_running_job_is_described_from_spec_to_last_attempt():
     """In the order in which a person asks."""
     lines = told(make_job())
 
@@ -56,7 +56,7 @@ def test_a_time_ledger_of_no_seconds_is_left_out():
     assert not [line for line in told(make_job(goodput={})) if line.startswith("Time spent")]
 
 
-def test_slow_steps_are_told_apart_from_faults():
+def test_slow_steps_are_listed_apart_from_faults():
     """`Faults: slow 1` made people look for a simulator that broke."""
     both = told(make_job(faults={"dead": 2, "slow": 1}))
 
@@ -65,15 +65,15 @@ def test_slow_steps_are_told_apart_from_faults():
     assert not [line for line in told(make_job(faults={"slow": 1})) if line.startswith("Faults")]
 
 
-def test_recycling_is_told_apart_from_recovering():
+def test_recycling_is_listed_apart_from_recovering():
     """It is planned: nothing has to be mended. An older release reports none."""
     lines = told(make_job(goodput={"stepping": 75, "recycling": 25}))
 
     assert "Time spent:     stepping 75%, recycling 25%" in lines
 
 
-def test_where_the_run_lies_is_told():
-    """It decides what is left when the job is deleted."""
+def test_the_storage_of_the_run_is_shown():
+    """The storage decides what is left when the job is deleted."""
     assert "Storage:       in the pod, and gone with it" in told(
         make_job(spec={"storage": {"ephemeral": True}})
     )
@@ -113,6 +113,6 @@ def test_an_event_about_a_container_names_it():
     assert " ".join(line.split()) == "0s Normal Created Pod/job-0-x7k2p (sim-collect-0) Container created"
 
 
-def test_no_events_are_told_in_words():
-    """A cluster forgets them after an hour."""
+def test_a_line_says_that_there_are_no_events():
+    """A cluster deletes events after an hour."""
     assert happened([], NOW) == ["none that the cluster remembers"]

@@ -45,7 +45,7 @@ def test_a_full_history_fits_into_a_terminal_of_80_columns(draw):
     assert all(len(line) <= 80 for line in text.splitlines())
 
 
-def test_the_phase_its_reason_and_the_simulators_are_told(draw):
+def test_the_phase_its_reason_and_the_simulators_are_shown(draw):
     """Why a job stands where it does is seen without another command."""
     text = draw(make_job())
 

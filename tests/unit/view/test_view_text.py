@@ -12,8 +12,8 @@ from palaestra.view.sparkline import BARS
     ("seconds", "told"),
     [(-3, "0s"), (0.9, "0s"), (59, "59s"), (60, "1m"), (192, "3m12s"), (7500, "2h5m"), (273_600, "3d4h")],
 )
-def test_a_duration_is_told_in_its_two_largest_units(seconds, told):
-    """Nobody needs the seconds of a week."""
+def test_a_duration_is_shown_in_its_two_largest_units(seconds, told):
+    """The seconds of a week do not matter."""
     assert short(seconds) == told
 
 

@@ -54,8 +54,8 @@ def test_no_fault_lets_the_stub_go_on(endings):
     assert endings.done == []
 
 
-def test_a_fault_is_told_in_the_log(endings, caplog):
-    """So that nobody takes it for a bug of the stub."""
+def test_a_fault_is_logged(endings, caplog):
+    """It must not be taken for a bug of the stub."""
     Effects(endings).happen(parse("exit:step=5", "test"))
 
     assert caplog.messages == ["fault: exit:step=5"]

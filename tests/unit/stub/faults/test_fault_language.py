@@ -119,7 +119,7 @@ def test_a_value_may_be_no_number():
         ("memory_growth:mib=0", "mib is '0'; give a number from 0.001 to 1,048,576"),
     ],
 )
-def test_a_wrong_fault_is_told_with_its_place_its_fact_and_a_remedy(text, words):
+def test_the_error_for_a_wrong_fault_has_place_fact_and_remedy(text, words):
     """Its author can fix it without the documentation; a trailing colon does no harm."""
     if words is None:
         assert one(text).trigger == Trigger(event=Event.STEP)

@@ -76,7 +76,7 @@ def test_a_life_that_nobody_counts_is_drawn_and_can_be_repeated(read):
         (["--fault=slow_start:every=2,latency_ms=1"], {}, "nobody counts the starts here"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(read, arguments, environment, words):
+def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, words):
     """An option, or a variable of a job that was written somewhere else."""
     with pytest.raises(FaultError, match=words):
         read(*arguments, **environment)
@@ -93,7 +93,7 @@ def test_what_is_wrong_is_told_with_its_place(read, arguments, environment, word
         ("lost:topic=camera*", "the world has no topic camera"),
     ],
 )
-def test_what_the_world_does_not_have_is_told_with_what_it_has(read, arena, fault, words):
+def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read, arena, fault, words):
     """Found by starting its controllers on nodes that only listen."""
     with pytest.raises(FaultError, match=words):
         begin(read(f"--fault={fault}"), arena)
