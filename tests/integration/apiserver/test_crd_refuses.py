@@ -82,13 +82,13 @@ WRONG = [
     ("spec.steps", 5, 'unknown field "spec.steps"'),
     ("spec.simulators", [], "spec.simulators"),
     ("spec.simulators", [COLLECT, COLLECT], "spec.simulators[1]: Duplicate value"),
-    ("spec.simulators", [EVALUATE], "spec.simulators: Invalid value.*none of them collects; add a group"),
+    ("spec.simulators", [EVALUATE], "spec.simulators: Invalid value.*no group has role Collect; add one"),
     (
         "spec.simulators",
         [COLLECT | {"count": 16}, EVALUATE | {"count": 16}, COLLECT | {"name": "more"}],
         "spec.simulators: Invalid value.*more than 32 simulators in one pod; lower the counts",
     ),
-    ("spec.simulators", [COLLECT], "spec.trainer.evaluation.*no simulator evaluates; add a group"),
+    ("spec.simulators", [COLLECT], "spec.trainer.evaluation.*no group has role Evaluate; add one"),
     ("spec.simulators.0", {"name": "collect"}, "spec.simulators[0].role: Required value"),
     ("spec.simulators.0.role", "Eval", "spec.simulators[0].role: Unsupported value"),
     ("spec.simulators.0.count", 17, "spec.simulators[0].count"),
@@ -96,11 +96,11 @@ WRONG = [
     ("spec.simulators.0.name", "c" * 21, "spec.simulators[0].name: Too long"),
     ("spec.simulators.0.driver", "gazebo", "spec.simulators[0].driver: Unsupported value"),
     ("spec.simulators.0.image", "two words", "spec.simulators[0].image"),
-    ("spec.simulators.0.command", ["run"], "spec.simulators[0].command.*belongs to driver command"),
+    ("spec.simulators.0.command", ["run"], "spec.simulators[0].command.*is for driver command"),
     (
         "spec.simulators.0.driver",
         "command",
-        "spec.simulators[0].image.*driver command has no image of its own; name the one",
+        "spec.simulators[0].image.*is required with driver command; name the image",
     ),
     ("spec.simulators.0.world", {}, "spec.simulators[0].world.*needs exactly one of inline, configMap"),
     (
@@ -111,13 +111,17 @@ WRONG = [
     ("spec.simulators.0.world", {"configMap": {"name": "c"}}, "world.configMap.key: Required value"),
     ("spec.simulators.0.world", {"builtin": "house"}, "world.builtin: Unsupported value"),
     ("spec.simulators.0.world", {"file": "../x.wbt"}, "world.file"),
-    ("spec.simulators.0.recycle", {}, "spec.simulators[0].recycle.*sets no limit; give afterResets, after"),
+    ("spec.simulators.0.recycle", {}, "spec.simulators[0].recycle.*sets no limit; set afterResets, after"),
     ("spec.simulators.0.recycle", {"aboveMemory": "400"}, "spec.simulators[0].recycle.aboveMemory"),
     ("spec.simulators.0.recycle", {"afterMinutes": 0}, "spec.simulators[0].recycle.afterMinutes"),
     ("spec.simulators.0.standby", "yes", "spec.simulators[0].standby"),
-    ("spec.simulators.0.minSimulators", 2, "minSimulators.*is more than the group has; lower it or raise"),
-    ("spec.simulators.0.env", [{"name": "A"}], "env[0].*has both or neither of value and secretKeyRef"),
-    ("spec.simulators.0.env", [{"name": "ROS_IP", "value": "x"}], "env[0].name.*are set by Palaestra"),
+    ("spec.simulators.0.minSimulators", 2, "minSimulators.*is more than count; lower it or raise"),
+    ("spec.simulators.0.env", [{"name": "A"}], "env[0].*needs exactly one of value and secretKeyRef"),
+    (
+        "spec.simulators.0.env",
+        [{"name": "ROS_IP", "value": "x"}],
+        "env[0].name.*Palaestra sets the",
+    ),
     ("spec.simulators.0.env", [{"name": "A-B", "value": "x"}], "env[0].name"),
     ("spec.simulators.0.resources", {"requests": {"cpu": "lots"}}, "resources.requests.cpu"),
     ("spec.trainer.steps", 0, "spec.trainer.steps"),
@@ -137,16 +141,20 @@ WRONG = [
     ),
     ("spec.trainer.checkpoint", {"keep": 0}, "spec.trainer.checkpoint.keep"),
     ("spec.storage", {"size": "much"}, "spec.storage.size"),
-    ("spec.storage", {"ephemeral": True, "existingClaim": "c"}, "ephemeral.*excludes existingClaim; remove"),
+    (
+        "spec.storage",
+        {"ephemeral": True, "existingClaim": "c"},
+        "ephemeral.*cannot be combined with existing",
+    ),
     ("spec.storage", {"resumeFrom": "uid"}, "resumeFrom.*needs existingClaim; name the claim"),
     (
         "spec.storage",
         {"existingClaim": "c", "retain": "Delete"},
-        "retain.*is never deleted with it; use Keep",
+        "retain.*is never deleted with the job; use Keep",
     ),
     ("spec.network", {"egress": "Half"}, "spec.network.egress: Unsupported value"),
     ("spec.scheduling", {"tolerations": [{"value": "x"}]}, "tolerations[0].key: Required value"),
-    ("spec.scheduling", {"podLabels": {"palaestra.dev/job": "x"}}, "podLabels.*are set by Palaestra; remove"),
+    ("spec.scheduling", {"podLabels": {"palaestra.dev/job": "x"}}, "podLabels.*Palaestra sets the keys"),
     ("spec.scheduling", {"podLabels": {"a.b/c": "two words"}}, "podLabels"),
 ]
 
@@ -167,7 +175,7 @@ def test_suspending_a_queued_job_by_hand_is_refused(create):
     code, said = create(make_job(spec__suspend=True, spec__scheduling__queueName="team"))
 
     assert code == 1
-    assert_says(said, "spec.suspend.*Kueue suspends a job that has a queueName; remove one of them")
+    assert_says(said, "spec.suspend.*because Kueue suspends the job then; remove one of them")
 
 
 def test_a_driver_that_is_a_command_needs_one(create):
@@ -175,7 +183,7 @@ def test_a_driver_that_is_a_command_needs_one(create):
     code, said = create(make_job(spec__simulators__0__driver="command", spec__simulators__0__image="mine:1"))
 
     assert code == 1
-    assert_says(said, "spec.simulators[0].command.*belongs to driver command, which needs one; set both")
+    assert_says(said, "spec.simulators[0].command.*is for driver command, which requires it; set both")
 
 
 def groups_with_worlds(*lengths):
@@ -195,7 +203,7 @@ def test_inline_worlds_are_bounded_together(create):
 
     assert accepted == 0
     assert code == 1
-    assert_says(said, "spec.simulators.*more than 900,000 characters; put the worlds into the images")
+    assert_says(said, "spec.simulators.*more than 900,000 characters together; put the worlds into")
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

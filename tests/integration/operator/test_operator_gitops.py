@@ -74,7 +74,7 @@ def test_helm_fails_at_once_for_a_job_that_lacks_its_world(place, start, type_in
 
     assert code == 1
     assert "status: Failed" in output
-    assert "there is no ConfigMap nowhere here; create it with the label palaestra.dev/for-jobs" in output
+    assert "ConfigMap nowhere does not exist in this namespace; create it with the label" in output
 
     place.create(CONFIG_MAPS, {**world_map(), "metadata": {**world_map()["metadata"], "name": "nowhere"}})
     place.run(place.pods(only_job(place))[0])

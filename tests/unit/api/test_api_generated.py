@@ -106,7 +106,7 @@ def test_every_rule_stands_below_its_table() -> None:
     """An author can read each rule before a job breaks it."""
     section = tables().split("### spec.storage\n")[1].split("###")[0]
 
-    assert "- `resumeFrom`: needs existingClaim; name the claim that holds the run" in section
+    assert "- `resumeFrom`: needs existingClaim; name the claim that contains the run" in section
 
 
 def test_a_table_tells_type_default_and_what_is_required() -> None:

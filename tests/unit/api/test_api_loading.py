@@ -39,7 +39,7 @@ def test_five_mistakes_are_five_lines() -> None:
         "spec.trainer.stepps: is not a field; did you mean steps?",
         (
             "spec.simulators[0].world: needs exactly one of inline, configMap, builtin and file; "
-            "give one of them"
+            "set one of them"
         ),
     )
 
@@ -67,7 +67,7 @@ def test_a_rule_is_judged_when_only_other_fields_are_wrong(problems) -> None:
 
     assert problems({"simulators": [group]}) == [
         "spec.simulators[0].startDeadlineSeconds: 0 is less than 1; use 1 or more",
-        "spec.simulators: none of them collects; add a group with role Collect",
+        "spec.simulators: no group has role Collect; add one",
     ]
 
 

@@ -18,7 +18,7 @@ COMMAND = {"name": "collect", "role": "Collect", "driver": "command"}
 BROKEN = {
     "no group collects": (
         {"simulators": [{"name": "evaluate", "role": "Evaluate"}]},
-        "spec.simulators: none of them collects; add a group with role Collect",
+        "spec.simulators: no group has role Collect; add one",
     ),
     "too many simulators for a pod": (
         {
@@ -28,7 +28,7 @@ BROKEN = {
                 {"name": "c", "role": "Evaluate"},
             ]
         },
-        "spec.simulators: more than 32 simulators in one pod; lower the counts or use replicas",
+        "spec.simulators: has more than 32 simulators in one pod; lower the counts or use replicas",
     ),
     "more inline worlds than a ConfigMap holds": (
         {
@@ -39,67 +39,67 @@ BROKEN = {
             "trainer.evaluation": {"everySteps": 0},
         },
         (
-            "spec.simulators: their inline worlds have more than 900,000 characters; "
+            "spec.simulators: the inline worlds have more than 900,000 characters together; "
             "put the worlds into the images and name them with world.file"
         ),
     ),
     "nothing evaluates": (
         {"simulators": [{"name": "collect", "role": "Collect"}]},
-        (
-            "spec.trainer.evaluation: no simulator evaluates; "
-            "add a group with role Evaluate, or set everySteps: 0"
-        ),
+        "spec.trainer.evaluation: no group has role Evaluate; add one, or set everySteps: 0",
     ),
     "suspended by two": (
         {"suspend": True, "scheduling.queueName": "robots"},
-        "spec.suspend: Kueue suspends a job that has a queueName; remove one of them",
+        (
+            "spec.suspend: cannot be true with queueName, because Kueue suspends the job then; "
+            "remove one of them"
+        ),
     ),
     "a driver without its command": (
         {"simulators.0.driver": "command", "simulators.0.image": "mine:1"},
-        "spec.simulators[0].command: belongs to driver command, which needs one; set both or neither",
+        "spec.simulators[0].command: is for driver command, which requires it; set both or neither",
     ),
     "a command without its driver": (
         {"simulators.0.command": ["simulate"]},
-        "spec.simulators[0].command: belongs to driver command, which needs one; set both or neither",
+        "spec.simulators[0].command: is for driver command, which requires it; set both or neither",
     ),
     "a program in no image": (
         {"simulators.0.driver": "command", "simulators.0.command": ["simulate"]},
         (
-            "spec.simulators[0].image: driver command has no image of its own; "
-            "name the one that holds your program"
+            "spec.simulators[0].image: is required with driver command; "
+            "name the image that contains your program"
         ),
     ),
     "recycled at no limit": (
         {"simulators.0.recycle": {}},
-        "spec.simulators[0].recycle: sets no limit; give afterResets, afterMinutes or aboveMemory",
+        "spec.simulators[0].recycle: sets no limit; set afterResets, afterMinutes or aboveMemory",
     ),
     "more than there are are enough": (
         {"simulators.0.count": 2, "simulators.0.minSimulators": 3},
-        "spec.simulators[0].minSimulators: is more than the group has; lower it or raise count",
+        "spec.simulators[0].minSimulators: is more than count; lower it or raise count",
     ),
     "two worlds": (
         {"simulators.1.world": {"builtin": "arena", "file": "/worlds/hall.wbt"}},
         (
             "spec.simulators[1].world: needs exactly one of inline, configMap, builtin and file; "
-            "give one of them"
+            "set one of them"
         ),
     ),
     "no world": (
         {"simulators.1.world": {}},
         (
             "spec.simulators[1].world: needs exactly one of inline, configMap, builtin and file; "
-            "give one of them"
+            "set one of them"
         ),
     ),
     "a variable with two values": (
         {"trainer.env": [{"name": "A", "value": "1", "secretKeyRef": {"name": "keys", "key": "a"}}]},
-        "spec.trainer.env[0]: has both or neither of value and secretKeyRef; give one of them",
+        "spec.trainer.env[0]: needs exactly one of value and secretKeyRef; set one of them",
     ),
     "a variable that is ours": (
         {"simulators.0.env": [{"name": "ROS_MASTER_URI", "value": "http://elsewhere"}]},
         (
-            "spec.simulators[0].env[0].name: names beginning with PALAESTRA_ or ROS_ "
-            "are set by Palaestra, but for PALAESTRA_STUB_; choose another"
+            "spec.simulators[0].env[0].name: Palaestra sets the variables that begin with "
+            "PALAESTRA_ (except PALAESTRA_STUB_) or ROS_; choose another name"
         ),
     ),
     "an evaluation that never is": (
@@ -123,70 +123,73 @@ BROKEN = {
     "nothing normalized": (
         {"trainer.algorithm.normalize": {"observations": False, "rewards": False}},
         (
-            "spec.trainer.algorithm.normalize: nothing is normalized while observations and rewards are "
-            "false; remove it"
+            "spec.trainer.algorithm.normalize: has no effect while observations and rewards are both false; "
+            "remove it"
         ),
     ),
     "observations clipped that are not normalized": (
         {"trainer.algorithm.normalize": {"observations": False, "clipObservations": 5}},
         (
-            "spec.trainer.algorithm.normalize.clipObservations: no observation is normalized while "
-            "observations is false; remove it"
+            "spec.trainer.algorithm.normalize.clipObservations: has no effect while observations is false; "
+            "remove it"
         ),
     ),
     "rewards clipped that are not normalized": (
         {"trainer.algorithm.normalize": {"rewards": False, "clipRewards": 5}},
-        (
-            "spec.trainer.algorithm.normalize.clipRewards: no reward is normalized while rewards is false; "
-            "remove it"
-        ),
+        "spec.trainer.algorithm.normalize.clipRewards: has no effect while rewards is false; remove it",
     ),
     "a claim for what is kept nowhere": (
         {"storage": {"ephemeral": True, "existingClaim": "runs"}},
-        "spec.storage.ephemeral: excludes existingClaim; remove one of them",
+        "spec.storage.ephemeral: cannot be combined with existingClaim; remove one of them",
     ),
     "a class for what is kept nowhere": (
         {"storage": {"ephemeral": True, "storageClassName": "fast"}},
-        "spec.storage.ephemeral: excludes storageClassName, as no claim is made; remove one of them",
+        (
+            "spec.storage.ephemeral: cannot be combined with storageClassName, as no claim is created; "
+            "remove one of them"
+        ),
     ),
     "a class for a claim that is there": (
         {"storage": {"existingClaim": "runs", "storageClassName": "fast"}},
-        "spec.storage.storageClassName: an existing claim has its class already; remove it or existingClaim",
+        (
+            "spec.storage.storageClassName: cannot be combined with existingClaim, which already has a "
+            "class; remove one of them"
+        ),
     ),
     "somebody else's claim deleted": (
         {"storage": {"existingClaim": "runs", "retain": "Delete"}},
-        "spec.storage.retain: a claim that was there before the job is never deleted with it; use Keep",
+        "spec.storage.retain: an existing claim is never deleted with the job; use Keep",
     ),
     "resumed from nowhere": (
         {"storage.resumeFrom": "5a0c"},
-        "spec.storage.resumeFrom: needs existingClaim; name the claim that holds the run",
+        "spec.storage.resumeFrom: needs existingClaim; name the claim that contains the run",
     ),
     "a label that is ours": (
         {"scheduling.podLabels": {"palaestra.dev/job": "other"}},
         (
-            "spec.scheduling.podLabels: keys of palaestra.dev and kueue.x-k8s.io "
-            "are set by Palaestra; remove them"
+            "spec.scheduling.podLabels: Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; "
+            "remove them"
         ),
     ),
     "an annotation that is Kueue's": (
         {"scheduling.podAnnotations": {"kueue.x-k8s.io/queue": "other"}},
         (
-            "spec.scheduling.podAnnotations: keys of palaestra.dev and kueue.x-k8s.io "
-            "are set by Palaestra; remove them"
+            "spec.scheduling.podAnnotations: Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; "
+            "remove them"
         ),
     ),
     "a priority above everybody's": (
         {"scheduling.priorityClassName": "system-node-critical"},
         (
             "spec.scheduling.priorityClassName: classes that begin with system- are for the cluster's own "
-            "parts; choose another"
+            "components; choose another"
         ),
     ),
     "a label that others select by": (
         {"scheduling.podLabels": {"app.kubernetes.io/name": "database"}},
         (
-            "spec.scheduling.podLabels: others may select pods by such a label; put a domain of yours "
-            "before it, as example.com/team"
+            "spec.scheduling.podLabels: Services and NetworkPolicies of other users may select pods by a "
+            "label without your domain; use a key such as example.com/team"
         ),
     ),
     "an annotation that confines less": (
@@ -196,22 +199,25 @@ BROKEN = {
             }
         },
         (
-            "spec.scheduling.podAnnotations: how a pod is confined is not the job's to say; "
-            "remove what is about AppArmor or seccomp"
+            "spec.scheduling.podAnnotations: a job must not select AppArmor or seccomp profiles; "
+            "remove those annotations"
         ),
     ),
     "a toleration of a control plane": (
         {"scheduling.tolerations": [{"key": "node-role.kubernetes.io/control-plane", "operator": "Exists"}]},
-        "spec.scheduling.tolerations[0].key: keeps nodes free for the cluster's own parts; remove it",
+        (
+            "spec.scheduling.tolerations[0].key: is a taint that reserves nodes for the cluster's own "
+            "components; remove it"
+        ),
     ),
     "a toleration of any value and one": (
         {"scheduling.tolerations": [{"key": "gpu", "operator": "Exists", "value": "a100"}]},
-        "spec.scheduling.tolerations[0].value: operator Exists compares no value; remove it or use Equal",
+        "spec.scheduling.tolerations[0].value: has no effect with operator Exists; remove it or use Equal",
     ),
     "a toleration that ends without an effect": (
         {"scheduling.tolerations": [{"key": "gpu", "tolerationSeconds": 60}]},
         (
-            "spec.scheduling.tolerations[0].tolerationSeconds: belongs to effect NoExecute; "
+            "spec.scheduling.tolerations[0].tolerationSeconds: requires effect NoExecute; "
             "set that effect or remove it"
         ),
     ),

@@ -46,7 +46,7 @@ def test_the_last_lines_and_the_faults_outlive_the_pod(training, last_word):
     kept = scene.replica().last_attempt
     assert last(scene) == (1, 80, "SimulatorBudgetSpent")
     assert kept.message == (
-        "the simulators broke too often (exit code 80): SimulatorBudgetSpent: collect-0: 11 restarts"
+        "the simulators failed too often (exit code 80): SimulatorBudgetSpent: collect-0: 11 restarts"
     )
     assert (kept.log, kept.restarts) == (("first line", "last line"), 10)
     [told] = kept.faults
@@ -177,7 +177,7 @@ def test_a_disruption_is_counted_and_reported_once_and_is_no_failure(training, t
     assert (replica.restarts.disruption, replica.restarts.trainer) == (1, 0)
     assert last(scene)[0::2] == (1, "Disrupted")
     assert len(told) == 1
-    assert told[0].startswith(f"pod {pod['metadata']['name']} was taken (")
+    assert told[0].startswith(f"pod {pod['metadata']['name']} was disrupted (")
 
 
 def test_a_pod_that_was_deleted_and_did_not_save_in_time_is_a_failure(training):

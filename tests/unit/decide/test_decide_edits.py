@@ -35,7 +35,7 @@ def test_an_edit_of_a_job_is_said_and_left_alone(change, words, training):
 
     decision = scene.step()
 
-    assert edited(decision) == [f"Job job-0 was changed by somebody else: {words}"]
+    assert edited(decision) == [f"Job job-0 was edited by another field manager: {words}"]
     assert decision.actions == ()
 
 

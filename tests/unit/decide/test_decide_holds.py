@@ -35,7 +35,7 @@ def held(scene):
             {"simulators": WORLD},
             {},
             "WorldMissing",
-            "spec.simulators[0].world.configMap: there is no ConfigMap worlds here; "
+            "spec.simulators[0].world.configMap: ConfigMap worlds does not exist in this namespace; "
             'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
             id="no ConfigMap",
         ),
@@ -59,7 +59,7 @@ def held(scene):
             {"trainer": SECRET},
             {},
             "SecretMissing",
-            "spec.trainer.env[0].secretKeyRef: there is no Secret keys here; "
+            "spec.trainer.env[0].secretKeyRef: Secret keys does not exist in this namespace; "
             'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
             id="no Secret",
         ),
@@ -67,8 +67,8 @@ def held(scene):
             {"simulators": [{**GROUPS[0], **SECRET}, GROUPS[1]]},
             {("Secret", "keys"): {"metadata": {"name": "keys"}}},
             "SecretNotForJobs",
-            "spec.simulators[0].env[0].secretKeyRef: Secret keys is not for jobs, or the operator may not "
-            'see that it is; label it palaestra.dev/for-jobs: "true" and bind the role '
+            "spec.simulators[0].env[0].secretKeyRef: Secret keys is not for jobs, or the operator has no "
+            'permission to read its labels; label it palaestra.dev/for-jobs: "true" and bind the role '
             "palaestra-job-secrets in this namespace",
             id="a Secret of somebody else",
         ),
@@ -76,7 +76,7 @@ def held(scene):
             {"storage": {"existingClaim": "runs"}},
             {},
             "ClaimMissing",
-            "spec.storage.existingClaim: there is no PersistentVolumeClaim runs here; "
+            "spec.storage.existingClaim: PersistentVolumeClaim runs does not exist in this namespace; "
             'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
             id="no claim",
         ),
@@ -92,7 +92,8 @@ def held(scene):
             {"scheduling": {"queueName": "robots"}},
             {},
             "NoKueue",
-            "spec.scheduling.queueName: this cluster has no Kueue; install it, or make a job without a queue",
+            "spec.scheduling.queueName: this cluster has no Kueue; install it, "
+            "or create a job without a queue",
             id="a queue without Kueue",
         ),
     ],
@@ -223,7 +224,7 @@ def test_no_label_and_no_annotation_reaches_a_pod_unless_it_is_allowed(make_scen
     value = "jobs.allowed" + attempt.path.rpartition(".")[2].replace("pod", "Pod")
     message = (
         f"{attempt.path}: key {key} is not allowed in this cluster; allow it with the chart's value {value}, "
-        "or make a new TrainingJob without it"
+        "or create a new TrainingJob without it"
     )
     assert held(scene) == (attempt.told, message), attempt.gain
     assert decision.actions == ()

@@ -45,7 +45,7 @@ def test_a_memory_kill_of_a_simulator_that_is_back_at_once_is_reported(scene_and
     assert scene.replica().reason == "Training"
     [message] = told(decision)
     assert message == (
-        "container sim-collect-0 was killed for its memory (limit 512Mi, 1 so far); "
+        "container sim-collect-0 ran out of memory and was killed (limit 512Mi, 1 so far); "
         "raise spec.simulators[].resources.limits.memory"
     )
     assert kills(scene) == [("sim-collect-0", 1, "512Mi")]
@@ -135,4 +135,6 @@ def test_the_trainers_kills_are_counted_too(training):
     scene.settle(1)
 
     assert kills(scene) == [("trainer", 2, "1Gi")]
-    assert told(decision)[0].startswith("the trainer was killed for its memory (limit 1Gi, 1 so far); ")
+    assert told(decision)[0].startswith(
+        "the trainer ran out of memory and was killed (limit 1Gi, 1 so far); "
+    )

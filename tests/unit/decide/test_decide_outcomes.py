@@ -10,7 +10,7 @@ from palaestra_sim.protocol.status import SuccessInterval
     ("code", "reason", "begin"),
     [
         (2, "ConfigurationRefused", "the trainer refuses its configuration (exit code 2): Why: because"),
-        (80, "SimulatorBudgetSpent", "the simulators broke too often (exit code 80): Why: because"),
+        (80, "SimulatorBudgetSpent", "the simulators failed too often (exit code 80): Why: because"),
         (81, "Diverged", "the learner diverged (exit code 81): Why: because"),
     ],
 )
@@ -73,7 +73,7 @@ def test_a_trainer_that_was_killed_for_its_memory_is_reported_with_its_limit(tra
     scene.settle()
 
     assert scene.replica().reason == "TrainerOutOfMemory"
-    assert "killed for its memory (limit 2Gi, 1 so far); raise spec.trainer" in scene.replica().message
+    assert "was killed (limit 2Gi, 1 so far); raise spec.trainer" in scene.replica().message
 
 
 def test_a_simulator_that_hung_each_time_is_distinguished_from_a_stalled_run(training, last_word):
@@ -100,7 +100,7 @@ def test_a_full_volume_is_reported_with_its_remedy(training, last_word, word):
     assert scene.replica().reason == "StorageFull"
     assert scene.replica().message == (
         "the volume of the run is full: checkpoints/5: disk full; "
-        "free some space, or ask for more with spec.storage.size"
+        "free some space, or request more with spec.storage.size"
     )
 
 

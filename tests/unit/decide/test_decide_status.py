@@ -203,7 +203,7 @@ def test_only_the_conditions_running_and_reconciling_say_in_full_why_a_job_waits
     others = {kind: message for kind, message in messages(scene).items() if kind not in told}
     assert {kind for kind, message in messages(scene).items() if "no such image" in message} == told
     assert others == {
-        "Accepted": "the spec is right and all that it names is there",
+        "Accepted": "the spec is valid and all objects that it names exist",
         **dict.fromkeys(
             ("Suspended", "Succeeded", "Failed"), "the job is Pending; see the condition Running"
         ),

@@ -35,7 +35,7 @@ def test_the_message_about_refused_pods_quotes_the_api_server(accepted, words):
     scene.settle()
 
     assert scene.replica().reason == "PodsRefused"
-    assert scene.replica().message == f"no pod can be made: {words}"
+    assert scene.replica().message == f"no pod can be created: {words}"
     assert scene.status.phase is Phase.PENDING
 
 
@@ -103,7 +103,7 @@ def test_a_pod_that_is_not_gone_when_it_should_be_is_on_a_lost_node(training):
     scene.settle(90)
 
     assert scene.replica().reason == "NodeLost"
-    assert "node node-1 does not confirm it; delete the Node object" in scene.replica().message
+    assert "node node-1 has not confirmed it; delete the Node object" in scene.replica().message
 
 
 def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
@@ -119,7 +119,7 @@ def test_a_simulator_that_is_killed_for_its_memory_is_named(training):
 
     assert scene.replica().reason == "SimulatorOutOfMemory"
     assert scene.replica().message == (
-        "container sim-collect-0 was killed for its memory (limit 512Mi, 1 so far); "
+        "container sim-collect-0 ran out of memory and was killed (limit 512Mi, 1 so far); "
         "raise spec.simulators[].resources.limits.memory"
     )
 
@@ -155,7 +155,7 @@ def test_a_trainer_that_is_tried_again_after_it_ran_out_of_memory_says_so(traini
     scene.settle()
 
     assert (scene.replica().phase, scene.replica().reason) == (Phase.PENDING, "Retrying")
-    assert "failed: the trainer was killed for its memory; another goes on" in scene.replica().message
+    assert "failed: the trainer was killed for its memory; the next pod resumes" in scene.replica().message
 
 
 def test_a_pod_that_the_cluster_took_is_no_failure(training):

@@ -1,4 +1,4 @@
-"""What a container of the pod may be given by the job: variables and resources."""
+"""Environment variables and resources of the pod's containers."""
 
 from typing import Annotated
 
@@ -11,8 +11,8 @@ from palaestra.api.model import ApiModel, Rule
 class SecretKey(ApiModel):
     """A key of a Secret in the job's own namespace.
 
-    The Secret must carry the label `palaestra.dev/for-jobs: "true"`: a TrainingJob opens nothing
-    that its author could not open before.
+    The Secret must have the label `palaestra.dev/for-jobs: "true"`. Otherwise an author of TrainingJobs could
+    read Secrets to which they have no access.
     """
 
     name: ObjectName
@@ -23,22 +23,22 @@ class SecretKey(ApiModel):
 
 
 class Variable(ApiModel):
-    """An environment variable: a value, or the key of a Secret that holds it."""
+    """An environment variable: a value, or a reference to a Secret's key."""
 
     name: Annotated[str, Field(min_length=1, max_length=128, pattern=VARIABLE)]
     """Name of the variable."""
 
     value: Sentence | None = None
-    """Its value; absent when it comes from a Secret. No `$(OTHER)` is expanded in it."""
+    """Value of the variable; absent if `secretKeyRef` is set. `$(OTHER)` is not expanded."""
 
     secret_key_ref: SecretKey | None = None
-    """Where its value is kept; absent when `value` is given."""
+    """Key of a Secret that contains the value; absent if `value` is set."""
 
     rules = (
         Rule(
             holds=lambda variable: (variable.value is None) != (variable.secret_key_ref is None),
             cel="has(self.value) != has(self.secretKeyRef)",
-            message="has both or neither of value and secretKeyRef; give one of them",
+            message="needs exactly one of value and secretKeyRef; set one of them",
         ),
         Rule(
             field="name",
@@ -51,8 +51,8 @@ class Variable(ApiModel):
                 "!self.name.startsWith('PALAESTRA_') && !self.name.startsWith('ROS_')"
             ),
             message=(
-                "names beginning with PALAESTRA_ or ROS_ are set by Palaestra, but for PALAESTRA_STUB_; "
-                "choose another"
+                "Palaestra sets the variables that begin with PALAESTRA_ (except PALAESTRA_STUB_) or ROS_; "
+                "choose another name"
             ),
         ),
     )
@@ -65,9 +65,8 @@ class Resources(ApiModel):
     """CPU, memory and devices of one container, as in a pod."""
 
     requests: Quantities = Field(default={})
-    """What is set aside for the container, by resource (`cpu`, `memory`, ...); default: Palaestra's
-    own small requests."""
+    """Resource requests of the container (`cpu`, `memory`, ...); default: Palaestra's own small
+    requests."""
 
     limits: Quantities = Field(default={})
-    """What the container may use at most, by resource; the CPU limit sets the number of threads
-    that PyTorch uses."""
+    """Resource limits of the container; the CPU limit also sets PyTorch's number of threads."""

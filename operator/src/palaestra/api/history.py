@@ -1,7 +1,7 @@
-"""What is kept of a replica's past: how its last attempt ended, what broke, and where the time went.
+"""The history of a replica in the status: end of the last attempt, faults, and time by activity.
 
-A pod's logs die with it, so what it said last is kept here, and all of it is bounded: a status is one
-object of an API server, which people read.
+Kubernetes deletes logs with their pod, so the status keeps the last lines. Every part is bounded, because a
+status is one object of the API server and people read it.
 """
 
 from datetime import datetime
@@ -21,7 +21,7 @@ class Fault(Reported):
     """One fault of one simulator."""
 
     time: datetime = Field(strict=False)
-    """When the trainer noticed it."""
+    """Time at which the trainer detected it."""
 
     simulator: Word
     """Group and number: `collect-0`."""
@@ -30,100 +30,100 @@ class Fault(Reported):
     """`dead`, `hung` or `wrong_data`."""
 
     fact: Line = ""
-    """What happened, in a sentence."""
+    """Description of the fault, in a sentence."""
 
     step: Count
-    """Environment steps learned from by then."""
+    """Environment steps trained at that time."""
 
 
 class LastAttempt(Reported):
-    """How the newest attempt that has ended did so; it stays when the pod is gone."""
+    """End of the newest attempt that has ended; kept after its pod is deleted."""
 
     attempt: Count
-    """Its number, from 1."""
+    """Number of the attempt, from 1."""
 
     exit_code: Count | None = None
-    """Exit code of the trainer; absent: nobody knows, as when its node was lost."""
+    """Exit code of the trainer; absent: unknown, for example because its node was lost."""
 
     reason: Word
-    """Why it ended, in one word: `Disrupted`, `SimulatorBudgetSpent`, `Succeeded`, ..."""
+    """Reason for its end, in one word: `Disrupted`, `SimulatorBudgetSpent`, `Succeeded`, ..."""
 
     message: Sentence
-    """Why, in a sentence for people."""
+    """Reason for its end, in a sentence for people."""
 
     log: Annotated[Listed[Line], Field(max_length=MOST_LINES)] = ()
-    """The last lines of the trainer's log, the newest last, each cut to 200 characters."""
+    """Last lines of the trainer's log, the newest last, each truncated to 200 characters."""
 
     faults: Annotated[Listed[Fault], Field(max_length=MOST_FAULTS)] = ()
-    """The last faults of its simulators, the newest last."""
+    """Last faults of its simulators, the newest last."""
 
     restarts: Count = 0
-    """Simulators that were started again after a fault."""
+    """Restarts of simulators after a fault."""
 
 
 class Faults(Reported):
-    """How often simulators broke, and were slow without breaking, over all attempts."""
+    """Number of simulator faults by kind, and of slow steps, over all attempts."""
 
     dead: Count = 0
-    """Connections were refused or closed."""
+    """Refused or closed connections."""
 
     hung: Count = 0
-    """No answer in time."""
+    """Timeouts."""
 
     slow: Count = 0
-    """Steps that took more than ten times as long as usual; they are no faults, and nothing was restarted."""
+    """Steps that took more than ten times as long as usual; they are not faults and cause no restart."""
 
     wrong_data: Count = 0
-    """Answers that cannot be right."""
+    """Invalid answers."""
 
 
 class Goodput(Reported):
-    """What the trainer's time was spent on, over all attempts, in whole seconds."""
+    """Time of the trainer by activity, over all attempts, in whole seconds."""
 
     stepping: Seconds = 0
-    """Seconds in which simulators computed a step that training waited for."""
+    """Seconds in which training waited for simulators to compute a step."""
 
     transport: Seconds = 0
-    """Seconds of steps that were spent on asking, reading and the environment."""
+    """Seconds of steps spent on requests, responses and the environment's code."""
 
     learning: Seconds = 0
-    """Seconds of the algorithm."""
+    """Seconds spent in the algorithm."""
 
     evaluating: Seconds = 0
-    """Seconds of evaluations."""
+    """Seconds spent on evaluations."""
 
     checkpointing: Seconds = 0
-    """Seconds of saving."""
+    """Seconds spent on saving checkpoints."""
 
     starting: Seconds = 0
-    """Seconds until the first step of each attempt."""
+    """Seconds before the first step of each attempt."""
 
     recovering: Seconds = 0
-    """Seconds in which every simulator was broken, or a resumed run was brought back to where it was;
-    in releases that report no `recycling`, also those of recycling."""
+    """Seconds in which every simulator was broken, or a resumed run restored its simulators to the state at
+    the checkpoint. In releases that do not report `recycling`, this includes recycling."""
 
     recycling: Seconds | None = None
-    """Seconds in which training waited for a healthy simulator that was being restarted, as `recycle` plans
-    it; absent: none, or not reported."""
+    """Seconds in which training waited for a healthy simulator to restart, as `recycle` schedules it; absent:
+    none, or not reported."""
 
 
 class MemoryKills(Reported):
-    """How often one container was killed for its memory."""
+    """How many times one container was killed because it ran out of memory."""
 
     container: Word
-    """Its name: `sim-collect-0` or `trainer`."""
+    """Name of the container: `sim-collect-0` or `trainer`."""
 
     times: Count
-    """How often, over all attempts, as far as it was seen."""
+    """Number of kills that the operator observed, over all attempts."""
 
     limit: Word | None = None
-    """Its memory limit, as `512Mi`; absent: it has none, so its node ran short."""
+    """Memory limit of the container, as `512Mi`; absent: it has no limit, so its node ran out of memory."""
 
     last: datetime = Field(strict=False)
-    """When it was killed last, by its node's clock."""
+    """Time of the last kill, by the node's clock."""
 
     pod: Word | None = None
-    """UID of the pod in which it was killed last; absent: an older release has counted."""
+    """UID of the pod of the last kill; absent: an older release counted it."""
 
     run: Count | None = None
-    """Which run of the container in that pod was killed last, from 0; absent as `pod` is."""
+    """Run of the container in that pod that was killed last, from 0; absent if `pod` is absent."""

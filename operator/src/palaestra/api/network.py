@@ -1,4 +1,4 @@
-"""Whom the pods may talk to. Nothing here is used by `palaestra run`."""
+"""Network access of the pods. `palaestra run` ignores all of it."""
 
 from enum import StrEnum
 
@@ -8,15 +8,15 @@ from palaestra.api.model import ApiModel
 
 
 class Egress(StrEnum):
-    """Whether the pods may call out."""
+    """Whether the pods may open connections."""
 
     OPEN = "Open"
     CLOSED = "Closed"
 
 
 class Network(ApiModel):
-    """Whom the pods may talk to; who may talk to them is not the job's to say."""
+    """Connections that the pods may open; a job cannot change which connections reach its pods."""
 
     egress: Egress = Field(default=Egress.OPEN, strict=False)
-    """`Open`: the pods may call anything. `Closed`: nothing at all, names of hosts included; training
-    needs none."""
+    """`Open`: the pods may connect to anything. `Closed`: to nothing, not even to DNS; training needs no
+    connection."""

@@ -1,7 +1,7 @@
-"""Every reason that a condition, a replica or an event may have, and all their sentences.
+"""All reasons of conditions, replicas and events, with their messages.
 
-A reason is one word for programs; its message, with the facts filled in, is a sentence for people: the
-fact and the remedy. `meaning` and `remedy` are the rows of docs/operations.md.
+A reason is one word for programs. Its message is a template; with the facts filled in it is a sentence for
+people: the fact and the remedy. `meaning` and `remedy` are the rows of docs/operations.md.
 """
 
 from dataclasses import dataclass
@@ -9,14 +9,15 @@ from enum import StrEnum
 
 from palaestra.api.lines import flat, one_line
 
-LONGEST_MESSAGE = 1024  # characters, as the API server bounds an event's; ours stay within it everywhere
-LONGEST_FACT = 600  # of one fact that comes from elsewhere: the scheduler, a registry, a trainer
+LONGEST_MESSAGE = 1024  # Characters; the API server's limit for an event, which all our messages respect.
+
+LONGEST_FACT = 600  # Characters of one external fact: from the scheduler, a registry, a trainer.
 
 
 class Reason(StrEnum):
-    """Why something is as it is, in one word.
+    """The reason for a state or an event, in one word.
 
-    A word that an older release wrote into a status is read as what it is called now.
+    A reason that an older release wrote into a status is read under its current name.
     """
 
     ACCEPTED = "Accepted"
@@ -75,7 +76,7 @@ class Reason(StrEnum):
 
     @classmethod
     def known(cls, word: str) -> "Reason":
-        """Return the reason of this name; an unknown one, as of a newer release, is `JobFailed`."""
+        """Return the reason of this name; `JobFailed` for an unknown one, for example of a newer release."""
         return cls(word) if word in set(cls) else cls.JOB_FAILED
 
     @classmethod
@@ -86,7 +87,7 @@ class Reason(StrEnum):
 _RENAMED = {"FaultBudgetSpent": Reason.SIMULATOR_BUDGET_SPENT}
 
 
-# What keeps a job from being planned or resumed until a person acts.
+# Reasons for which a job is not planned or resumed until a person acts.
 HELD = frozenset(
     {
         Reason.INVALID_SPEC,
@@ -102,8 +103,8 @@ HELD = frozenset(
     }
 )
 
-# What a replica waits for while nothing has ended: the cluster tries again, or a person has to act. The
-# metric palaestra_replicas_waiting counts these.
+# Reasons for which a replica waits: the cluster retries, or a person must act. The metric
+# palaestra_replicas_waiting counts these.
 WAITING = (
     Reason.NAME_TAKEN,
     Reason.OLD_POD_TERMINATING,
@@ -123,7 +124,7 @@ WAITING = (
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What is said with a reason: `message` has the facts in braces; `warning` is the event's type."""
+    """The texts of a reason: `message` has the facts in braces; `warning` is the event's type."""
 
     message: str
     meaning: str
@@ -133,289 +134,294 @@ class Row:
 
 ROWS: dict[Reason, Row] = {
     Reason.ACCEPTED: Row(
-        "the spec is right and all that it names is there{note}",
-        "the job can be planned; the images of this release are fixed for it",
+        "the spec is valid and all objects that it names exist{note}",
+        "the spec is valid; the job keeps the images of this release for its whole life",
         "nothing",
         warning=False,
     ),
     Reason.INVALID_SPEC: Row(
         "{problem}",
-        "the spec says something that cannot be carried out; the message names the field",
-        "make a new TrainingJob with the field mended: a spec does not change",
+        "the spec has an invalid value; the message names the field",
+        "create a new TrainingJob with a corrected value, because a spec cannot be changed",
     ),
     Reason.STATUS_UNREADABLE: Row(
-        "{problem}; nothing is done with the job; upgrade the operator, or make a new TrainingJob",
-        "the status was written by something else than this release, so it is not known which replicas ended",
-        "run the release that wrote it, or make a new TrainingJob",
+        "{problem}; the operator ignores the job; upgrade the operator, or create a new TrainingJob",
+        "this release cannot read the status that another release or program wrote, so it cannot know which "
+        "replicas have ended",
+        "run the release that wrote it, or create a new TrainingJob",
     ),
     Reason.WORLD_MISSING: Row(
         "{field}: {fact}; {remedy} and the job starts",
-        "the ConfigMap of a world, or its key, is not there",
+        "the ConfigMap of a world, or its key, does not exist",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
     Reason.WORLD_INVALID: Row(
         "{problem}",
-        "a world is no readable `.wbt` file, or names other files",
-        "mend the world; one that came from a ConfigMap is read again by itself",
+        "a world is not a readable `.wbt` file, or refers to other files",
+        "correct the world; the operator reads a changed ConfigMap again by itself",
     ),
     Reason.CONFIG_MAP_NOT_FOR_JOBS: Row(
         '{field}: ConfigMap {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
-        "a job may read only what somebody has opened to jobs",
-        "whoever owns the ConfigMap sets the label",
+        "a job may read only ConfigMaps with the label",
+        "ask the owner of the ConfigMap to set the label",
     ),
     Reason.SECRET_MISSING: Row(
-        "{field}: there is no Secret {name} here; "
+        "{field}: Secret {name} does not exist in this namespace; "
         'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
-        "the Secret of a variable is not there",
+        "the Secret of a variable does not exist",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
     Reason.SECRET_NOT_FOR_JOBS: Row(
-        "{field}: Secret {name} is not for jobs, or the operator may not see that it is; "
+        "{field}: Secret {name} is not for jobs, or the operator has no permission to read its labels; "
         'label it palaestra.dev/for-jobs: "true" and bind the role palaestra-job-secrets in this namespace',
-        "a job may read only what somebody has opened to jobs, and only where the operator may look at it",
-        "whoever owns the Secret labels it and binds the role `palaestra-job-secrets`: see Secrets below",
+        "a job may read only Secrets with the label, and the operator must be allowed to check it",
+        "ask the owner of the Secret to set the label and to bind the role `palaestra-job-secrets`: see "
+        "Secrets below",
     ),
     Reason.CLAIM_MISSING: Row(
-        "{field}: there is no PersistentVolumeClaim {name} here; "
+        "{field}: PersistentVolumeClaim {name} does not exist in this namespace; "
         'create it with the label palaestra.dev/for-jobs: "true" and the job starts',
-        "the existing claim that the job names is not there",
+        "the claim named in `existingClaim` does not exist",
         'create it in the job\'s namespace with the label `palaestra.dev/for-jobs: "true"`',
     ),
     Reason.CLAIM_NOT_FOR_JOBS: Row(
         '{field}: PersistentVolumeClaim {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
-        "a job may write only where somebody has opened a volume to jobs",
-        "whoever owns the claim sets the label",
+        "a job may write only to claims with the label",
+        "ask the owner of the claim to set the label",
     ),
     Reason.POD_METADATA_NOT_ALLOWED: Row(
         "{field}: key {key} is not allowed in this cluster; allow it with the chart's value {value}, "
-        "or make a new TrainingJob without it",
-        "other controllers obey labels and annotations of pods: who may write a TrainingJob and no pod "
-        "must not reach them; an installation allows none unless it names them",
+        "or create a new TrainingJob without it",
+        "other controllers act on labels and annotations of pods, so an author of TrainingJobs without "
+        "permission to create pods must not set them; an installation allows only the keys that it names",
         "add the key, or its domain with a `/` at the end, to `jobs.allowedPodLabels` or "
-        "`jobs.allowedPodAnnotations` ([install](install.md#what-pods-may-carry)): the job starts then",
+        "`jobs.allowedPodAnnotations` ([install](install.md#what-pods-may-carry)); the job then starts",
     ),
     Reason.NO_KUEUE: Row(
-        "spec.scheduling.queueName: this cluster has no Kueue; install it, or make a job without a queue",
-        "a queue is named and nothing would ever admit the job",
-        "install Kueue, or make a new TrainingJob without `queueName`",
+        "spec.scheduling.queueName: this cluster has no Kueue; install it, or create a job without a queue",
+        "the job names a queue, but the cluster has no Kueue to admit it",
+        "install Kueue, or create a new TrainingJob without `queueName`",
     ),
     Reason.NAME_TAKEN: Row(
-        "Job {name} belongs to somebody else{deleting}; remove it or rename this TrainingJob",
-        "a Job of another owner has the name of a replica's",
-        "wait while it is being deleted; otherwise remove it, or rename the TrainingJob",
+        "Job {name} belongs to another owner{deleting}; delete it or rename this TrainingJob",
+        "a Job of another owner has the name that a replica's Job needs",
+        "wait while it is being deleted; otherwise delete it, or rename the TrainingJob",
     ),
     Reason.OLD_POD_TERMINATING: Row(
         "pod {pod} of an earlier TrainingJob of this name has not ended and mounts claim {claim}; "
         "if node {node} is lost, delete the Node object or taint it node.kubernetes.io/out-of-service",
-        "the TrainingJob was made again while a pod of the one before still terminates, as on a lost node, "
-        "and both mount the same `existingClaim`: no second pod is made while the first may still write",
-        "wait; once the machine is off, `kubectl delete node NODE`, or use another claim",
+        "the TrainingJob was deleted and created again, a pod of the deleted one still terminates (for "
+        "example on a lost node), and both use the same `existingClaim`; the operator creates no second pod "
+        "while the first may still write",
+        "wait; if the node is lost and its machine is off, run `kubectl delete node NODE`; or use another "
+        "claim",
     ),
     Reason.PLANNED: Row(
-        "created {objects}", "the objects of a replica were created", "nothing", warning=False
+        "created {objects}", "the operator created the objects of a replica", "nothing", warning=False
     ),
     Reason.QUEUED: Row(
         "waits in queue {queue} for Kueue{taken}{why}{again}",
-        "Kueue has not admitted the replica yet, or has taken it back; the words after the colon are Kueue's",
+        "Kueue has not admitted the replica yet, or has evicted it; the text after the colon is Kueue's",
         "wait, or change what the message names: see [queues](queues.md#train-in-a-queue)",
         warning=False,
     ),
     Reason.SUSPENDING: Row(
         "pod {pod} saves a checkpoint and ends; {by}",
-        "the replica is suspended, and its pod has not ended yet: the checkpoint is not safe before it has. "
-        "A job that is resumed meanwhile waits for this pod too",
-        "wait for `Suspended` before you take the node or the volume",
+        "the replica is suspended and its pod has not ended yet, so the checkpoint may be incomplete; "
+        "a job that is resumed now also waits for this pod",
+        "wait for `Suspended` before you remove the node or the volume",
         warning=False,
     ),
     Reason.SUSPENDED: Row(
         "suspended by {by}",
-        "the pods have ended after a checkpoint; the message says who set `suspend`: the TrainingJob's "
-        "`spec.suspend`, or a field manager that changed the Job, such as Kueue. "
-        "The operator does not undo what another has set",
-        "set `spec.suspend: false`; what another has suspended, it has to resume",
+        "the pods have ended after a checkpoint; the message names the cause: the TrainingJob's "
+        "`spec.suspend`, or a field manager that changed the Job, such as Kueue; "
+        "the operator does not undo a change by another field manager",
+        "set `spec.suspend: false`; if another field manager suspended the Job, resume it there",
         warning=False,
     ),
     Reason.RESUMED: Row(
-        "goes on from the last checkpoint", "the replica is no longer suspended", "nothing", warning=False
+        "resumes from the last checkpoint", "the replica is no longer suspended", "nothing", warning=False
     ),
     Reason.STARTING: Row(
         "{what}",
-        "the objects are there and nothing trains yet",
-        "nothing; after some minutes, `kubectl describe pod` tells what it waits for",
+        "the objects exist and no trainer runs yet",
+        "nothing; if it takes minutes, run `kubectl describe pod`",
         warning=False,
     ),
     Reason.TRAINING: Row("{what}", "at least one trainer runs", "nothing", warning=False),
     Reason.DISRUPTED: Row(
-        "pod {pod} was taken ({words}); the next one goes on from the last checkpoint",
-        "an eviction, a preemption, a drain, a lost node or a deletion; "
+        "pod {pod} was disrupted ({words}); the next pod resumes from the last checkpoint",
+        "an eviction, a preemption, a drain, a lost node or a deletion ended the pod; "
         "it does not count against `backoffLimit`",
-        "nothing; often: ask for nodes that stay",
+        "nothing; if it recurs, use non-preemptible nodes",
         warning=False,
     ),
     Reason.INTERRUPTED: Row(
-        "the trainer of pod {pod} stopped at a checkpoint ({how}); the next one goes on from there",
-        "a signal that nobody has told of, or the ROS master was lost; "
+        "the trainer of pod {pod} stopped at a checkpoint ({how}); the next pod resumes from there",
+        "the trainer received an unexplained signal, or lost the ROS master; "
         "it does not count against `backoffLimit`",
-        "nothing; often: read `lastAttempt.log` in the status",
+        "nothing; if it recurs, read `lastAttempt.log` in the status",
         warning=False,
     ),
     Reason.TRAINER_FAILED: Row(
         "{how}",
-        "the trainer ended as nobody expects; it is tried again while `backoffLimit` allows",
+        "the trainer failed for an unknown reason; it is retried while `backoffLimit` allows",
         "read `lastAttempt.log` in the status",
     ),
     Reason.RETRYING: Row(
-        "pod {pod} failed: {how}; another goes on from the last checkpoint",
+        "pod {pod} failed: {how}; the next pod resumes from the last checkpoint",
         "a pod failed and counts against `backoffLimit`",
-        "read `lastAttempt.log` in the status, which has the last lines of the trainer",
+        "read the last lines of the trainer's log in `lastAttempt.log` in the status",
     ),
     Reason.UNSCHEDULABLE: Row(
-        "no node takes pod {pod}: {words}; make room or ask for less",
-        "the scheduler finds no node; the words are its own",
-        "add nodes, lower `resources`, or look at `nodeSelector` and `tolerations`",
+        "no node fits pod {pod}: {words}; free resources or request less",
+        "the scheduler finds no node; the message quotes it",
+        "add nodes, lower `resources`, or check `nodeSelector` and `tolerations`",
     ),
     Reason.IMAGE_PULL: Row(
-        "container {container}: image {image} cannot be pulled ({words}); name one that can",
-        "an image does not exist, or the registry refuses it; the kubelet tries again, and before the first "
-        "step `startTimeoutSeconds` bounds it",
-        "push the image, give `imagePullSecrets`, or name another one in a new TrainingJob",
+        "container {container}: image {image} cannot be pulled ({words}); push it or name another",
+        "an image does not exist, or the registry refuses the pull; the kubelet retries, before the first "
+        "step for at most `startTimeoutSeconds`",
+        "push the image, set `imagePullSecrets`, or name another image in a new TrainingJob",
     ),
     Reason.CONTAINER_REFUSED: Row(
-        "container {container}: the node cannot make it ({words}); mend what it names",
-        "a program, a key of a Secret or a device that the container needs is not there; "
-        "the kubelet tries again, and before the first step `startTimeoutSeconds` bounds it",
-        "the words are the kubelet's and name what is missing",
+        "container {container}: the node cannot create it ({words}); provide what is missing",
+        "a program, a key of a Secret or a device that the container needs is missing; "
+        "the kubelet retries, before the first step for at most `startTimeoutSeconds`",
+        "provide what is missing; the message quotes the kubelet",
     ),
     Reason.VOLUME_NOT_MOUNTED: Row(
-        "pod {pod} waits for a volume: {words}; mend what is named",
-        "a claim, a ConfigMap or a Secret cannot be mounted, or another node still holds the volume; "
-        "the words are the cluster's",
-        "`kubectl describe pvc`; a volume on a lost node comes free when its Node object is deleted",
+        "pod {pod} waits for a volume: {words}; fix the cause that is named",
+        "a claim, a ConfigMap or a Secret cannot be mounted, or the volume is still attached to another "
+        "node; the message quotes the cluster",
+        "run `kubectl describe pvc`; a volume of a lost node is detached when the Node object is deleted",
     ),
     Reason.PODS_REFUSED: Row(
-        "no pod can be made: {words}",
-        "a quota, LimitRange, Pod Security, webhook or a PriorityClass that is missing refuses a pod "
-        "or its claim, in the API server's words",
+        "no pod can be created: {words}",
+        "the API server refuses a pod or its claim because of a quota, a LimitRange, Pod Security, a webhook "
+        "or a missing PriorityClass; the message quotes it",
         "raise the quota, or allow what the message names ([queues and quotas](queues.md#quotas)); "
-        "it is tried again by itself",
+        "the creation is retried by itself",
     ),
     Reason.RESTART_POLICY_DROPPED: Row(
-        "pod {pod}: {containers} lost restartPolicy: Always, so that the trainer would wait for ever; "
+        "pod {pod}: {containers} lost restartPolicy: Always, so the trainer would wait forever; "
         "update the webhook or scheduler that rewrites pods",
-        "something between operator and kubelet does not know sidecar containers and has dropped the field; "
-        "the pod is replaced, at most `backoffLimit` times",
+        "a webhook or scheduler does not support sidecar containers and has dropped the field; "
+        "the operator replaces the pod, at most `backoffLimit` times",
         "update or remove the mutating webhook",
     ),
     Reason.SIDECAR_CRASH_LOOP: Row(
         "container {container} has crashed {times} times ({how}); read its log",
-        "a sidecar does not stay up; the kubelet starts it again and again, and while it trains the "
-        "trainer's budget of faults ends the run",
-        "`kubectl logs POD -c CONTAINER --previous`",
+        "a sidecar crashes repeatedly and the kubelet restarts it; during training, the limit of faults "
+        "(`restart.limit`) ends the run",
+        "run `kubectl logs POD -c CONTAINER --previous`",
     ),
     Reason.SIMULATOR_START_DEADLINE: Row(
         "{what}; read the simulator's log or raise startDeadlineSeconds",
-        "a simulator did not come up within `startDeadlineSeconds`; its trainer tries again, and gives up by "
-        "its own budget (`SimulatorBudgetSpent`)",
-        "`kubectl logs POD -c sim-GROUP-N`; raise the deadline if it is only slow",
+        "a simulator did not become ready within `startDeadlineSeconds`; the trainer retries until "
+        "`restart.limit` is reached (`SimulatorBudgetSpent`)",
+        "run `kubectl logs POD -c sim-GROUP-N`; if the simulator is only slow, raise the deadline",
     ),
     Reason.TRAINER_NOT_STARTED: Row(
         "all sidecars of pod {pod} run and the node has not started the trainer for {seconds} s; "
         "update the node's Kubernetes",
-        "a kubelet forgets the main container when a sidecar's first start failed (Kubernetes issue 132826); "
-        "the pod is replaced, at most `backoffLimit` times",
+        "the kubelet does not start the main container if a sidecar's first start failed (Kubernetes issue "
+        "132826); the operator replaces the pod, at most `backoffLimit` times",
         "update the nodes to 1.34 or newer",
     ),
     Reason.START_TIMEOUT: Row(
         "{what}",
-        "the replica did not reach its first step within `startTimeoutSeconds`, and no other reason explains "
+        "the replica did not make its first step within `startTimeoutSeconds`, and no other reason explains "
         "the wait",
         "run `kubectl describe pod`; if a start may take longer, raise `startTimeoutSeconds` in a new "
         "TrainingJob",
     ),
     Reason.SIMULATOR_OUT_OF_MEMORY: Row(
-        "container {container} was killed for its memory ({limit}, {times} so far); "
+        "container {container} ran out of memory and was killed ({limit}, {times} so far); "
         "raise spec.simulators[].resources.limits.memory",
         "a simulator's container needs more memory than its limit; the simulator itself did not crash",
         "raise `spec.simulators[].resources.limits.memory` in a new TrainingJob",
     ),
     Reason.TRAINER_OUT_OF_MEMORY: Row(
-        "the trainer was killed for its memory ({limit}, {times} so far); "
+        "the trainer ran out of memory and was killed ({limit}, {times} so far); "
         "raise spec.trainer.resources.limits.memory, or lower buffer_size",
-        "the trainer needs more than its limit",
+        "the trainer needs more memory than its limit",
         "raise `spec.trainer.resources.limits.memory`, or lower the replay buffer, in a new TrainingJob",
     ),
     Reason.EPHEMERAL_STORAGE: Row(
-        "pod {pod} was evicted for its storage ({words}); write less outside of the run directory",
+        "pod {pod} was evicted because of its ephemeral storage ({words}); "
+        "write less outside of the run directory",
         "the pod wrote more to temporary volumes than its limit, or the node's disk is full",
-        "write less to /tmp, or enlarge the volume: `spec.storage.size` when it is ephemeral",
+        "write less to /tmp; if the run is ephemeral, raise `spec.storage.size`",
     ),
     Reason.STORAGE_FULL: Row(
-        "the volume of the run is full: {words}; free some space, or ask for more with spec.storage.size",
-        "the run directory takes no more; the last checkpoint is whole, and from it the run is tried again "
-        "while `backoffLimit` allows",
+        "the volume of the run is full: {words}; free some space, or request more with spec.storage.size",
+        "the run directory is full; the last checkpoint is complete, and the run is retried from it while "
+        "`backoffLimit` allows",
         "delete old runs on the volume, enlarge the claim, or lower `spec.trainer.checkpoint.keep`",
     ),
     Reason.NODE_LOST: Row(
-        "pod {pod} was to be gone more than {seconds} s ago and node {node} does not confirm it; "
+        "pod {pod} should have ended more than {seconds} s ago and node {node} has not confirmed it; "
         "delete the Node object or taint it node.kubernetes.io/out-of-service",
-        "the node does not answer; no second pod is made while the first may still write",
-        "`kubectl delete node NODE` once the machine is off",
+        "the node does not answer; the operator creates no second pod while the first may still write",
+        "once the machine is off, run `kubectl delete node NODE`",
     ),
     Reason.SIMULATOR_HUNG: Row(
         "{what}; read the simulator's log",
-        "the trainer waited for a simulator for `stallDeadlineSeconds` (exit code 82); it is tried again "
+        "the trainer waited for a simulator for `stallDeadlineSeconds` (exit code 82); it is retried "
         "while `backoffLimit` allows",
-        "`kubectl logs POD -c sim-GROUP-N`; raise the deadline, in a new TrainingJob, "
-        "if a step may take that long",
+        "run `kubectl logs POD -c sim-GROUP-N`; if a step may take that long, raise the deadline in a new "
+        "TrainingJob",
     ),
     Reason.STALLED: Row(
         "{what}; read the stacks in the trainer's log",
-        "no step was learned from for `stallDeadlineSeconds`: the trainer ended itself and is tried again, "
-        "or answers all the same, and its pod is replaced, at most `backoffLimit` times",
-        "`kubectl logs POD -c trainer`; raise the deadline, in a new TrainingJob, "
-        "if a step may take that long",
+        "the step count has not changed for `stallDeadlineSeconds`; the trainer exits and is retried; if it "
+        "still answers, the operator replaces its pod, at most `backoffLimit` times",
+        "run `kubectl logs POD -c trainer`; if a step may take that long, raise the deadline in a new "
+        "TrainingJob",
     ),
     Reason.DEADLINE_EXCEEDED: Row(
         "the job was active for {seconds} s, as long as activeDeadlineSeconds allows; "
-        "go on with a new job from the same volume",
-        "the time is over; suspended time was not counted",
-        "raise `activeDeadlineSeconds` before the end, or make a new TrainingJob",
+        "continue with a new job on the same volume",
+        "the job has used up `activeDeadlineSeconds`; suspended time is not counted",
+        "raise `activeDeadlineSeconds` before the end, or create a new TrainingJob",
     ),
     Reason.BACKOFF_LIMIT_SPENT: Row(
         "{pods} pods failed, as many as backoffLimit allows; the last: {how}",
-        "retrying has not helped",
+        "all retries failed",
         "read the message of the last failure and the trainer's log",
     ),
     Reason.CONFIGURATION_REFUSED: Row(
         "the trainer refuses its configuration (exit code 2): {words}",
-        "algorithm, environment and options do not go together; it is not tried again",
-        "make a new TrainingJob with the field that the message names mended",
+        "algorithm, environment and options do not fit together; the trainer is not retried",
+        "correct the field that the message names, in a new TrainingJob",
     ),
     Reason.SIMULATOR_BUDGET_SPENT: Row(
-        "the simulators broke too often (exit code 80): {words}",
+        "the simulators failed too often (exit code 80): {words}",
         "a simulator had more than `restart.limit` faults within `restart.withinSeconds`; "
-        "it is not tried again",
-        "read `lastAttempt.faults` in the status; raise `restart.limit` if faults are to be borne",
+        "the replica is not retried",
+        "read `lastAttempt.faults` in the status; if these faults are acceptable, raise `restart.limit`",
     ),
     Reason.DIVERGED: Row(
         "the learner diverged (exit code 81): {words}",
         "an observation or reward of the environment, a loss or a weight is NaN or infinite; "
-        "the message names it; it is not tried again",
-        "mend the environment or lower the learning rate, in a new TrainingJob; "
+        "the message names it; the replica is not retried",
+        "correct the environment or lower the learning rate, in a new TrainingJob; "
         "the last good checkpoint is kept",
     ),
     Reason.NO_PROGRESS: Row(
-        "{pods} pods in a row were taken or interrupted without one new step; "
-        "ask for nodes that stay, or checkpoint more often",
-        "`noProgressLimit`: the cluster takes pods faster than they come forward, or the trainer always "
-        "exits with 75",
-        "lower `spec.trainer.checkpoint.everySteps`, or use nodes that are not taken away; a program of "
-        "your own (`trainer.command`) must report its steps with `palaestra_trainer.report`",
+        "{pods} consecutive pods were disrupted or interrupted without one new step; "
+        "use non-preemptible nodes, or save checkpoints more often",
+        "as many pods as `noProgressLimit` ended without a new step: the cluster disrupts pods before they "
+        "make progress, or the trainer always exits with 75",
+        "lower `spec.trainer.checkpoint.everySteps`, or use non-preemptible nodes; your own program "
+        "(`trainer.command`) must report its steps with `palaestra_trainer.report`",
     ),
     Reason.JOB_FAILED: Row(
         "the Job failed: {words}",
-        "something else than Palaestra ended the replica's Job; the words are the Job's",
-        "`kubectl describe job`",
+        "Kubernetes or another controller ended the replica's Job; the message quotes the Job",
+        "run `kubectl describe job`",
     ),
     Reason.SUCCEEDED: Row(
         "{what}", "the training is complete", "fetch `model.zip` from the run directory", warning=False
@@ -423,17 +429,17 @@ ROWS: dict[Reason, Row] = {
     Reason.SOME_REPLICAS_FAILED: Row(
         "{failed} of {all} replicas failed; the first: replica {index}, {message}",
         "all replicas have ended and not all succeeded",
-        "the reason of each stands in `status.replicas`",
+        "read the reason of each replica in `status.replicas`",
     ),
     Reason.EXPIRED: Row(
-        "ended more than {seconds} s ago and is deleted, as ttlSecondsAfterFinished asks",
-        "the TrainingJob is deleted; its claims stay unless `retain: Delete`",
+        "ended more than {seconds} s ago and is deleted because of ttlSecondsAfterFinished",
+        "the operator deletes the TrainingJob; its claims stay unless `retain: Delete`",
         "nothing",
         warning=False,
     ),
     Reason.EDITED: Row(
-        "{what} was changed by somebody else: {fact}",
-        "an object that the operator made was edited; the operator emits one event for each edit "
+        "{what} was edited by another field manager: {fact}",
+        "an object that the operator created was edited; the operator emits one event per edit "
         "and does not restore the object",
         "if the edit was a mistake, undo it",
     ),

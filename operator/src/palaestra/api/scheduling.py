@@ -1,4 +1,4 @@
-"""Where and when the pods run. Nothing here is used by `palaestra run`."""
+"""Queue, priority, nodes and metadata of the pods. `palaestra run` ignores all of it."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -10,14 +10,14 @@ from palaestra.api.model import ApiModel, Rule
 
 
 class TolerationOperator(StrEnum):
-    """How a toleration is compared with a taint."""
+    """How a toleration matches a taint."""
 
     EXISTS = "Exists"
     EQUAL = "Equal"
 
 
 class TaintEffect(StrEnum):
-    """What a taint does to pods that do not tolerate it."""
+    """Effect of a taint on pods that do not tolerate it."""
 
     NO_SCHEDULE = "NoSchedule"
     PREFER_NO_SCHEDULE = "PreferNoSchedule"
@@ -25,7 +25,7 @@ class TaintEffect(StrEnum):
 
 
 class Toleration(ApiModel):
-    """A taint of nodes that the pods tolerate, as in a pod."""
+    """A node taint that the pods tolerate, as in a pod."""
 
     key: Annotated[str, Field(min_length=1, max_length=317)]
     """Key of the taint."""
@@ -40,26 +40,26 @@ class Toleration(ApiModel):
     """Effect of the taint; absent: any."""
 
     toleration_seconds: Annotated[int, Field(ge=0, le=31_536_000)] | None = None
-    """Seconds that a `NoExecute` taint is tolerated; absent: for ever."""
+    """Seconds that a `NoExecute` taint is tolerated; absent: forever."""
 
     rules = (
         Rule(
             field="key",
             holds=lambda it: not it.key.startswith("node-role.kubernetes.io/"),
             cel="!self.key.startsWith('node-role.kubernetes.io/')",
-            message="keeps nodes free for the cluster's own parts; remove it",
+            message="is a taint that reserves nodes for the cluster's own components; remove it",
         ),
         Rule(
             field="value",
             holds=lambda it: it.value is None or it.operator is TolerationOperator.EQUAL,
             cel="!has(self.value) || self.operator == 'Equal'",
-            message="operator Exists compares no value; remove it or use Equal",
+            message="has no effect with operator Exists; remove it or use Equal",
         ),
         Rule(
             field="tolerationSeconds",
             holds=lambda it: it.toleration_seconds is None or it.effect is TaintEffect.NO_EXECUTE,
             cel="!has(self.tolerationSeconds) || (has(self.effect) && self.effect == 'NoExecute')",
-            message="belongs to effect NoExecute; set that effect or remove it",
+            message="requires effect NoExecute; set that effect or remove it",
         ),
     )
 
@@ -74,29 +74,29 @@ def _domain(key: str) -> str:
 
 
 def _is_selected_by_nobody(key: str) -> bool:
-    """Return whether a label is under a domain, and not under one of Kubernetes'."""
+    """Return whether a label has a domain that is not Kubernetes' own."""
     return _domain(key) != "" and not _domain(key).endswith(("kubernetes.io", "k8s.io"))
 
 
 def _confines(key: str) -> bool:
-    """Return whether an annotation chooses a profile of seccomp, or of AppArmor, which is still obeyed."""
+    """Return whether an annotation selects a seccomp or AppArmor profile; nodes still apply AppArmor's."""
     return "security" in _domain(key) and _domain(key).endswith(".kubernetes.io")
 
 
 class Scheduling(ApiModel):
-    """Where and when the pods run."""
+    """Queue, priority, nodes and metadata of the pods."""
 
     queue_name: ObjectName | None = None
-    """Kueue's queue, which then starts and suspends the job; absent: Kubernetes starts it."""
+    """Kueue queue; Kueue then starts and suspends the job. Absent: the job starts without a queue."""
 
     priority_class_name: ObjectName | None = None
-    """Priority class of the pods, none of Kubernetes' own; absent: the cluster's default."""
+    """Priority class of the pods, not one that begins with `system-`; absent: the cluster's default."""
 
     node_selector: LabelMap = Field(default={})
     """Labels that a node must have."""
 
     tolerations: Annotated[Listed[Toleration], Field(max_length=16)] = ()
-    """Taints of nodes that the pods tolerate."""
+    """Node taints that the pods tolerate."""
 
     affinity: FreeObject = Field(default={})
     """Affinity of the pods, as in a pod."""
@@ -105,12 +105,12 @@ class Scheduling(ApiModel):
     """Runtime class of the pods, such as `nvidia`; absent: the cluster's default."""
 
     pod_labels: LabelMap = Field(default={})
-    """Labels for the pods, beside Palaestra's own, under a domain of yours such as `example.com/team`:
-    Services and NetworkPolicies of others select pods by the usual ones. A cluster takes those that its
-    installation allows (`jobs.allowedPodLabels`)."""
+    """Additional pod labels. Each key needs a domain of yours, such as `example.com/team`, because Services
+    and NetworkPolicies of other users select pods by common labels. The cluster's installation must allow
+    each key (`jobs.allowedPodLabels`)."""
 
     pod_annotations: TextMap = Field(default={})
-    """Annotations for the pods, beside Palaestra's own. A cluster takes those that its installation allows
+    """Additional pod annotations. The cluster's installation must allow each key
     (`jobs.allowedPodAnnotations`)."""
 
     rules = (
@@ -118,35 +118,35 @@ class Scheduling(ApiModel):
             field="priorityClassName",
             holds=lambda it: not (it.priority_class_name or "").startswith("system-"),
             cel="!has(self.priorityClassName) || !self.priorityClassName.startsWith('system-')",
-            message="classes that begin with system- are for the cluster's own parts; choose another",
+            message="classes that begin with system- are for the cluster's own components; choose another",
         ),
         Rule(
             field="podLabels",
             holds=lambda it: all(_is_selected_by_nobody(key) for key in it.pod_labels),
             cel="self.podLabels.all(key, key.contains('/') && !key.startsWith('/')"
             " && !key.split('/')[0].endsWith('kubernetes.io') && !key.split('/')[0].endsWith('k8s.io'))",
-            message="others may select pods by such a label; put a domain of yours before it, "
-            "as example.com/team",
+            message="Services and NetworkPolicies of other users may select pods by a label without your"
+            " domain; use a key such as example.com/team",
         ),
         Rule(
             field="podAnnotations",
             holds=lambda it: not any(_confines(key) for key in it.pod_annotations),
             cel="!self.podAnnotations.exists(key, key.contains('/') && key.split('/')[0].contains('security')"
             " && key.split('/')[0].endsWith('.kubernetes.io'))",
-            message="how a pod is confined is not the job's to say; remove what is about AppArmor or seccomp",
+            message="a job must not select AppArmor or seccomp profiles; remove those annotations",
         ),
         Rule(
             field="podLabels",
             holds=lambda it: _has_none_of_ours(it.pod_labels),
             cel="self.podLabels.all(key, !key.startsWith('palaestra.dev/')"
             " && !key.startsWith('kueue.x-k8s.io/'))",
-            message="keys of palaestra.dev and kueue.x-k8s.io are set by Palaestra; remove them",
+            message="Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; remove them",
         ),
         Rule(
             field="podAnnotations",
             holds=lambda it: _has_none_of_ours(it.pod_annotations),
             cel="self.podAnnotations.all(key, !key.startsWith('palaestra.dev/')"
             " && !key.startsWith('kueue.x-k8s.io/'))",
-            message="keys of palaestra.dev and kueue.x-k8s.io are set by Palaestra; remove them",
+            message="Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; remove them",
         ),
     )

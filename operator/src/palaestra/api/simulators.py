@@ -1,4 +1,4 @@
-"""The simulators of a replica: groups of equal ones, their worlds and their lives."""
+"""The simulators of a replica: groups, worlds, recycling and restarts."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -23,14 +23,14 @@ from palaestra.api.model import ApiModel, Rule
 
 
 class Role(StrEnum):
-    """What a simulator's episodes are for."""
+    """Use of a simulator's episodes."""
 
     COLLECT = "Collect"
     EVALUATE = "Evaluate"
 
 
 class Driver(StrEnum):
-    """Which program simulates."""
+    """The simulator program."""
 
     STUB = "stub"
     WEBOTS = "webots"
@@ -46,8 +46,8 @@ class Builtin(StrEnum):
 class ConfigMapKey(ApiModel):
     """A key of a ConfigMap in the job's own namespace.
 
-    The ConfigMap must carry the label `palaestra.dev/for-jobs: "true"`: a TrainingJob opens nothing
-    that its author could not open before.
+    The ConfigMap must have the label `palaestra.dev/for-jobs: "true"`. Otherwise an author of TrainingJobs
+    could read ConfigMaps to which they have no access.
     """
 
     name: ObjectName
@@ -58,25 +58,25 @@ class ConfigMapKey(ApiModel):
 
 
 class World(ApiModel):
-    """Where the source world comes from: exactly one of the four.
+    """The source of the world: exactly one of four.
 
-    Every simulator runs its own copy of it. Only the `controllerArgs` of robots whose controller is
-    `ros` change: `--name=` is set, `--synchronize` is added, and `--clock` stays in one simulator at most.
+    Every simulator runs its own copy. In the copy, only the `controllerArgs` of robots whose controller is
+    `ros` change: `--name=` is set, `--synchronize` is added, and at most one simulator keeps `--clock`.
     """
 
     inline: Annotated[str, Field(min_length=1, max_length=200_000)] | None = None
-    """The text of a `.wbt` file. It names no other file: relative addresses are refused. If the inline
-    worlds of a job have more than 256 KiB together, use `kubectl apply --server-side`."""
+    """Text of a `.wbt` file. It must not refer to other files: relative URLs are refused. If the inline
+    worlds of a job are larger than 256 KiB together, use `kubectl apply --server-side`."""
 
     config_map: ConfigMapKey | None = None
-    """A ConfigMap that holds the text of a `.wbt` file; relative addresses are refused."""
+    """ConfigMap key with the text of a `.wbt` file; relative URLs are refused."""
 
     builtin: Builtin | None = Field(default=None, strict=False)
-    """A world that ships with Palaestra: `arena`, four metres square, four cylinders, a Robotino."""
+    """A world that ships with Palaestra: `arena`, four by four meters with four cylinders and a Robotino."""
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
-    """Absolute path of a `.wbt` file inside the simulator's image (of this machine for
-    `palaestra run`), whose PROTOs and textures lie beside it."""
+    """Absolute path of a `.wbt` file in the simulator's image (`palaestra run`: on this machine). PROTOs and
+    textures are beside it."""
 
     rules = (
         Rule(
@@ -91,23 +91,23 @@ class World(ApiModel):
                 "[has(self.inline), has(self.configMap), has(self.builtin), has(self.file)]"
                 ".exists_one(given, given)"
             ),
-            message="needs exactly one of inline, configMap, builtin and file; give one of them",
+            message="needs exactly one of inline, configMap, builtin and file; set one of them",
         ),
     )
 
 
 class Recycle(ApiModel):
-    """When a healthy simulator is started anew between two episodes: at the first limit reached."""
+    """When a healthy simulator is restarted between two episodes: at the first limit that it reaches."""
 
     after_resets: Count | None = None
-    """Resets after which it is started anew; 0: never, absent: they are not counted."""
+    """Resets after which the simulator is restarted; 0: never; absent: resets are not counted."""
 
     after_minutes: Minutes | None = None
-    """Minutes in use after which it is started anew; absent: never."""
+    """Minutes of use after which the simulator is restarted; absent: never."""
 
     above_memory: Memory | None = None
-    """Memory of all processes of one simulator above which it is started anew, as `400Mi`; absent:
-    never. Give less than the limit in `resources`."""
+    """Memory of all processes of one simulator above which it is restarted, as `400Mi`; absent: never. Set
+    it below the limit in `resources`."""
 
     rules = (
         Rule(
@@ -116,93 +116,92 @@ class Recycle(ApiModel):
                 for limit in (recycle.after_resets, recycle.after_minutes, recycle.above_memory)
             ),
             cel="has(self.afterResets) || has(self.afterMinutes) || has(self.aboveMemory)",
-            message="sets no limit; give afterResets, afterMinutes or aboveMemory",
+            message="sets no limit; set afterResets, afterMinutes or aboveMemory",
         ),
     )
 
 
 class Restart(ApiModel):
-    """How many faults of one simulator are survived."""
+    """How many times one simulator is restarted after faults."""
 
     limit: Annotated[int, Field(ge=0, le=1000)] = 10
-    """Restarts after faults within the window; one more ends the replica (exit code 80), or with
-    `minSimulators` left only this simulator."""
+    """Restarts after faults within the window. One more fault ends the replica (exit code 80). If at least
+    `minSimulators` others are left, training continues without this simulator instead."""
 
     within_seconds: Seconds = 600
     """Length of the window in seconds."""
 
 
 class SimulatorGroup(ApiModel):
-    """A group of equal simulators."""
+    """A group of identical simulators."""
 
     name: GroupName
     """Name of the group, unique in the job: a DNS label of at most 20 characters."""
 
     role: Role = Field(strict=False)
-    """`Collect`: its episodes are learned from. `Evaluate`: they only measure the policy."""
+    """`Collect`: the policy learns from the episodes. `Evaluate`: the episodes only measure the policy."""
 
     count: Annotated[int, Field(ge=1, le=16)] = 1
-    """How many of them run in each replica."""
+    """Number of simulators of this group in each replica."""
 
     min_simulators: Annotated[int, Field(ge=1, le=16)] | None = None
-    """How many of them are enough to go on with: one whose restarts are used up is given up while
-    as many are left, and training begins while others still come up; absent: all of them."""
+    """Number of simulators that training needs. Training starts when that many are ready, and continues
+    without a simulator that has used up its restarts while that many are left. Absent: all of them."""
 
     image: Image | None = None
-    """Container image; absent: the one of this release for the driver. Not used by
-    `palaestra run`."""
+    """Container image; absent: this release's image for the driver. `palaestra run` ignores it."""
 
     driver: Driver = Field(default=Driver.STUB, strict=False)
-    """`stub`: the simulator that ships with Palaestra. `webots`: Webots; its image is not built here
-    yet, so give `image` one of yours. `command`: any program that speaks the same ROS interface."""
+    """`stub`: the simulator that ships with Palaestra. `webots`: Webots; Palaestra has no image for it yet,
+    so set `image` to your own. `command`: any program with the same ROS interface."""
 
     command: Words = ()
-    """The program and its arguments, for driver `command` only."""
+    """Program and arguments, for driver `command` only."""
 
     world: World = World(builtin=Builtin.ARENA)
-    """The source world, from exactly one of four places."""
+    """World that the simulators load, from exactly one of four sources."""
 
     recycle: Recycle | None = None
-    """When a healthy simulator is started anew between two episodes; absent: after 24 resets, or never
-    with driver `stub`, which neither leaks nor slows down."""
+    """When a healthy simulator is restarted between two episodes; absent: after 24 resets. Absent with
+    driver `stub`: never, because the stub neither leaks memory nor slows down."""
 
     standby: bool = False
-    """True: a second simulator stands by in the same container and takes over at once when the first
-    is recycled or fails. The container then has twice the memory."""
+    """`true` runs a second simulator in the same container, which takes over at once when the first is
+    recycled or fails. The container then has twice the memory."""
 
     options: Words = ()
-    """Options for the simulator's own command line, each one word."""
+    """Options for the simulator's command line, one word per item."""
 
     restart: Restart = Restart()
-    """How many faults of one simulator are survived."""
+    """How many times one simulator is restarted after faults."""
 
     start_deadline_seconds: Seconds = Field(default=60, json_schema_extra={MAY_CHANGE: True})
-    """Seconds that the trainer gives a simulator to come up, from when it asks for it; image pulls are not
-    counted. The operator ends nothing by it."""
+    """Seconds from the trainer's request to start a simulator until the trainer counts the start as failed.
+    Image pulls are not counted. The operator ends no pod because of it."""
 
     env: Environment = ()
     """Environment variables of the simulator's container."""
 
     resources: Resources = Resources()
-    """CPU and memory of one simulator; memory is doubled for a standby."""
+    """CPU and memory of one simulator; a standby doubles the memory."""
 
     rules = (
         Rule(
             field="command",
             holds=lambda group: (group.driver is Driver.COMMAND) == bool(group.command),
             cel="(self.driver == 'command') == (size(self.command) > 0)",
-            message="belongs to driver command, which needs one; set both or neither",
+            message="is for driver command, which requires it; set both or neither",
         ),
         Rule(
             field="image",
             holds=lambda group: group.driver is not Driver.COMMAND or group.image is not None,
             cel="self.driver != 'command' || has(self.image)",
-            message="driver command has no image of its own; name the one that holds your program",
+            message="is required with driver command; name the image that contains your program",
         ),
         Rule(
             field="minSimulators",
             holds=lambda group: group.min_simulators is None or group.min_simulators <= group.count,
             cel="!has(self.minSimulators) || self.minSimulators <= self.count",
-            message="is more than the group has; lower it or raise count",
+            message="is more than count; lower it or raise count",
         ),
     )

@@ -1,12 +1,11 @@
-"""The status of a TrainingJob: what the operator tells people about it.
+"""The status of a TrainingJob, which the operator writes.
 
-Numbers come from the trainers and are as old as the last poll. What is not known is absent, never
-zero.
+Numbers come from the trainers and are as old as the last poll. An unknown value is absent, never zero.
 
-A status may have been written by another release. Unknown fields are ignored, and so are conditions
-and simulators with an unknown word. An unknown phase, or a value of another type, is refused: it could
-mean that a replica has ended. A field that is new since a5276f3 is absent unless it is set: the
-programs of that release refuse a status with an unknown field.
+Another release may have written a status. The reader ignores unknown fields, and conditions and simulators
+with an unknown enum value. It refuses an unknown phase or a value of another type, because that could mean
+that a replica has ended. A field added after a5276f3 is absent unless it is set, because the programs of
+that release refuse a status with an unknown field.
 """
 
 from datetime import datetime
@@ -22,7 +21,7 @@ from palaestra.api.simulators import Role
 
 
 class Phase(StrEnum):
-    """Where a job or a replica stands, in one word."""
+    """Phase of a job or a replica."""
 
     PENDING = "Pending"
     RUNNING = "Running"
@@ -31,11 +30,11 @@ class Phase(StrEnum):
     FAILED = "Failed"
 
 
-TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})  # a job or a replica that came there stays there
+TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})  # A job or replica never leaves these phases.
 
 
 class SimulatorPhase(StrEnum):
-    """Where a simulator stands, as its sidecar tells it."""
+    """State of a simulator, as its sidecar reports it."""
 
     IDLE = "idle"
     STARTING = "starting"
@@ -65,7 +64,7 @@ class ConditionStatus(StrEnum):
 
 
 class Condition(Reported):
-    """One claim about the job, with its reason, as Kubernetes' own conditions."""
+    """A condition of the job, in the format of Kubernetes' own conditions."""
 
     type: ConditionType = Field(strict=False)
     """`Accepted`, `Running`, `Suspended`, `Succeeded` or `Failed`; `Reconciling` or `Stalled`."""
@@ -74,67 +73,67 @@ class Condition(Reported):
     """`True`, `False` or `Unknown`."""
 
     reason: Word
-    """Why, in one word for programs."""
+    """Reason, in one word for programs."""
 
     message: Sentence
-    """Why, in a sentence for people: the fact and the remedy."""
+    """Reason, in a sentence for people: the fact and the remedy."""
 
     last_transition_time: datetime = Field(strict=False)
-    """When `status` last changed."""
+    """Time of the last change of `status`."""
 
     observed_generation: Count | None = None
-    """Generation of the spec that this speaks of; absent: unknown."""
+    """Generation of the spec to which this condition applies; absent: unknown."""
 
 
 class LastCheckpoint(Reported):
     """The newest checkpoint in the run directory."""
 
     step: Count
-    """Environment steps learned from when it was written."""
+    """Environment steps trained when it was saved."""
 
     time: datetime = Field(strict=False)
-    """When it was written."""
+    """Time at which it was saved."""
 
 
 class Restarts(Reported):
-    """What was started again in a replica, by cause.
+    """Restarts in a replica, by cause.
 
-    The attempt's number is 1 + trainer + disruption + suspension + operator.
+    The number of the attempt is 1 + trainer + disruption + suspension + operator.
     """
 
     trainer: Count = 0
-    """Pods that were replaced because the trainer failed; these count against `backoffLimit`."""
+    """Pods replaced because the trainer failed; these count against `backoffLimit`."""
 
     simulator: Count = 0
-    """Simulators that were started again after a fault, over all attempts."""
+    """Restarts of simulators after a fault, over all attempts."""
 
     disruption: Count = 0
-    """Pods that were replaced because the cluster took them (preemption, eviction, drain) or
-    somebody deleted them; they do not count against `backoffLimit`."""
+    """Pods replaced after a disruption (preemption, eviction, drain) or a manual deletion; these do not count
+    against `backoffLimit`."""
 
     suspension: Count = 0
-    """Pods that were replaced because the job was suspended and resumed."""
+    """Pods replaced because the job was suspended and resumed."""
 
     operator: Count | None = None
-    """Pods that the operator replaced because no kubelet heals them: `TrainerNotStarted`,
-    `RestartPolicyDropped`, `Stalled`. At most `backoffLimit` are; absent: none was."""
+    """Pods that the operator replaced because the kubelet does not recover them: `TrainerNotStarted`,
+    `RestartPolicyDropped`, `Stalled`. At most `backoffLimit`; absent: none."""
 
 
 class PodReference(Reported):
     """The pod of the current attempt."""
 
     name: Word
-    """Its name, for `kubectl logs`."""
+    """Name of the pod, for `kubectl logs`."""
 
     uid: Word
-    """Its UID."""
+    """UID of the pod."""
 
     created: datetime = Field(strict=False)
-    """When it was made."""
+    """Time at which the pod was created."""
 
 
 class SimulatorStatus(Reported):
-    """One simulator of a replica, as the trainer tells it."""
+    """One simulator of a replica, as the trainer reports it."""
 
     name: Word
     """Group and number: `collect-0`."""
@@ -149,29 +148,29 @@ class SimulatorStatus(Reported):
     """Restarts after a fault in this attempt; recycling is not counted."""
 
     last_fault: Sentence | None = None
-    """The last fault in a sentence; absent: none in this attempt."""
+    """Last fault, in a sentence; absent: none in this attempt."""
 
     flapping: bool = False
-    """True: it breaks again and again."""
+    """Whether it fails repeatedly."""
 
     given_up: bool = False
-    """True: its restarts are used up and the run goes on without it."""
+    """Whether its restarts are used up and training continues without it."""
 
     standby: Word | None = None
-    """`starting` or `ready`: its spare; absent: it has none."""
+    """State of its standby, `starting` or `ready`; absent: it has no standby."""
 
 
 class SuccessInterval(Reported):
-    """The 95 % interval (Wilson) around a success rate."""
+    """The 95 % interval (Wilson) of a success rate."""
 
     low: Fraction
-    """Its lower bound, 0 to 1."""
+    """Lower bound, 0 to 1."""
 
     high: Fraction
-    """Its upper bound, 0 to 1."""
+    """Upper bound, 0 to 1."""
 
     episodes: Count
-    """Episodes that were played."""
+    """Number of episodes."""
 
 
 class ReplicaStatus(Reported):
@@ -181,108 +180,107 @@ class ReplicaStatus(Reported):
     """Number of the replica, from 0."""
 
     phase: Phase = Field(default=Phase.PENDING, strict=False)
-    """Where it stands; `Succeeded` and `Failed` are final."""
+    """Phase of the replica; `Succeeded` and `Failed` are final."""
 
     reason: Word | None = None
-    """Why, in one word for programs; absent: nothing to say."""
+    """Reason for the phase, in one word for programs; absent: none."""
 
     message: Sentence | None = None
-    """Why, in a sentence for people; absent: nothing to say."""
+    """Reason for the phase, in a sentence for people; absent: none."""
 
     since: datetime | None = Field(default=None, strict=False)
-    """When `phase` or `reason` last changed; absent: not seen yet."""
+    """Time of the last change of `phase` or `reason`; absent: not observed yet."""
 
     attempt: Count = 0
-    """Number of the current pod, from 1; 0: none yet."""
+    """Number of the current pod, from 1; 0: no pod yet."""
 
     pod: PodReference | None = None
-    """The pod of the current attempt; absent: none yet."""
+    """Pod of the current attempt; absent: no pod yet."""
 
     step: Count | None = None
-    """Environment steps learned from; absent: not known yet."""
+    """Environment steps trained; absent: not known yet."""
 
     target: Count | None = None
-    """Environment steps at which it ends; absent: not known yet."""
+    """Environment steps at which training ends; absent: not known yet."""
 
     success_rate: Fraction | None = None
-    """Share of successful episodes in the last evaluation or confirmation, 0 to 1; absent: none yet, or
-    the environment reports no success."""
+    """Share of successful episodes in the last evaluation or confirmation, 0 to 1. Absent: no evaluation yet,
+    or the environment reports no success."""
 
     success_interval: SuccessInterval | None = None
-    """Where the true success rate lies; absent: as `successRate`, or an older trainer."""
+    """Interval of the true success rate. Absent: `successRate` is absent, or the trainer is older."""
 
     mean_return: float | None = None
-    """Mean return of recent training episodes, in rewards; absent: none ended yet."""
+    """Mean return of recent training episodes; absent: no episode has ended yet."""
 
     steps_per_second: Annotated[float, Field(ge=0)] | None = None
-    """Environment steps a second, lately; absent: not known, or not running."""
+    """Recent environment steps per second; absent: not known, or not running."""
 
     simulators: Annotated[Listed[SimulatorStatus], Field(max_length=32), KNOWN_ONES] = ()
-    """Its simulators; empty: not known yet."""
+    """Simulators of the replica; empty: not known yet."""
 
     last_checkpoint: LastCheckpoint | None = None
-    """The newest checkpoint; absent: none yet."""
+    """Newest checkpoint; absent: none yet."""
 
     last_progress: datetime | None = Field(default=None, strict=False)
-    """When `step` last moved, or an evaluation did, by the operator's clock; for people, nothing is counted
-    from it. Absent: the current attempt has not begun to train."""
+    """Time of the last progress of `step` or of an evaluation, by the operator's clock. It is for people; no
+    timeout uses it. Absent: the current attempt has not started to train."""
 
     furthest_step: Count | None = None
-    """The highest step of all attempts; a new attempt goes on from the last checkpoint, which may
-    be behind it. Absent: not known yet."""
+    """Highest step of all attempts. A new attempt resumes from the last checkpoint, which may be behind it.
+    Absent: not known yet."""
 
     fruitless: Count = 0
-    """Pods in a row whose trainer ran and that were taken or interrupted without a step beyond
-    `furthestStep`; `noProgressLimit` bounds them. None is counted before a step was reported."""
+    """Consecutive pods whose trainer ran and that were disrupted or interrupted without a step beyond
+    `furthestStep`; limited by `noProgressLimit`. Counting starts after the first reported step."""
 
     simulator_restarts: Count = 0
-    """Simulators that were started again after a fault in the current attempt."""
+    """Restarts of simulators after a fault in the current attempt."""
 
     restarts: Restarts = Restarts()
-    """What was started again, by cause."""
+    """Restarts, by cause."""
 
     last_attempt: LastAttempt | None = None
-    """How the newest attempt that has ended did so; absent: none has."""
+    """End of the newest attempt that has ended; absent: none has ended."""
 
     memory_kills: Annotated[Listed[MemoryKills], Field(max_length=64)] = ()
-    """Containers that were killed for their memory; empty: none."""
+    """Containers that were killed because they ran out of memory; empty: none."""
 
     faults: Faults | None = None
-    """Faults of its simulators by kind, over all attempts; absent: not known yet."""
+    """Faults of the simulators by kind, over all attempts; absent: not known yet."""
 
     goodput: Goodput | None = None
-    """What the time was spent on, in seconds; absent: not known yet."""
+    """Time spent by activity, in seconds; absent: not known yet."""
 
     steps_lost: Count | None = None
-    """Environment steps of episodes that a fault cut, and of those played again after an
-    interruption, over all attempts; absent: not known yet."""
+    """Environment steps of episodes that a fault ended early, and steps repeated after an interruption, over
+    all attempts; absent: not known yet."""
 
 
 class Release(Reported):
-    """The images that were fixed when the job was accepted, for whatever names none of its own."""
+    """The images for containers without an image of their own, fixed when the job was accepted."""
 
     trainer: Image
-    """Image of trainer and ROS master."""
+    """Image of the trainer and the ROS master."""
 
     stub: Image
     """Image of the stub simulator."""
 
     webots: Image
-    """Image of Webots, which is not built here yet."""
+    """Image of Webots, which Palaestra does not build yet."""
 
 
 class Status(Reported):
-    """What the operator tells about a TrainingJob; never written by its author."""
+    """Status of a TrainingJob, written by the operator only."""
 
     observed_generation: Count | None = None
-    """Generation of the spec that this status speaks of; 0 or absent: no operator has seen the job yet."""
+    """Generation of the spec to which this status applies; 0 or absent: not reconciled yet."""
 
     phase: Phase | None = Field(default=None, strict=False)
-    """The job in one word; absent: not seen yet."""
+    """Phase of the job; absent: not reconciled yet."""
 
     release: Release | None = None
-    """The images of the release that accepted the job, kept for its whole life; absent: not
-    accepted yet."""
+    """Images of the release that accepted the job; they never change afterwards. Absent: not accepted yet."""
 
     conditions: Annotated[
         Listed[Condition],
@@ -296,31 +294,31 @@ class Status(Reported):
         KNOWN_ONES,
     ] = ()
     """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason; `Reconciling` while
-    the job is on its way to what its spec asks for, `Stalled` when it cannot get there by itself."""
+    the job approaches its spec; `Stalled` if it needs a person to get there."""
 
     start_time: datetime | None = Field(default=None, strict=False)
-    """When the first pod started, by its node's clock; absent: none has."""
+    """Time at which the first pod started, by its node's clock; absent: no pod has started."""
 
     completion_time: datetime | None = Field(default=None, strict=False)
-    """When the operator found that the last replica had ended, by its own clock;
-    `ttlSecondsAfterFinished` counts from here. Absent: not all have ended."""
+    """Time at which the operator found that the last replica had ended, by the operator's clock;
+    `ttlSecondsAfterFinished` counts from it. Absent: not all replicas have ended."""
 
     active_seconds: Count = 0
-    """Seconds that the job was active before `activeSince`; suspended time is not counted. They are written
-    with whatever else changes."""
+    """Seconds that the job was active before `activeSince`, without suspended time. The value is updated only
+    when another field changes."""
 
     active_since: datetime | None = Field(default=None, strict=False)
-    """When `activeSeconds` was counted, by the operator's clock; absent: the job is suspended, has ended, or
-    was not seen yet."""
+    """Time at which `activeSeconds` was updated, by the operator's clock. Absent: the job is suspended, has
+    ended, or is not reconciled yet."""
 
     running: Word | None = None
-    """Replicas that run or have succeeded, of all: `2/2`; absent: not seen yet."""
+    """Replicas that run or have succeeded, of all replicas: `2/2`; absent: not reconciled yet."""
 
     step: Count | None = None
-    """Step of the replica that is furthest behind; absent: not known yet."""
+    """Lowest step of all replicas; absent: not known yet."""
 
     success_rate: Fraction | None = None
-    """Success rate of the worst replica, 0 to 1; absent: nothing evaluated yet."""
+    """Lowest success rate of all replicas, 0 to 1; absent: no evaluation yet."""
 
     replicas: Annotated[
         Listed[ReplicaStatus],
@@ -332,4 +330,4 @@ class Status(Reported):
             },
         ),
     ] = ()
-    """One entry for each replica, by index; empty: not seen yet."""
+    """One entry per replica, by index; empty: not reconciled yet."""

@@ -1,4 +1,4 @@
-"""The trainer: what is learned, how, for how long, and how it is measured and kept."""
+"""The trainer: task, algorithm, length of training, evaluation and checkpoints."""
 
 from enum import StrEnum
 from typing import Annotated
@@ -13,14 +13,14 @@ MOVE_TO_TARGET = "MoveToTargetEnv-v0"
 
 
 class Reward(StrEnum):
-    """When the environment pays."""
+    """At which steps the environment gives a reward."""
 
     DENSE = "Dense"
     SPARSE = "Sparse"
 
 
 class AlgorithmName(StrEnum):
-    """The algorithms that the trainer knows."""
+    """The algorithms that the trainer implements."""
 
     DQN = "DQN"
     PPO = "PPO"
@@ -30,7 +30,7 @@ class AlgorithmName(StrEnum):
 
 
 class PullPolicy(StrEnum):
-    """When a node fetches an image."""
+    """When a node pulls an image."""
 
     ALWAYS = "Always"
     IF_NOT_PRESENT = "IfNotPresent"
@@ -41,10 +41,10 @@ class Task(ApiModel):
     """The gymnasium environment."""
 
     id: Annotated[str, Field(min_length=1, max_length=128, pattern=ENVIRONMENT_ID)] = "MoveToTargetEnv-v0"
-    """Its id in gymnasium's registry; `module:Name-v0` imports the module first."""
+    """Id in gymnasium's registry; `module:Name-v0` imports the module first."""
 
     reward: Reward = Field(default=Reward.DENSE, strict=False)
-    """`Dense`: every step pays. `Sparse`: only the last step of an episode does."""
+    """`Dense`: a reward at every step. `Sparse`: a reward at the last step of an episode only."""
 
     options: FreeObject = Field(default={})
     """Keyword arguments of the environment, as in `gymnasium.make`."""
@@ -54,41 +54,41 @@ Bound = Annotated[float, Field(gt=0, le=1_000_000)]
 
 
 class Normalize(ApiModel):
-    """What is brought to one scale before it is learned from: Stable-Baselines3's VecNormalize.
+    """Normalization of observations and rewards with Stable-Baselines3's VecNormalize.
 
-    What is known of observations is kept in `model.zip`, since the policy cannot be used without it.
-    Evaluations see as training saw, and their returns are true ones.
+    `model.zip` contains the statistics of the observations, because the policy needs them. Evaluations
+    normalize observations with these statistics and report unscaled returns.
     """
 
     observations: bool = True
-    """Each number of an observation is shifted and scaled by its running mean and deviation."""
+    """Whether each number of an observation is normalized by its running mean and standard deviation."""
 
     rewards: bool = True
-    """Rewards are scaled by the running deviation of the discounted return."""
+    """Whether rewards are divided by the running standard deviation of the discounted return."""
 
     clip_observations: Bound | None = None
-    """The largest absolute value of a normalized observation; absent: 10."""
+    """Largest absolute value of a normalized observation; absent: 10."""
 
     clip_rewards: Bound | None = None
-    """The largest absolute value of a normalized reward; absent: 10."""
+    """Largest absolute value of a normalized reward; absent: 10."""
 
     rules = (
         Rule(
             holds=lambda it: it.observations or it.rewards,
             cel="self.observations || self.rewards",
-            message="nothing is normalized while observations and rewards are false; remove it",
+            message="has no effect while observations and rewards are both false; remove it",
         ),
         Rule(
             field="clipObservations",
             holds=lambda it: it.clip_observations is None or it.observations,
             cel="!has(self.clipObservations) || self.observations",
-            message="no observation is normalized while observations is false; remove it",
+            message="has no effect while observations is false; remove it",
         ),
         Rule(
             field="clipRewards",
             holds=lambda it: it.clip_rewards is None or it.rewards,
             cel="!has(self.clipRewards) || self.rewards",
-            message="no reward is normalized while rewards is false; remove it",
+            message="has no effect while rewards is false; remove it",
         ),
     )
 
@@ -97,34 +97,33 @@ class Algorithm(ApiModel):
     """The learning algorithm."""
 
     name: AlgorithmName = Field(default=AlgorithmName.DQN, strict=False)
-    """DQN, PPO, A2C and SAC are Stable-Baselines3's; REINFORCE is Palaestra's. DQN needs discrete
-    actions, SAC a continuous one."""
+    """DQN, PPO, A2C and SAC are from Stable-Baselines3; REINFORCE is Palaestra's. DQN needs discrete
+    actions; SAC needs continuous actions."""
 
     hyperparameters: FreeObject = Field(default={})
-    """Keyword arguments of the algorithm's class, in its own spelling (`learning_rate`, not
-    `learningRate`); absent ones have the defaults of docs/trainingjob.md."""
+    """Keyword arguments of the algorithm's class, spelled as in Python (`learning_rate`, not
+    `learningRate`); docs/trainingjob.md lists the defaults."""
 
     normalize: Normalize | None = None
-    """What is brought to one scale before it is learned from; `{}`: observations and rewards; absent:
-    nothing."""
+    """Normalization of observations and rewards; `{}`: both; absent: neither."""
 
 
 class Evaluation(ApiModel):
-    """How the policy is measured while it learns."""
+    """Evaluation of the policy during training."""
 
     every_steps: Count = 2500
-    """Environment steps between two evaluations; 0: none."""
+    """Environment steps between two evaluations; 0: no evaluations."""
 
     episodes: Annotated[int, Field(ge=1, le=1000)] = 20
-    """Episodes of one evaluation, always with the same seeds."""
+    """Episodes of one evaluation; every evaluation uses the same seeds."""
 
     stop_at_success_rate: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Training ends when this share of an evaluation's episodes succeeds, above 0 and up to 1, and then
-    of the episodes that confirm it; absent: it goes on for all `steps`."""
+    """Success rate, above 0 and up to 1, at which training ends early: an evaluation must reach it, and then
+    the confirmation of that evaluation. Absent: training runs for all `steps`."""
 
     confirm_episodes: Annotated[int, Field(ge=0, le=10_000)] | None = None
-    """Episodes that confirm an evaluation that would end training, and the best one at its end, with
-    seeds by which no policy was chosen; 0: none; absent: 100."""
+    """Episodes that confirm an evaluation that would end training, and the best evaluation at the end of
+    training. They use other seeds than evaluations do. 0: no confirmation; absent: 100."""
 
     rules = (
         Rule(
@@ -143,17 +142,17 @@ class Evaluation(ApiModel):
 
 
 class Checkpoint(ApiModel):
-    """How the run is kept."""
+    """How often a checkpoint is saved, and how many are kept."""
 
     every_steps: Annotated[int, Field(ge=1, le=2_000_000_000)] = 5000
-    """Environment steps between two checkpoints, which are written at rollout boundaries."""
+    """Environment steps between two checkpoints; a checkpoint is saved at the end of a rollout."""
 
     keep: Annotated[int, Field(ge=1, le=100)] = 3
-    """How many of the newest checkpoints are kept."""
+    """Number of newest checkpoints that are kept."""
 
 
 def _actions(trainer: "Trainer") -> str | None:
-    """Return what actions the task takes; None for a task that is not Palaestra's own."""
+    """Return whether Palaestra's own task takes discrete or continuous actions; None for another task."""
     if trainer.environment.id != MOVE_TO_TARGET:
         return None
     return str(trainer.environment.options.get("actions", "discrete"))
@@ -163,13 +162,13 @@ _ACTIONS = ("environment", "id", "options", "actions", "algorithm", "name")
 
 
 class Trainer(ApiModel):
-    """What is learned, how, and for how long."""
+    """The task, the algorithm and the length of training."""
 
     image: Image | None = None
-    """Container image; absent: the one of this release. Not used by `palaestra run`."""
+    """Container image; absent: this release's image. `palaestra run` ignores it."""
 
     image_pull_policy: PullPolicy = Field(default=PullPolicy.IF_NOT_PRESENT, strict=False)
-    """When a node fetches the pod's images: `Always`, `IfNotPresent` or `Never`."""
+    """When a node pulls the pod's images: `Always`, `IfNotPresent` or `Never`."""
 
     environment: Task = Task()
     """The task, a gymnasium environment."""
@@ -178,23 +177,23 @@ class Trainer(ApiModel):
     """The learning algorithm and its hyperparameters."""
 
     steps: Annotated[int, Field(ge=1, le=2_000_000_000)] = 50_000
-    """Environment steps to learn from, over all collecting simulators of a replica."""
+    """Environment steps to train for, summed over all collecting simulators of a replica."""
 
     evaluation: Evaluation = Evaluation()
-    """How the policy is measured while it learns."""
+    """Evaluation of the policy during training."""
 
     checkpoint: Checkpoint = Checkpoint()
-    """How the run is kept."""
+    """How often a checkpoint is saved, and how many are kept."""
 
     command: Words = ()
-    """A program and its arguments in place of the built-in training loop; empty: the built-in."""
+    """Program and arguments that replace the built-in training loop; empty: the built-in loop."""
 
     env: Environment = ()
     """Environment variables of the trainer's container."""
 
     resources: Resources = Resources()
-    """CPU, memory and GPUs of the trainer. Where `limits` or `requests` name a GPU (`nvidia.com/gpu`,
-    `amd.com/gpu`), the built-in loop trains on it, if the image's PyTorch sees it; else on the CPU."""
+    """CPU, memory and GPUs of the trainer. If `limits` or `requests` name a GPU (`nvidia.com/gpu`,
+    `amd.com/gpu`) and the image's PyTorch finds it, the built-in loop trains on it; otherwise on the CPU."""
 
     rules = (
         Rule(

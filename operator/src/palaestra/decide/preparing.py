@@ -163,7 +163,7 @@ def sources_are_still_for_jobs(job: TrainingJob, observed: Observed) -> Hold | N
 def _missing(source: Source, observed: Observed) -> Hold | None:
     if observed.sources.get(source) is not None:
         return None
-    fact = f"there is no {source.kind} {source.name} here"
+    fact = f"{source.kind} {source.name} does not exist in this namespace"
     reason = _MISSING.get(source.kind, Reason.WORLD_MISSING)
     return _hold(reason, field=source.field, name=source.name, fact=fact, remedy=_CREATE)
 
