@@ -1,8 +1,8 @@
 """The ROS types of the interface: md5 sums, and values to and from bytes.
 
-The definitions stand in `ros_definitions.txt`; genmsg computes the md5 sums that peers compare and genpy
-writes the classes that serialise. Classes are made in memory when first asked for: Debian's own packages
-hold few of these types, and genpy's dynamic loader would leave files behind after a SIGKILL.
+genmsg computes the md5 sums that peers compare and genpy writes the classes that serialise. Classes are made
+in memory when first asked for: Debian's own packages hold few of these types, and genpy's dynamic loader
+would leave files behind after a SIGKILL.
 
 Messages of fixed-size numbers alone (every motor command and step) skip genpy for one precompiled struct.
 """
@@ -16,17 +16,22 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from importlib import resources
 from itertools import islice, repeat
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
 
 import genmsg
 import genmsg.gentools
-import genmsg.msg_loader
 import genpy
 import genpy.generator
 
+from palaestra_sim.protocol.definitions import (
+    all_nested,
+    context_for,
+    is_defined,
+    message_spec,
+    service_spec,
+)
 from palaestra_sim.protocol.tcpros import frame
 
 _STRUCT_CODES = {
@@ -87,8 +92,8 @@ def message_type(name: str) -> MessageType:
     Raises:
         KeyError: `ros_definitions.txt` has no such message.
     """
-    spec = _message_spec(name, _definition_lines()[name])
-    context = _context_for(spec)
+    spec = message_spec(name)
+    context = context_for(spec)
     return MessageType(
         name,
         genmsg.gentools.compute_md5(context, spec),
@@ -104,53 +109,9 @@ def service_type(name: str) -> ServiceType:
     Raises:
         KeyError: `ros_definitions.txt` has no such service.
     """
-    request, response = _definition_lines()[name].split("---")
-    specs = (_message_spec(name + "Request", request), _message_spec(name + "Response", response))
-    service = genmsg.SrvSpec(specs[0], specs[1], "", name)
-    md5 = genmsg.gentools.compute_md5(_context_for(*specs), service)
-    return ServiceType(name, md5, _codec(specs[0]), _codec(specs[1]))
-
-
-def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of all messages and of all services."""
-    lines = _definition_lines()
-    services = tuple(name for name, line in lines.items() if "---" in line)
-    return tuple(name for name in lines if name not in services), services
-
-
-@cache
-def _definition_lines() -> dict[str, str]:
-    text = resources.files("palaestra_sim.protocol").joinpath("ros_definitions.txt").read_text("utf-8")
-    lines = (line for line in text.splitlines() if line and not line.startswith("#"))
-    return {name: fields for name, _, fields in (line.partition(":") for line in lines)}
-
-
-def _message_spec(name: str, fields: str) -> Any:
-    text = "\n".join(field.strip() for field in fields.split(";"))
-    return genmsg.msg_loader.load_msg_from_string(genmsg.MsgContext.create_default(), text, name)
-
-
-def _nested(spec: Any) -> list[str]:
-    bare = (genmsg.msgs.bare_msg_type(type_) for type_ in spec.types)
-    return [
-        "std_msgs/Header" if type_ == "Header" else type_
-        for type_ in bare
-        if not genmsg.msgs.is_builtin(type_)
-    ]
-
-
-def _context_for(*specs: Any) -> Any:
-    context = genmsg.MsgContext.create_default()
-    waiting = [name for spec in specs for name in _nested(spec)]
-    while waiting:
-        name = waiting.pop()
-        spec = _message_spec(name, _definition_lines()[name])
-        context.register(name, spec)
-        waiting += _nested(spec)
-    for spec in specs:
-        context.register(spec.full_name, spec)
-        genmsg.msg_loader.load_depends(context, spec, {})
-    return context
+    spec = service_spec(name)
+    md5 = genmsg.gentools.compute_md5(context_for(spec.request, spec.response), spec)
+    return ServiceType(name, md5, _codec(spec.request), _codec(spec.response))
 
 
 def _codec(spec: Any) -> Codec:
@@ -203,7 +164,7 @@ def _record(spec: Any) -> _Record | None:
         part = None
         if type_ in _STRUCT_CODES:
             codes += _STRUCT_CODES[type_]
-        elif type_ in _definition_lines() and (part := _record_of(type_)) is not None:
+        elif is_defined(type_) and (part := _record_of(type_)) is not None:
             codes += part.codes
         else:
             return None
@@ -216,7 +177,7 @@ def _record(spec: Any) -> _Record | None:
 
 @cache
 def _record_of(name: str) -> _Record | None:
-    return _record(_message_spec(name, _definition_lines()[name]))
+    return _record(message_spec(name))
 
 
 class _StructCodec:
@@ -276,29 +237,18 @@ def _fill(message: Any, fields: Mapping[str, Any]) -> Any:
 
 @cache
 def _class_of(name: str) -> Any:
-    return _genpy_class(_message_spec(name, _definition_lines()[name]))
+    return _genpy_class(message_spec(name))
 
 
 def _genpy_class(spec: Any) -> Any:
     """Return the class for `spec`, with the classes of the messages inside it in reach of its code."""
-    lines = genpy.generator.msg_generator(_context_for(spec), spec, {})
+    lines = genpy.generator.msg_generator(context_for(spec), spec, {})
     source = "\n".join(line for line in lines if not line.startswith("import ") or "msg" not in line)
     namespace: dict[str, Any] = {"genpy": genpy, "struct": struct}
-    for name in _all_nested(spec):
+    for name in all_nested(spec):
         package, base = genmsg.package_resource_name(name)
         module = namespace.setdefault(package, SimpleNamespace(msg=SimpleNamespace())).msg
         setattr(module, base, _class_of(name))
         setattr(module, f"_{base}", SimpleNamespace(**{base: _class_of(name)}))
     exec(compile(source, f"<genpy {spec.full_name}>", "exec"), namespace)  # noqa: S102 - genpy's own output
     return namespace[spec.short_name]
-
-
-def _all_nested(spec: Any) -> set[str]:
-    found: set[str] = set()
-    waiting = _nested(spec)
-    while waiting:
-        name = waiting.pop()
-        if name not in found:
-            found.add(name)
-            waiting += _nested(_message_spec(name, _definition_lines()[name]))
-    return found
