@@ -6,6 +6,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 PACKAGES := operator trainer sim_image
 SOURCES := operator/src trainer/src sim_image/src
+WEBOTS_ROS := $(addprefix sim_image/src/palaestra_sim/,protocol/ros_definitions.txt message_package/files.py)
 JOB := manifests/examples/move-to-target.yaml
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 
@@ -19,7 +20,7 @@ help: ## list the verbs
 
 setup: .venv/ready ## install ROS from the distribution and everything else into .venv
 
-.venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh
+.venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh $(WEBOTS_ROS)
 	@tools/setup.sh
 
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy

@@ -6,9 +6,12 @@ cd "$(dirname "$0")/.."
 
 # rospy's own service proxies import netifaces, on which its package forgets to depend.
 ros_packages=(python3-rospy python3-rosmaster python3-netifaces python3-venv)
+# ROS's command line, and the messages that those of webots_ros hold, as Python modules and as definitions.
+ros_packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
 
 ros_is_installed() {
-  /usr/bin/python3 -c 'import ensurepip, netifaces, rospy, rosmaster' 2>/dev/null
+  local modules='ensurepip, netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs'
+  /usr/bin/python3 -c "import $modules" 2>/dev/null && [[ -d /usr/share/sensor_msgs/msg ]]
 }
 
 if ! ros_is_installed; then
@@ -35,4 +38,5 @@ echo "setup: installing the locked packages (PyTorch with CUDA is 3 GB; the firs
 export VIRTUAL_ENV="$PWD/.venv" UV_LINK_MODE="${UV_LINK_MODE:-hardlink}"
 .venv/bin/uv pip install --quiet --require-hashes -r requirements.lock
 .venv/bin/uv pip install --quiet --no-deps --no-build-isolation -e operator -e trainer -e sim_image
+.venv/bin/palaestra-webots-ros --importable .venv/share
 touch .venv/ready

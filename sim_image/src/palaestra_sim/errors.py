@@ -3,7 +3,8 @@
     SimError
     ├── WorldError (ValueError)          the .wbt file is wrong: retrying cannot help
     │   └── WorldRefusedError            several things in it are wrong; it has all of them
-    └── UnknownWorldError (LookupError)  no shipped world has that name: retrying cannot help
+    ├── UnknownWorldError (LookupError)  no shipped world has that name: retrying cannot help
+    └── ForeignPackageError (FileExistsError)  the folder has another webots_ros: retrying cannot help
 
 A message names the place, the fact and the remedy.
 """
@@ -84,3 +85,7 @@ def _in_one_line(errors: list[WorldError]) -> str:
 
 class UnknownWorldError(SimError, LookupError):
     """No world of that name ships with this package; the message names those that do."""
+
+
+class ForeignPackageError(SimError, FileExistsError):
+    """The folder for the package webots_ros has one that Palaestra did not write."""

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).parents[3] / "tools/setup.sh"
-PACKAGES = "python3-rospy python3-rosmaster python3-netifaces python3-venv"
+PACKAGES = (
+    "python3-rospy python3-rosmaster python3-netifaces python3-venv "
+    "python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs"
+)
 NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
 
 

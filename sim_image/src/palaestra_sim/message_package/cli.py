@@ -1,0 +1,53 @@
+"""`palaestra-webots-ros`: the command line."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import sysconfig
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.message_package.writing import make_importable, write
+
+_WRONG = 2
+
+_EPILOG = """\
+Writes FOLDER/webots_ros; ROS's tools find it with FOLDER on ROS_PACKAGE_PATH, or in /usr/share without.
+An installed webots_ros wins: one that is importable, or earlier on ROS_PACKAGE_PATH.
+
+exit codes: 0; 2 the folder cannot be written, or has a webots_ros of another origin
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the package; return the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        package = write(options.folder)
+        if options.importable:
+            make_importable(package, Path(sysconfig.get_path("purelib")))
+    except SimError as error:
+        sys.stderr.write(f"palaestra-webots-ros: {error}\n")
+    except OSError as error:
+        place = error.filename or options.folder
+        sys.stderr.write(f"palaestra-webots-ros: {place}: {error.strerror}; choose a folder to write to\n")
+    else:
+        return 0
+    return _WRONG
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="palaestra-webots-ros",
+        description="Write the ROS package webots_ros, the messages and services of a simulator.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--version", action="version", version=version("palaestra-sim"))
+    add("folder", type=Path, help="the folder for the package, such as /usr/share")
+    add("--importable", action="store_true", help="also make it importable for the Python that runs this")
+    return parser

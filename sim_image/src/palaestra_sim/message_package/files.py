@@ -1,0 +1,67 @@
+"""Every file of the package webots_ros, as text: a manifest, the definitions, and genpy's Python modules.
+
+The package has two peculiarities, so that an installed webots_ros and a plain Debian both work.
+
+`src/webots_ros` has no `__init__.py`. Python takes a folder without one only if no `sys.path` entry, also a
+later one, has a package of that name: an installed webots_ros is imported instead.
+
+The manifest is a `manifest.xml` and names no dependencies. Only for such a package does roslib add `src` to
+the path of ROS's tools, and only if each dependency has a manifest. Debian has the manifests of std_msgs,
+geometry_msgs and sensor_msgs in their C++ packages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+import genpy.generator
+
+from palaestra_sim.protocol import definitions
+
+NAME = "webots_ros"
+MANIFEST = "manifest.xml"
+
+_MANIFEST_TEXT = """\
+<package>
+  <description brief="Messages and services of the ros controller of Webots">
+    Messages and services of the `ros` controller of Webots, as Palaestra's simulators use them.
+  </description>
+  <author>Palaestra</author>
+  <license>Apache-2.0</license>
+</package>
+"""
+
+
+def package_files() -> Iterator[tuple[str, str]]:
+    """Yield the path in the package and the text of every file."""
+    messages, services = definitions.type_names()
+    yield MANIFEST, _MANIFEST_TEXT
+    yield from _of_one_kind("msg", messages, _message_module)
+    yield from _of_one_kind("srv", services, _service_module)
+
+
+def _of_one_kind(kind: str, types: Iterable[str], module: Callable[[str], str]) -> Iterator[tuple[str, str]]:
+    modules = f"src/{NAME}/{kind}"
+    own = [name for name in types if name.startswith(f"{NAME}/")]
+    bases = [name.removeprefix(f"{NAME}/") for name in own]
+    for name, base in zip(own, bases, strict=True):
+        yield f"{kind}/{base}.{kind}", definitions.text(name)
+        yield f"{modules}/_{base}.py", module(name)
+    yield f"{modules}/__init__.py", "".join(f"from ._{base} import *\n" for base in bases)
+
+
+def _message_module(name: str) -> str:
+    spec = definitions.message_spec(name)
+    return _text(genpy.generator.msg_generator(definitions.context_for(spec), spec, {}))
+
+
+def _service_module(name: str) -> str:
+    spec = definitions.service_spec(name)
+    context = definitions.context_for(spec.request, spec.response)
+    return _text(genpy.generator.srv_generator(context, spec, {}))
+
+
+def _text(lines: Iterable[str]) -> str:
+    # genpy counts variables across modules; from 1 for each, a type has the same text every time.
+    genpy.generator.reset_var()
+    return "".join(f"{line}\n" for line in lines)

@@ -1,0 +1,58 @@
+"""The package webots_ros in a folder: whole or not at all, and never in the place of another's."""
+
+from __future__ import annotations
+
+import compileall
+import tempfile
+from pathlib import Path
+
+from palaestra_sim.errors import ForeignPackageError
+from palaestra_sim.message_package.files import MANIFEST, NAME, package_files
+
+
+def write(folder: Path) -> Path:
+    """Return the path of the package, written into `folder`; one of an earlier release is replaced.
+
+    A process that is killed leaves the earlier package, the new one, or none, never a part.
+
+    Raises:
+        ForeignPackageError: the folder has a webots_ros that Palaestra did not write.
+    """
+    target = folder / NAME
+    _check_ours(target)
+    folder.mkdir(parents=True, exist_ok=True)
+    # rospkg does not look into hidden folders.
+    with tempfile.TemporaryDirectory(prefix=f".{NAME}-", dir=folder) as temporary:
+        made = Path(temporary) / NAME
+        _fill(made)
+        compileall.compile_dir(made, quiet=1, stripdir=str(made), prependdir=str(target))
+        if target.exists():
+            target.rename(Path(temporary) / "replaced")
+        made.rename(target)
+    return target
+
+
+def make_importable(package: Path, packages_of_python: Path) -> None:
+    """Let the Python that has `packages_of_python` on its path import the package, unless it has another."""
+    lines = packages_of_python / f"{NAME}.pth"
+    part = lines.with_suffix(".part")
+    part.write_text(f"{package.resolve() / 'src'}\n")
+    part.replace(lines)
+
+
+def _check_ours(target: Path) -> None:
+    if not target.exists():
+        return
+    manifest = target / MANIFEST
+    if not manifest.exists() or "<author>Palaestra</author>" not in manifest.read_text(errors="replace"):
+        raise ForeignPackageError(
+            f"{target}: is a package that Palaestra did not write; "
+            "use it as it is, remove it, or choose another folder"
+        )
+
+
+def _fill(package: Path) -> None:
+    for name, text in package_files():
+        path = package / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)

@@ -1,0 +1,68 @@
+"""The text of the package webots_ros: its md5 sums, and its Python modules."""
+
+import ast
+from pathlib import Path
+
+import genmsg.gentools
+import genmsg.msg_loader
+import pytest
+
+from palaestra_sim.message_package.files import package_files
+from palaestra_sim.protocol.definitions import type_names
+from palaestra_sim.protocol.rostypes import message_type, service_type
+
+FILES = dict(package_files())
+MESSAGES, SERVICES = ([name for name in names if name.startswith("webots_ros/")] for names in type_names())
+# Those of Debian's ros-sensor-msgs and what that depends on.
+INSTALLED = {name: [f"/usr/share/{name}/msg"] for name in ("std_msgs", "geometry_msgs", "sensor_msgs")}
+
+
+@pytest.fixture
+def definitions(tmp_path):
+    """Returns where genmsg looks for messages: ours in a folder, all others as they are installed."""
+    for name, text in FILES.items():
+        if name.endswith(".msg"):
+            (tmp_path / Path(name).name).write_text(text)
+    return {**INSTALLED, "webots_ros": [str(tmp_path)]}
+
+
+def md5_of(spec, context, definitions):
+    """Return the md5 that ROS's tools compute from files."""
+    genmsg.msg_loader.load_depends(context, spec, definitions)
+    return genmsg.gentools.compute_md5(context, spec)
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
+    """A tool that reads the file would otherwise be refused by the simulator."""
+    context = genmsg.MsgContext.create_default()
+    text = FILES[f"msg/{name.removeprefix('webots_ros/')}.msg"]
+
+    spec = genmsg.msg_loader.load_msg_from_string(context, text, name)
+
+    assert md5_of(spec, context, definitions) == message_type(name).md5
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_the_file_of_every_service_has_the_md5_of_the_wire(name, definitions):
+    """Request and response together: the md5 of a service is over both."""
+    context = genmsg.MsgContext.create_default()
+    text = FILES[f"srv/{name.removeprefix('webots_ros/')}.srv"]
+
+    spec = genmsg.msg_loader.load_srv_from_string(context, text, name)
+
+    assert md5_of(spec, context, definitions) == service_type(name).md5
+
+
+def test_the_modules_of_a_kind_are_the_types_of_that_kind():
+    """`webots_ros.srv` without one service would fail in the program that needs it, not in ours."""
+    for kind, names in (("msg", MESSAGES), ("srv", SERVICES)):
+        imports = ast.parse(FILES[f"src/webots_ros/{kind}/__init__.py"]).body
+
+        assert [f"webots_ros/{each.module.removeprefix('_')}" for each in imports] == names
+        assert {f"src/webots_ros/{kind}/{each.module}.py" for each in imports} <= set(FILES)
+
+
+def test_no_file_makes_the_package_a_regular_one():
+    """A regular package that comes first on `sys.path` would hide an installed webots_ros."""
+    assert "src/webots_ros/__init__.py" not in FILES
