@@ -82,6 +82,18 @@ def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
     assert all("--compile-bytecode" in run for run in values(instructions, "RUN") if "uv pip" in run)
 
 
+@pytest.mark.parametrize("name", ["stub", "trainer", "notebook"])
+def test_an_image_with_ros_has_the_package_webots_ros(name):
+    """Programs of users import it there, beside the messages inside its own."""
+    runs = values(parsed(recipes("debian")[name]), "RUN")
+
+    [distribution] = [run for run in runs if "apt-get" in run]
+    [ours] = [run for run in runs if "/context/packages/" in run]
+
+    assert "python3-sensor-msgs" in distribution.split()
+    assert "&& palaestra-webots-ros --importable /usr/share" in ours
+
+
 def test_what_changes_most_comes_last(instructions):
     """A changed source builds one layer anew, not PyTorch."""
     order = [f"{instruction} {value}" for instruction, value in instructions]
