@@ -160,14 +160,14 @@ def test_the_doctor_is_named_where_a_right_is_missing_alone(server, capsys, mess
 
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith(f"Forbidden (403): {message}")
-    assert line.endswith("; `palaestra doctor` tells which rights are missing") is hint
+    assert line.endswith("; `palaestra doctor` lists the missing rights") is hint
 
 
 @pytest.mark.parametrize(
     ("answer", "code", "said"),
     [
         (reply(obj={"columnDefinitions": [], "rows": []}), 0, ""),
-        (refusal(404, "NotFound"), 1, "job trial: there is none in namespace robots"),
+        (refusal(404, "NotFound"), 1, "job trial: does not exist in namespace robots"),
     ],
     ids=["there", "not there"],
 )
@@ -202,7 +202,7 @@ def test_the_error_for_a_cluster_without_trainingjobs_shows_how_to_install_them(
 
     [line] = capsys.readouterr().err.splitlines()
     assert code == 1
-    assert "the cluster does not know TrainingJobs; install them with `palaestra crd | kubectl apply" in line
+    assert "the cluster has no TrainingJob definition; install it with `palaestra crd | kubectl apply" in line
 
 
 def test_logs_of_a_container_that_is_not_there_lists_those_that_are(server, capsys):

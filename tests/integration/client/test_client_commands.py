@@ -108,7 +108,7 @@ def test_a_job_that_is_not_there_is_one_line_and_1(typed, command):
 
     assert code == 1
     assert out == []
-    assert line.startswith("job none: there is none in namespace ")
+    assert line.startswith("job none: does not exist in namespace ")
 
 
 def test_options_that_exclude_each_other_are_2(typed):
@@ -116,7 +116,7 @@ def test_options_that_exclude_each_other_are_2(typed):
     code, _, [line] = typed("get", "a", "-A")
 
     assert code == 2
-    assert line == "NAME: excludes -A and -l; leave it out, or them"
+    assert line == "NAME: cannot be combined with -A and -l; remove one of them"
 
 
 def test_describe_tells_status_and_events(typed, place, tell):
@@ -251,7 +251,7 @@ def test_suspending_a_job_with_a_queue_says_that_kueue_decides_and_how_to_stop_i
     code, out, [line] = typed(command, "a")
 
     assert (code, out) == (1, [])
-    assert line.startswith("job a: Kueue decides when it runs, since it is in the queue robots; ")
+    assert line.startswith("job a: Kueue decides when it runs, because it is in queue robots; ")
     assert f"`kubectl get workloads -n {place.name}`" in line
 
 
@@ -263,7 +263,7 @@ def test_delete_says_what_stays(typed, place):
     code, [of_a, of_b], _ = typed("delete", "a", "b")
 
     assert code == 0
-    assert of_a.endswith(f"`kubectl delete pvc -n {place.name} -l palaestra.dev/job-uid={uid}` removes them")
+    assert of_a.endswith(f"`kubectl delete pvc -n {place.name} -l palaestra.dev/job-uid={uid}` deletes them")
     assert of_b == "b: deleted"
     assert place.all(TRAINING_JOBS) == []
 

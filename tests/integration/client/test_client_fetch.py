@@ -226,7 +226,7 @@ def test_a_folder_that_is_there_is_left_as_it_is(scene):
     there = scene.into / "job" / "0"
     there.mkdir(parents=True)
 
-    with pytest.raises(NotFetched, match="is there already; move it away"):
+    with pytest.raises(NotFetched, match="already exists; move it away"):
         scene.fetch()
     assert scene.asked("POST", "/pods") == []
 

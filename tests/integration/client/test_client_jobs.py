@@ -100,7 +100,7 @@ def test_the_error_for_a_missing_job_shows_how_to_find_it(client):
     """A wrong namespace is the usual cause."""
     for ask in (client.get, client.suspend, client.delete, client.events):
         with pytest.raises(
-            NoSuchJob, match=f"job none: there is none in namespace {client.namespace}; .* -A"
+            NoSuchJob, match=f"job none: does not exist in namespace {client.namespace}; .* -A"
         ):
             ask("none")
     with pytest.raises(NoSuchJob):

@@ -147,7 +147,7 @@ def test_what_is_not_done_here_is_refused_before_anything_is_written(
 def test_a_file_that_is_not_there_is_one_line(tmp_path, fails):
     """No traceback for a typing error."""
     assert fails("run", tmp_path / "no.yaml") == [
-        f"{tmp_path}/no.yaml: No such file or directory; name a file that can be read"
+        f"{tmp_path}/no.yaml: No such file or directory; name a readable file"
     ]
 
 
@@ -172,7 +172,7 @@ def test_an_operator_that_cannot_be_is_not_started(fails):
     assert fails("operator", "--metrics-address=8080") == [told]
 
 
-A_KEY = "give a key such as example.com/team, or a domain such as example.com/"
+A_KEY = "use a key such as example.com/team, or a domain such as example.com/"
 
 
 @pytest.mark.parametrize(
@@ -183,10 +183,10 @@ A_KEY = "give a key such as example.com/team, or a domain such as example.com/"
         ("world FILE --job=a --group=collect --index=-1", "--index: -1 is refused; give 0 or more"),
         ("operator --workers=0", "--workers: 0 is refused; give 1 or more"),
         ("operator --resync=nan", "--resync: nan is refused; give a finite number"),
-        ("operator --allow-pod-label=*", f"--allow-pod-label: '*' is refused; {A_KEY}"),
+        ("operator --allow-pod-label=*", f"--allow-pod-label: '*' is not a key; {A_KEY}"),
         (
             "operator --node-selector=gpu",
-            "--node-selector: 'gpu' is refused; give a label such as kubernetes.io/arch=amd64",
+            "--node-selector: 'gpu' is not a label; use a label such as kubernetes.io/arch=amd64",
         ),
         ("try FILE --within=0", "--within: 0 is refused; give more than 0"),
         ("delete a --timeout=soon", "--timeout: 'soon' is no number"),
@@ -218,8 +218,8 @@ def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
 
     out = " ".join(capsys.readouterr().out.split())
     assert "exit codes of all commands: 0 done 1 failed, or the cluster has no such job" in out
-    assert "75, 80, 81, 82 of `run` alone" in out
-    assert "`COMMAND --help` explains those of one command" in out
+    assert "75, 80, 81, 82 of `run` only" in out
+    assert "`COMMAND --help` explains the exit codes of one command" in out
 
 
 @pytest.mark.parametrize(
@@ -232,4 +232,4 @@ def test_help_and_version_say_what_they_are(arguments, capsys):
 
     assert ended.value.code == 0
     out = capsys.readouterr().out
-    assert out.startswith("palaestra 0.") or "75   interrupted and checkpointed" in out
+    assert out.startswith("palaestra 0.") or "75   interrupted after a checkpoint" in out

@@ -59,7 +59,7 @@ def test_the_error_for_an_option_before_the_command_shows_where_it_goes(option, 
     name = option.partition("=")[0]
     line = capsys.readouterr().err.splitlines()[-1]
     assert ended.value.code == 2
-    assert line.endswith(f"{name}: goes behind the command, as in `kubectl palaestra get {name} ...`")
+    assert line.endswith(f"{name}: must come after the command, as in `kubectl palaestra get {name} ...`")
 
 
 @pytest.mark.parametrize(

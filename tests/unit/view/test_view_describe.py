@@ -22,7 +22,7 @@ def test_a_running_job_is_described_from_spec_to_last_attempt():
     assert "Restarts:       trainer 1, simulator 3" in lines
     assert "Time spent:     stepping 75%, learning 25%" in lines
     assert "Running   True     1m      Because   so it is" in lines
-    assert lines[-3:] == ["its last lines:", "first", "last"]
+    assert lines[-3:] == ["last lines of its log:", "first", "last"]
 
 
 def test_a_success_rate_has_its_interval_and_that_of_an_older_trainer_has_none():
@@ -61,7 +61,7 @@ def test_slow_steps_are_listed_apart_from_faults():
     both = told(make_job(faults={"dead": 2, "slow": 1}))
 
     assert "Faults:         dead 2" in both
-    assert "Slow steps:     1, which are no faults" in both
+    assert "Slow steps:     1 (not faults)" in both
     assert not [line for line in told(make_job(faults={"slow": 1})) if line.startswith("Faults")]
 
 
@@ -74,7 +74,7 @@ def test_recycling_is_listed_apart_from_recovering():
 
 def test_the_storage_of_the_run_is_shown():
     """The storage decides what is left when the job is deleted."""
-    assert "Storage:       in the pod, and gone with it" in told(
+    assert "Storage:       in the pod, deleted with it" in told(
         make_job(spec={"storage": {"ephemeral": True}})
     )
     assert "Storage:       claim mine" in told(make_job(spec={"storage": {"existingClaim": "mine"}}))
@@ -115,4 +115,4 @@ def test_an_event_about_a_container_names_it():
 
 def test_a_line_says_that_there_are_no_events():
     """A cluster deletes events after an hour."""
-    assert happened([], NOW) == ["none that the cluster remembers"]
+    assert happened([], NOW) == ["none that the cluster still has"]

@@ -60,7 +60,7 @@ def test_a_job_that_nobody_has_seen_is_drawn(draw):
     job = make_job(step=None, target=None, simulators=[], lastCheckpoint=None)
     unseen = job.model_copy(update={"status": type(job.status)()})
 
-    assert "not seen by an operator yet" in draw(unseen)
+    assert "not reconciled by an operator yet" in draw(unseen)
 
 
 def test_a_status_without_news_adds_nothing_to_the_history():

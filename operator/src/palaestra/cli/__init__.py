@@ -1,4 +1,4 @@
-"""The command line of `palaestra`: arguments in, text and an exit code out; the work is elsewhere."""
+"""The command line of `palaestra`: parses arguments, prints text and returns an exit code."""
 
 import argparse
 import sys
@@ -14,7 +14,7 @@ from palaestra_sim.errors import SimError
 
 __all__ = ["main"]
 
-# Modules with commands, in the order of the help. The operator runs for months, and needs no other.
+# Modules with commands, in the order of the help. The operator runs for months and imports only its own.
 COMMANDS = (
     "run", "documents", "operator", "looking", "watching", "changing", "fetching", "doctor", "trial",
 )  # fmt: skip
@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser(typed[:1])
     if typed and _of_a_cluster(typed[0]):
         option = typed[0].partition("=")[0]
-        parser.error(f"{option}: goes behind the command, as in `{_typed()} get {option} ...`")
+        parser.error(f"{option}: must come after the command, as in `{_typed()} get {option} ...`")
     options = parser.parse_args(typed)
     command: Callable[[argparse.Namespace], int] = options.command
     try:
@@ -46,12 +46,12 @@ def _failed(error: Exception, exit_code: int) -> int:
 
 
 def _of_a_cluster(argument: str) -> bool:
-    """Return whether an argument is one of kubectl's options, which only commands on a cluster take."""
+    """Return whether an argument is one of kubectl's options, which only cluster commands accept."""
     return argument.partition("=")[0] in {*NAMESPACE, CONTEXT, KUBECONFIG}
 
 
 def _typed() -> str:
-    """Return how the command line is called: by itself, or by kubectl, which finds a plugin by its name."""
+    """Return the name to show in usage: `palaestra`, or `kubectl palaestra` when run as a kubectl plugin."""
     return "kubectl palaestra" if Path(sys.argv[0]).name == "kubectl-palaestra" else "palaestra"
 
 
@@ -72,9 +72,9 @@ def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def _leave_out(part: str, module: str) -> None:
-    """Import a module as if a part that it can do without were not installed.
+    """Import a module as if its optional dependency `part` were not installed.
 
-    structlog takes rich, 4 MiB with its own imports, to draw tracebacks on terminals.
+    structlog imports rich (4 MiB with its own imports) only to format tracebacks on terminals.
     """
     if part not in sys.modules and module not in sys.modules:
         sys.modules[part] = None  # type: ignore[assignment]  # so Python documents how to forbid an import

@@ -1,4 +1,4 @@
-"""`palaestra suspend`, `resume` and `delete`: the few things of a job that may change."""
+"""`palaestra suspend`, `resume` and `delete`."""
 
 import argparse
 
@@ -10,16 +10,16 @@ from palaestra.client import Client
 from palaestra_sim.typed import seconds
 
 SUSPEND = """\
-Sets spec.suspend of TrainingJobs: their pods are deleted after a checkpoint. A job with a queue is refused,
-since its queue decides.
+Sets spec.suspend of TrainingJobs to true: the pods save a checkpoint and are deleted. Refuses a job with a
+queue, because Kueue suspends and resumes it.
 """
 RESUME = """\
-Takes spec.suspend of TrainingJobs back: they go on from their checkpoints. A job with a queue is refused,
-since its queue decides.
+Sets spec.suspend of TrainingJobs to false: they resume from their checkpoints. Refuses a job with a queue,
+because Kueue suspends and resumes it.
 """
 DELETE = """\
-Deletes TrainingJobs with their pods, and waits until they are gone. The claims with their runs stay unless
-the job says `retain: Delete`; the command that removes them is printed.
+Deletes TrainingJobs with their pods and waits until they are deleted. The claims with their runs stay unless
+the job has `retain: Delete`; the command prints how to delete them.
 """
 GONE_S = 300.0
 
@@ -27,28 +27,32 @@ GONE_S = 300.0
 def add(commands: Commands) -> None:
     """Add the three commands."""
     for name, work, summary, description in (
-        ("suspend", _suspend, "let jobs rest", SUSPEND),
-        ("resume", _resume, "let suspended jobs go on", RESUME),
+        ("suspend", _suspend, "suspend jobs", SUSPEND),
+        ("resume", _resume, "resume suspended jobs", RESUME),
         ("delete", _delete, "delete jobs", DELETE),
     ):
         parser = cluster_command(commands, name, work, summary, description)
-        parser.add_argument("names", metavar="NAME", nargs="+", help="of the jobs")
+        parser.add_argument("names", metavar="NAME", nargs="+", help="names of the jobs")
     parser.add_argument(
-        "--timeout", metavar="S", type=seconds, default=GONE_S, help="seconds to wait for each; default: 300"
+        "--timeout",
+        metavar="S",
+        type=seconds,
+        default=GONE_S,
+        help="seconds to wait for each job; default: 300",
     )
 
 
 def _suspend(client: Client, options: argparse.Namespace) -> int:
     for name in options.names:
         client.suspend(name)
-        say([f"{name}: to be suspended after a checkpoint; `palaestra watch {name}` shows when it is"])
+        say([f"{name}: will be suspended after a checkpoint; `palaestra watch {name}` shows its progress"])
     return 0
 
 
 def _resume(client: Client, options: argparse.Namespace) -> int:
     for name in options.names:
         client.resume(name)
-        say([f"{name}: to go on; `palaestra watch {name}` shows when it does"])
+        say([f"{name}: will resume; `palaestra watch {name}` shows its progress"])
     return 0
 
 
@@ -61,9 +65,9 @@ def _delete(client: Client, options: argparse.Namespace) -> int:
 
 
 def _left(job: TrainingJob) -> str:
-    """Return what is said of the runs that stay."""
+    """Return how to delete the claims that stay; empty if none stays."""
     storage = job.spec.storage
     if storage.ephemeral or storage.existing_claim or storage.retain is Retain.DELETE:
         return ""
     chosen = f"-n {job.metadata.namespace} -l palaestra.dev/job-uid={job.metadata.uid}"
-    return f"; its runs stay, `kubectl delete pvc {chosen}` removes them"
+    return f"; its runs stay, `kubectl delete pvc {chosen}` deletes them"

@@ -1,4 +1,4 @@
-"""What the commands about a cluster's jobs have in common: which cluster, and how they end."""
+"""Common parts of the commands for a cluster: options that choose it, and exit codes."""
 
 import argparse
 import os
@@ -17,8 +17,8 @@ REFUSED = 1
 EXIT_CODES = """\
 exit codes:
   0    done
-  1    the cluster has no such job, refuses, or did not come to it in time; the line says why
-  2    the command line or the kubeconfig is not as it must be; nothing was asked
+  1    the cluster has no such job, refused, or the deadline passed; the line gives the reason
+  2    the command line or the kubeconfig is wrong; nothing was sent to the cluster
   130  ended by Ctrl-C
 """
 
@@ -28,16 +28,18 @@ Work = Callable[[Client, argparse.Namespace], int]
 def cluster_command(
     commands: Commands, name: str, work: Work, summary: str, description: str
 ) -> argparse.ArgumentParser:
-    """Return the parser of a new command on a cluster, with kubectl's options for which one."""
+    """Return the parser of a new cluster command, with kubectl's options that choose the cluster."""
     parser = command(commands, name, _connected(work), summary, description, EXIT_CODES)
-    parser.add_argument(*NAMESPACE, metavar="NS", help="of the jobs; default: the context's")
-    parser.add_argument(CONTEXT, metavar="NAME", help="of the kubeconfig; default: its current one")
-    parser.add_argument(KUBECONFIG, metavar="FILE", help="default: $KUBECONFIG, then ~/.kube/config")
+    parser.add_argument(*NAMESPACE, metavar="NS", help="namespace of the jobs; default: the context's")
+    parser.add_argument(CONTEXT, metavar="NAME", help="kubeconfig context; default: the current one")
+    parser.add_argument(
+        KUBECONFIG, metavar="FILE", help="kubeconfig; default: $KUBECONFIG, then ~/.kube/config"
+    )
     return parser
 
 
 def say(lines: Iterable[str]) -> None:
-    """Write lines to standard output, each as soon as it is there."""
+    """Write lines to standard output and flush each at once."""
     for line in lines:
         sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
@@ -45,9 +47,9 @@ def say(lines: Iterable[str]) -> None:
 
 @contextmanager
 def cleaned_up() -> Iterator[None]:
-    """Let SIGTERM end what is done here as Ctrl-C does, so that what was made meanwhile is deleted then, too.
+    """Handle SIGTERM like Ctrl-C, so that temporary objects are deleted.
 
-    The first process of a container would ignore it otherwise.
+    The first process of a container would otherwise ignore SIGTERM.
     """
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -57,7 +59,7 @@ def cleaned_up() -> Iterator[None]:
 
 
 def _connected(work: Work) -> Callable[[argparse.Namespace], int]:
-    """Return the command: it connects, works, and tells in a line what the cluster did not do."""
+    """Return a command that connects, does its work, and prints errors of the cluster in one line."""
 
     def run(options: argparse.Namespace) -> int:
         client = Client(namespace=options.namespace, kubeconfig=options.kubeconfig, context=options.context)
@@ -65,11 +67,11 @@ def _connected(work: Work) -> Callable[[argparse.Namespace], int]:
             try:
                 return work(client, options)
             except Forbidden as error:
-                hint = "; `palaestra doctor` tells which rights are missing" if error.lacks_right else ""
+                hint = "; `palaestra doctor` lists the missing rights" if error.lacks_right else ""
                 return _refused(f"{error}{hint}")
             except (ApiError, ClientError, SpecErrors) as error:
                 return _refused(str(error))
-            except BrokenPipeError:  # who read the output has seen enough, as `| head`
+            except BrokenPipeError:  # The reader of the output ended, for example `| head`.
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
                 return 0
 

@@ -1,4 +1,4 @@
-"""`palaestra doctor`: what keeps jobs from running in a cluster."""
+"""`palaestra doctor`: find out why jobs do not run in a cluster."""
 
 import argparse
 from collections.abc import Iterator
@@ -10,22 +10,22 @@ from palaestra.doctor import Finding, Site, Verdict, examine
 from palaestra.operator.options import DEFAULT_NAMESPACE
 
 DOCTOR = """\
-Looks at a cluster: version, sidecars, the definition of TrainingJobs, the namespace, storage, the operator,
-its images, its leader, its rights and its metrics, and your own rights. Says what is wrong and the remedy.
-Reads the cluster; writes nothing but its output, since what has to be tried is a dry run. Ends with 1 if
-anything is wrong; a warning does not count, nor does what could not be seen.
+Checks a cluster: version, sidecars, the definition of TrainingJobs, the namespace, storage, the operator, its
+images, its leader, its rights and its metrics, and your own rights. Prints each problem with its remedy.
+Changes nothing: it only reads, and does a dry run where it must try something. Exits with 1 if a check finds
+a problem; warnings and checks that could not be made do not count.
 """
 WIDTH = 18
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "doctor", _doctor, "tell what keeps jobs from running", DOCTOR)
+    parser = cluster_command(commands, "doctor", _doctor, "find out why jobs do not run", DOCTOR)
     parser.add_argument(
         "--operator-namespace",
         metavar="NS",
         default=DEFAULT_NAMESPACE,
-        help=f"where the operator is; default: {DEFAULT_NAMESPACE}",
+        help=f"namespace of the operator; default: {DEFAULT_NAMESPACE}",
     )
 
 

@@ -1,4 +1,4 @@
-"""`palaestra plan`, `world` and `crd`: text in, text out, nothing is started."""
+"""`palaestra plan`, `world` and `crd`: read a file, print text, start nothing."""
 
 import argparse
 import sys
@@ -17,15 +17,15 @@ from palaestra_sim.world import RunIdentity, generate
 UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # stands for the uid that a cluster gives
 
 PLAN = """\
-Reads the TrainingJob in FILE and writes the Kubernetes objects that it needs to standard output, as
-YAML. Outside a cluster the job has no uid yet: zeros stand in its place.
+Reads the TrainingJob in FILE and prints the Kubernetes objects that it needs, as YAML. Outside a cluster the
+job has no uid yet, so the output contains zeros instead.
 """
 WORLD = """\
-Reads the world in FILE and writes it to standard output as one simulator of a job gets it. Only the
-controllerArgs of robots whose controller is "ros" change: --name= is set, --synchronize is added, and
---clock is removed unless the option --clock keeps the first one.
+Reads the world in FILE and prints the copy that one simulator of a job gets. Only the controllerArgs of
+robots whose controller is "ros" change: --name= is set, --synchronize is added, and --clock is removed. With
+the option --clock, the first --clock is kept.
 """
-CRD = "Writes the CustomResourceDefinition of TrainingJobs to standard output, as YAML."
+CRD = "Prints the CustomResourceDefinition of TrainingJobs, as YAML."
 
 
 def add(commands: Commands) -> None:
@@ -76,7 +76,12 @@ def _crd(options: argparse.Namespace) -> int:
 def _add_plan(commands: Commands) -> None:
     parser = command(commands, "plan", _plan, "print the objects that a job needs", PLAN)
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
-    parser.add_argument("--layout", choices=("cluster", "local"), default="cluster", help="for where")
+    parser.add_argument(
+        "--layout",
+        choices=("cluster", "local"),
+        default="cluster",
+        help="where the job runs; default: cluster",
+    )
     add_dir(parser)
 
 
@@ -88,5 +93,5 @@ def _add_world(commands: Commands) -> None:
     parser.add_argument("--uid", default="", help="uid of the job in its cluster")
     parser.add_argument("--replica", type=whole(), default=0, help="number of the replica")
     parser.add_argument("--group", required=True, help="name of the group of simulators")
-    parser.add_argument("--index", type=whole(), default=0, help="number in the group")
-    parser.add_argument("--clock", action="store_true", help="keep a --clock that the world has")
+    parser.add_argument("--index", type=whole(), default=0, help="number of the simulator in the group")
+    parser.add_argument("--clock", action="store_true", help="keep the world's first --clock")

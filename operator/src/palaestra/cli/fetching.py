@@ -1,4 +1,4 @@
-"""`palaestra fetch`: a run's results, from its volume to this machine."""
+"""`palaestra fetch`: copy a run's results from its volume to this machine."""
 
 import argparse
 from pathlib import Path
@@ -11,21 +11,25 @@ from palaestra.local.outcome import uses
 from palaestra_sim.typed import seconds, whole
 
 FETCH = """\
-Copies policy, evaluations and TensorBoard data of a run to <dir>/<job>/<replica>/, which must not be there
-yet; it is written whole or not at all. Reads them in the pod that trains, or, when that has ended, in a
-pod that mounts the claim for reading and is deleted afterwards. Needs the rights to make and delete pods
-and to run commands in them.
+Copies policy, evaluations and TensorBoard data of a run to <dir>/<job>/<replica>/. This folder must not exist
+yet; it is written completely or not at all. The data is read in the pod that trains. If that pod has ended,
+the command creates a pod that mounts the claim read-only, and deletes it afterwards. You need the rights to
+create and delete pods and to run commands in them.
 """
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
     parser = cluster_command(commands, "fetch", _fetch, "copy the results of a run", FETCH)
-    parser.add_argument("name", metavar="NAME", help="of the job")
-    parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="default: 0")
-    parser.add_argument("--dir", type=Path, default=Path("fetched"), help="default: fetched")
+    parser.add_argument("name", metavar="NAME", help="name of the job")
+    parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="number; default: 0")
+    parser.add_argument("--dir", type=Path, default=Path("fetched"), help="target folder; default: fetched")
     parser.add_argument(
-        "--timeout", metavar="S", type=seconds, default=FETCH_S, help="seconds for all of it; default: 600"
+        "--timeout",
+        metavar="S",
+        type=seconds,
+        default=FETCH_S,
+        help="seconds for the whole copy; default: 600",
     )
 
 

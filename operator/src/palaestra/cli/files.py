@@ -1,4 +1,4 @@
-"""Files that are named on the command line."""
+"""Files given on the command line."""
 
 import argparse
 from pathlib import Path
@@ -29,7 +29,7 @@ def read(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except OSError as error:
-        raise PalaestraError(f"{file}: {error.strerror}; name a file that can be read") from error
+        raise PalaestraError(f"{file}: {error.strerror}; name a readable file") from error
 
 
 def add_dir(parser: argparse.ArgumentParser) -> None:

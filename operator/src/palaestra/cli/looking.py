@@ -1,4 +1,4 @@
-"""`palaestra get`, `describe`, `events` and `logs`: what there is, and why."""
+"""`palaestra get`, `describe`, `events` and `logs`."""
 
 import argparse
 import json
@@ -15,15 +15,15 @@ from palaestra.plan.text import as_yaml
 from palaestra.view import describe, happened, server_table
 from palaestra_sim.typed import seconds, whole
 
-READS = "Reads the cluster; writes nothing but its output.\n"
+READS = "Reads the cluster and changes nothing.\n"
 GET = f"""\
 Lists TrainingJobs, or shows one. {READS}"""
 DESCRIBE = f"""\
-Tells everything that is known of a TrainingJob: spec, conditions, each replica's progress, simulators,
-faults and last attempt, and events. {READS}"""
+Shows a TrainingJob in full: spec, conditions, each replica's progress, simulators, faults and last attempt,
+and events. {READS}"""
 EVENTS = f"""\
-Lists the events about a TrainingJob and about its Jobs, pods and claims, oldest first; a cluster forgets
-them after an hour. {READS}"""
+Lists the events about a TrainingJob and its Jobs, pods and claims, oldest first. Kubernetes deletes events
+after an hour by default. {READS}"""
 LOGS = f"""\
 Prints the log of a container of a replica's newest pod. {READS}"""
 LOG_S = 86_400.0
@@ -33,28 +33,28 @@ def add(commands: Commands) -> None:
     """Add the four commands."""
     _add_get(commands)
     for name, work, summary, description in (
-        ("describe", _describe, "tell everything about a job", DESCRIBE),
-        ("events", _events, "list what happened to a job", EVENTS),
+        ("describe", _describe, "show a job in full", DESCRIBE),
+        ("events", _events, "list the events about a job", EVENTS),
     ):
         parser = cluster_command(commands, name, work, summary, description)
-        parser.add_argument("name", metavar="NAME", help="of the job")
+        parser.add_argument("name", metavar="NAME", help="name of the job")
     _add_logs(commands)
 
 
 def _add_get(commands: Commands) -> None:
     parser = cluster_command(commands, "get", _get, "list jobs", GET)
-    parser.add_argument("name", metavar="NAME", nargs="?", help="of one job; default: all")
-    parser.add_argument("-A", "--all-namespaces", action="store_true", help="of all namespaces")
-    parser.add_argument("-l", "--selector", metavar="LABELS", help="with these labels: key=value,...")
+    parser.add_argument("name", metavar="NAME", nargs="?", help="name of one job; default: all jobs")
+    parser.add_argument("-A", "--all-namespaces", action="store_true", help="jobs of all namespaces")
+    parser.add_argument("-l", "--selector", metavar="LABELS", help="jobs with these labels: key=value,...")
     parser.add_argument(
-        "-o", "--output", choices=("wide", "json", "yaml", "name"), help="default: a table for people"
+        "-o", "--output", choices=("wide", "json", "yaml", "name"), help="format; default: a table"
     )
 
 
 def _add_logs(commands: Commands) -> None:
     parser = cluster_command(commands, "logs", _logs, "print the log of a container", LOGS)
-    parser.add_argument("name", metavar="NAME", help="of the job")
-    parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="default: 0")
+    parser.add_argument("name", metavar="NAME", help="name of the job")
+    parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="number; default: 0")
     parser.add_argument(
         "-c",
         "--container",
@@ -62,7 +62,7 @@ def _add_logs(commands: Commands) -> None:
         default="trainer",
         help="trainer, ros-master or sim-<group>-<number>; default: trainer",
     )
-    parser.add_argument("-f", "--follow", action="store_true", help="wait for more until the container ends")
+    parser.add_argument("-f", "--follow", action="store_true", help="keep printing until the container ends")
     parser.add_argument("--tail", metavar="N", type=whole(), help="the last N lines only")
     parser.add_argument(
         "--timeout", metavar="S", type=seconds, default=LOG_S, help="seconds to follow; default: a day"
@@ -71,7 +71,7 @@ def _add_logs(commands: Commands) -> None:
 
 def _get(client: Client, options: argparse.Namespace) -> int:
     if options.name and (options.all_namespaces or options.selector):
-        raise PalaestraError("NAME: excludes -A and -l; leave it out, or them")
+        raise PalaestraError("NAME: cannot be combined with -A and -l; remove one of them")
     show = _table if options.output in {None, "wide"} else _document
     return show(client, options, None if options.all_namespaces else client.namespace)
 

@@ -1,4 +1,4 @@
-"""`palaestra operator`: look after the TrainingJobs of a cluster."""
+"""`palaestra operator`: reconcile the TrainingJobs of a cluster."""
 
 import argparse
 import re
@@ -12,9 +12,9 @@ from palaestra.plan import Images
 from palaestra_sim.typed import seconds, whole
 
 OPERATOR = """\
-Watches the TrainingJobs of a cluster, makes what they need, and writes their status. Reads the
-kubeconfig as kubectl does, inside a pod the pod's own account. Writes log lines, one JSON object each,
-to standard error; ends within 2 s of SIGTERM. Only one leads at a time, the others wait.
+Watches the TrainingJobs of a cluster, creates the objects that they need, and writes their status. Reads the
+kubeconfig as kubectl does; in a pod it uses the pod's service account. Logs one JSON object per line to
+standard error. Exits within 2 s of SIGTERM. Of several operators, one leads and the others wait.
 """
 
 NAME = r"[A-Za-z0-9]([-A-Za-z0-9_.]{0,61}[A-Za-z0-9])?"
@@ -25,19 +25,19 @@ NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = command(commands, "operator", _operator, "look after the jobs of a cluster", OPERATOR)
+    parser = command(commands, "operator", _operator, "reconcile the jobs of a cluster", OPERATOR)
     _add_looking(parser)
     parser.add_argument(
         "--leader-elect",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="wait for the Lease before anything is written; default: yes",
+        help="wait for the Lease before the first write; default: yes",
     )
     parser.add_argument(
         "--metrics-address",
         metavar="HOST:PORT",
         default="0.0.0.0:8080",
-        help="of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
+        help="address of /healthz, /readyz and /metrics; default: 0.0.0.0:8080",
     )
     _add_cluster(parser)
     _add_pods(parser)
@@ -45,24 +45,28 @@ def add(commands: Commands) -> None:
 
 
 def _add_looking(parser: argparse.ArgumentParser) -> None:
-    """Add which jobs are looked at, how many at once and how often."""
+    """Add the options for which jobs are reconciled, how many at once and how often."""
     parser.add_argument(
         "--namespace",
         metavar="NS",
         dest="namespaces",
         action="append",
         default=[],
-        help="look after this namespace only; may be repeated; default: all",
+        help="reconcile the jobs of this namespace only; may be repeated; default: all",
     )
     parser.add_argument(
-        "--workers", metavar="N", type=whole(1), default=4, help="jobs looked at at once; default: 4"
+        "--workers",
+        metavar="N",
+        type=whole(1),
+        default=4,
+        help="jobs reconciled at the same time; default: 4",
     )
     parser.add_argument(
         "--resync",
         metavar="S",
         type=seconds,
         default=600.0,
-        help="seconds after which every job is looked at again; default: 600",
+        help="seconds after which every job is reconciled again; default: 600",
     )
 
 
@@ -75,7 +79,7 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
             dest=f"allowed_pod_{kind}s",
             action="append",
             default=[],
-            help=f"{kind} that jobs may give their pods, or its domain with a / at the end; "
+            help=f"{kind} that jobs may set on their pods, or its domain with a / at the end; "
             "may be repeated; default: none",
         )
     parser.add_argument(
@@ -85,7 +89,7 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
         dest="node_selector",
         action="append",
         default=[],
-        help="label that the nodes of training pods must have, unless a job names another value; "
+        help="label that the nodes of training pods must have, unless a job sets another value; "
         "may be repeated; default: none",
     )
 
@@ -93,7 +97,7 @@ def _add_pods(parser: argparse.ArgumentParser) -> None:
 def _allowed(text: str) -> str:
     if not ALLOWED.fullmatch(text):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is refused; give a key such as example.com/team, or a domain such as example.com/"
+            f"{text!r} is not a key; use a key such as example.com/team, or a domain such as example.com/"
         )
     return text
 
@@ -101,26 +105,28 @@ def _allowed(text: str) -> str:
 def _node_label(text: str) -> tuple[str, str]:
     if not NODE_LABEL.fullmatch(text):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is refused; give a label such as kubernetes.io/arch=amd64"
+            f"{text!r} is not a label; use a label such as kubernetes.io/arch=amd64"
         )
     key, _, value = text.partition("=")
     return key, value
 
 
 def _add_cluster(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--kubeconfig", metavar="FILE", help="connect with it; default: as kubectl does")
-    parser.add_argument("--context", metavar="NAME", help="of the kubeconfig; default: its current one")
+    parser.add_argument("--kubeconfig", metavar="FILE", help="kubeconfig; default: as kubectl")
+    parser.add_argument(
+        "--context", metavar="NAME", help="context of the kubeconfig; default: the current one"
+    )
     parser.add_argument(
         "--operator-namespace",
         metavar="NS",
         default=own_namespace(DEFAULT_NAMESPACE),
-        help="where this operator runs; default: the pod's own, else palaestra-system",
+        help="namespace of this operator; default: the pod's own, else palaestra-system",
     )
     parser.add_argument(
         "--monitoring-namespace",
         metavar="NS",
         default="monitoring",
-        help="whose pods may scrape training pods; default: monitoring",
+        help="namespace of the pods that may scrape training pods; default: monitoring",
     )
 
 
@@ -128,7 +134,7 @@ def _add_images(parser: argparse.ArgumentParser) -> None:
     release = Images.of_release(version("palaestra"))
     for name in ("trainer", "stub", "webots"):
         image = getattr(release, name)
-        told = f"for jobs that name none; default: {image}"
+        told = f"image for jobs that name none; default: {image}"
         parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=told)
 
 

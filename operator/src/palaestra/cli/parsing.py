@@ -1,4 +1,4 @@
-"""What all commands have in common: how they are declared, and how they end."""
+"""Common parts of all commands: their declaration and their exit codes."""
 
 import argparse
 from collections.abc import Callable
@@ -11,27 +11,27 @@ CONTEXT, KUBECONFIG = "--context", "--kubeconfig"
 EXIT_CODES = """\
 exit codes:
   0    done
-  1    failed; the last lines of the log say why
-  2    the job, a world or this machine is not as it must be; nothing was started
-  75   interrupted and checkpointed; the same command goes on
-  80   a simulator's budget for faults is spent
+  1    failed; the last lines of the log give the reason
+  2    the job, a world or this machine is not suitable; nothing was started
+  75   interrupted after a checkpoint; run the same command to resume
+  80   a simulator had more faults than its restart limit allows
   81   training diverged
   82   training stalled
-  130  killed by a second Ctrl-C; the same command goes on from the newest checkpoint
+  130  killed by a second Ctrl-C; run the same command to resume from the newest checkpoint
 """
 ALL_EXIT_CODES = """\
 exit codes of all commands:
   0    done
-  1    failed, or the cluster has no such job, refuses, or did not come to it in time; the last lines say why
-  2    the command line, a file, the kubeconfig or this machine is not as it must be; nothing was started
-  75, 80, 81, 82  of `run` alone
+  1    failed, or the cluster has no such job, refused, or the deadline passed; the last lines give the reason
+  2    the command line, a file, the kubeconfig or this machine is not suitable; nothing was started
+  75, 80, 81, 82  of `run` only
   130  ended by Ctrl-C
-`COMMAND --help` explains those of one command.
+`COMMAND --help` explains the exit codes of one command.
 """
 
 
 class Commands(Protocol):
-    """What argparse gives for adding commands; its own class has no public name."""
+    """The object with which argparse adds commands; argparse's own class is not public."""
 
     def add_parser(self, *args: Any, **options: Any) -> argparse.ArgumentParser:
         """Return the parser of a new command."""
@@ -46,7 +46,7 @@ def command(
     description: str,
     exit_codes: str = EXIT_CODES,
 ) -> argparse.ArgumentParser:
-    """Return the parser of a new command, which `function` carries out and returns its exit code."""
+    """Return the parser of a new command; `function` runs the command and returns its exit code."""
     parser = commands.add_parser(
         name,
         help=summary,

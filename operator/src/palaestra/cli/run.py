@@ -10,10 +10,10 @@ from palaestra.local.run import Options, run
 from palaestra_sim.typed import MOST_PORT, whole
 
 RUN = """\
-Reads the TrainingJob in FILE and writes <dir>/<job name>/<replica>/: checkpoints/, tensorboard/,
-evaluations.jsonl, model.zip, the source worlds, training.yaml and logs/. Typed again it goes on from
-the newest checkpoint. Replicas run one after another; --replica picks one.
-Ctrl-C ends it with a checkpoint, a second one at once.
+Trains as the TrainingJob in FILE specifies, and writes <dir>/<job name>/<replica>/: checkpoints/,
+tensorboard/, evaluations.jsonl, model.zip, the source worlds, training.yaml and logs/. The same command
+resumes from the newest checkpoint. Replicas run one after another; --replica chooses one. Ctrl-C saves a
+checkpoint and exits; a second Ctrl-C exits at once.
 """
 
 
@@ -23,7 +23,9 @@ def add(commands: Commands) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     add_dir(parser)
     parser.add_argument("--replica", metavar="N", type=whole(), help="this replica only")
-    parser.add_argument("--fresh", action="store_true", help="begin anew; what was there is moved aside")
+    parser.add_argument(
+        "--fresh", action="store_true", help="start from the beginning; an existing run is moved aside"
+    )
     parser.add_argument(
         "--ros-port",
         metavar="PORT",

@@ -1,4 +1,4 @@
-"""`palaestra try`: have a small job carried out by a cluster, and see that it succeeds."""
+"""`palaestra try`: run a small job in a cluster and check that it succeeds."""
 
 import argparse
 import sys
@@ -13,29 +13,29 @@ from palaestra.trial import TrialFailed, attempt
 from palaestra_sim.typed import seconds
 
 TRY = """\
-Creates the TrainingJob in FILE under a name of its own, waits until it has ended, and deletes it,
-whatever came of it. Writes a line for each phase, and for each reason why a replica waits, to standard
-output. A job that did not succeed in time ends it with 1.
+Creates the TrainingJob in FILE under a unique name, waits until it has ended, and deletes it in any case.
+Prints a line for each phase and for each reason why a replica waits. Exits with 1 if the job did not succeed
+in time.
 """
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "try", _try, "have a cluster carry out a small job", TRY)
+    parser = cluster_command(commands, "try", _try, "run a small job in a cluster as a test", TRY)
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     parser.add_argument(
         "--within",
         metavar="S",
         type=seconds,
         default=900.0,
-        help="seconds in which it has to succeed, image pulls included; default: 900",
+        help="seconds within which the job must succeed, image pulls included; default: 900",
     )
 
 
 def _try(client: Client, options: argparse.Namespace) -> int:
     try:
         tried = job(options.file)
-    except SpecErrors as error:  # of what was typed, not of what a cluster has: nothing was asked
+    except SpecErrors as error:  # The file is wrong and nothing was sent, so the exit code is 2.
         raise PalaestraError(str(error)) from error
     content = tried.model_dump(mode="json", by_alias=True, exclude_unset=True)
     content["metadata"].setdefault("namespace", client.namespace)

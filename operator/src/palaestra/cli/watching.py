@@ -1,4 +1,4 @@
-"""`palaestra watch`: a job as it moves, until it has ended."""
+"""`palaestra watch`: show the progress of a job until it has ended."""
 
 import argparse
 import sys
@@ -17,18 +17,18 @@ from palaestra.view import History, live, progress
 from palaestra_sim.typed import seconds
 
 WATCH = """\
-Shows a TrainingJob as it moves, with a line for each figure of each replica, until it has ended; then says
-how. Figures are as old as the job's status, which is written every 30 s. Where the output is no terminal, a
-line for each change. Reads the cluster; writes nothing but its output. A job that failed
-or was deleted ends it with 1.
+Shows the progress of a TrainingJob, with a line for each figure of each replica, until the job has ended;
+then prints the result. Figures are as old as the job's status, which is written every 30 s. If the output is
+not a terminal, it prints a line for each change. Reads the cluster and changes nothing. Exits with 1 if the
+job failed or was deleted.
 """
 WATCH_S = 604_800.0
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "watch", _watch, "show a job as it moves", WATCH)
-    parser.add_argument("name", metavar="NAME", help="of the job")
+    parser = cluster_command(commands, "watch", _watch, "show the progress of a job", WATCH)
+    parser.add_argument("name", metavar="NAME", help="name of the job")
     parser.add_argument(
         "--timeout", metavar="S", type=seconds, default=WATCH_S, help="seconds to watch; default: a week"
     )
@@ -45,7 +45,7 @@ def _watch(client: Client, options: argparse.Namespace) -> int:
 
 
 def _drawn(client: Client, options: argparse.Namespace) -> TrainingJob:
-    """Draw the job again each second, and return it as it was last."""
+    """Redraw the job each second, and return its last state."""
     history = History()
     job = client.get(options.name)
     with Live(
@@ -57,11 +57,11 @@ def _drawn(client: Client, options: argparse.Namespace) -> TrainingJob:
 
 
 def _printed(client: Client, options: argparse.Namespace) -> TrainingJob:
-    """Print a line for each change that a person would notice, and return the job as it was last."""
+    """Print a line for each visible change, and return the job's last state."""
     job, told = client.get(options.name), ""
     for job in client.changes(options.name, deadline_s=options.timeout):
         parts = [f"{each.index}: {each.phase} {progress(each)}".rstrip() for each in job.status.replicas]
-        line = "; ".join([str(job.status.phase or "not seen by an operator yet"), *parts])
+        line = "; ".join([str(job.status.phase or "not reconciled by an operator yet"), *parts])
         if line != told:
             say([line])
             told = line

@@ -6,9 +6,9 @@
         client.apply(Path("job.yaml"))
         job = client.wait("job", deadline_s=3600)
 
-`client` is what people call; `asking` raises what is not found, `reading` understands a status, `following`
-waits for changes, `waiting` puts them into lines, `happenings` reads events, `fetching` copies a run out of
-its volume, with the pod of `reading_pod`, which runs `packing`.
+`client` has the public class. `asking` raises an error for a missing object, `reading` interprets a status,
+`following` waits for changes, `waiting` prints them as lines, and `happenings` reads events. `fetching`
+copies a run out of its volume with the pod of `reading_pod`, which runs `packing`.
 """
 
 from palaestra.client.asking import asked, check_namespace

@@ -1,4 +1,4 @@
-"""What it means that the API server found nothing: no such job, no namespace, or no TrainingJobs at all."""
+"""Errors for what the API server does not find: a job, a namespace, or the TrainingJob definition."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,11 +10,11 @@ from palaestra.cluster.resources import NAMESPACES
 
 @contextmanager
 def asked(name: str | None, namespace: str) -> Iterator[None]:
-    """Run requests about TrainingJobs; `name` is that of one job, None where no one job is meant.
+    """Run requests about TrainingJobs; `name` is the name of one job, or None.
 
     Raises:
-        NotInstalled: the cluster does not know TrainingJobs.
-        NoSuchJob: there is none of that name.
+        NotInstalled: the cluster has no TrainingJob definition.
+        NoSuchJob: no job has this name.
     """
     try:
         yield
@@ -27,7 +27,7 @@ def asked(name: str | None, namespace: str) -> Iterator[None]:
 
 
 def check_namespace(api: Api, name: str) -> None:
-    """Ask whether a namespace exists; without the right to ask, it is taken to exist.
+    """Check that a namespace exists; without permission to read it, it is assumed to exist.
 
     Raises:
         NoSuchNamespace: it does not.

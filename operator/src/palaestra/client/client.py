@@ -1,4 +1,4 @@
-"""The client: one method for each thing that people do with a TrainingJob of a cluster."""
+"""The client: one method for each operation on the TrainingJobs of a cluster."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -34,8 +34,8 @@ class Client:
     """The TrainingJobs of one namespace of a cluster; safe to use from several threads.
 
     Attributes:
-        api: the cluster, for what is not done here.
-        namespace: where the jobs are that are named.
+        api: the cluster, for other requests.
+        namespace: of the jobs.
     """
 
     def __init__(
@@ -67,53 +67,53 @@ class Client:
         self.api.close()
 
     def apply(self, job: TrainingJob | Mapping[str, Any] | Path) -> TrainingJob:
-        """Create a job, or change what of it may change, and return it as stored.
+        """Create a job, or change its mutable fields, and return the stored job.
 
         Args:
-            job: the job, plain data, or a file with one. What it leaves out is left to the cluster.
+            job: the job, plain data, or a file with one. Absent fields are left to the cluster.
 
         Raises:
-            SpecErrors: it is wrong, with every mistake; nothing was sent.
+            SpecErrors: the job is wrong; lists every mistake; nothing was sent.
             OSError: the file cannot be read.
-            ApiError: the API server refuses, as it does to change what a job is fixed on.
+            ApiError: the API server refuses, for example a change of an immutable field.
         """
         data = _data(job)
         validate(data, str(job) if isinstance(job, Path) else "job")
         metadata = {"namespace": self.namespace, **data["metadata"]}
-        # An empty spec that is applied twice is taken for one that is to be removed, and is then missing.
+        # A second server-side apply of an empty spec would remove the spec.
         spec = data["spec"] or {"replicas": Spec().replicas}
         with asked(None, self.namespace):
             return _job(self.api.apply({**data, "metadata": metadata, "spec": spec}, manager=MANAGER))
 
     def get(self, name: str) -> TrainingJob:
-        """Return a job as it is now.
+        """Return the current state of a job.
 
         Raises:
-            NoSuchJob: there is none of that name.
-            SpecErrors: another release has written what this one cannot read.
+            NoSuchJob: no job has this name.
+            SpecErrors: another release wrote a job that this one cannot read.
         """
         return _job(self.raw(name))
 
     def list(self, labels: str | None = None) -> tuple[TrainingJob, ...]:
-        """Return all jobs of the namespace, or those that a label selector chooses."""
+        """Return all jobs of the namespace, or those that match a label selector."""
         with asked(None, self.namespace):
             return tuple(_job(each) for each in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
 
     def raw(self, name: str) -> Object:
-        """Return a job as the API server has it, as plain data.
+        """Return a job as plain data, as the API server stores it.
 
         Raises:
-            NoSuchJob: there is none of that name.
+            NoSuchJob: no job has this name.
         """
         with asked(name, self.namespace):
             return self.api.get(TRAINING_JOBS, self.namespace, name)
 
     def changes(self, name: str, *, deadline_s: float) -> Iterator[TrainingJob]:
-        """Yield a job as it is, then after each change; ends when it has ended or was deleted.
+        """Yield a job, then yield it again after each change, until the job has ended or was deleted.
 
         Raises:
-            NoSuchJob: there is none of that name.
-            TookTooLong: it went on for longer than `deadline_s`.
+            NoSuchJob: no job has this name.
+            TookTooLong: the job had not ended after `deadline_s`.
         """
         found = None
         deadline = time.monotonic() + deadline_s
@@ -127,7 +127,7 @@ class Client:
             raise NoSuchJob.of(name, self.namespace)
 
     def statuses(self, name: str, *, deadline_s: float) -> Iterator[Status]:
-        """Yield the status of a job as `changes` yields the job; raises the same."""
+        """Yield the status of a job after each change; raises the same errors as `changes`."""
         for job in self.changes(name, deadline_s=deadline_s):
             yield job.status
 
@@ -139,19 +139,19 @@ class Client:
         deadline_s: float,
         report: Callable[[str], object] | None = None,
     ) -> TrainingJob:
-        """Return the job once it is in a phase, or has ended in any.
+        """Wait until the job reaches a phase or ends, and return it.
 
         Args:
             name: of the job.
             until: the phase, or `ended`.
-            deadline_s: for all of it.
-            report: is called with a line for each phase that the job comes to and for each reason why a
-                replica waits and since when, as `print` or `logging.info`; None: none is reported.
+            deadline_s: for the whole wait.
+            report: function such as `print` or `logging.info`, called with a line for each new phase, and for
+                each reason why a replica waits, with its time; None: no report.
 
         Raises:
-            EndedOtherwise: it has ended, and not as `until` says.
-            NoSuchJob: there is none of that name, or it was deleted.
-            TookTooLong: it did not come to that within `deadline_s`.
+            EndedOtherwise: the job ended in another phase than `until`.
+            NoSuchJob: no job has this name, or it was deleted.
+            TookTooLong: the job did not reach the phase within `deadline_s`.
         """
         news = News(name)
         for job in self.changes(name, deadline_s=deadline_s):
@@ -183,12 +183,12 @@ class Client:
             name: of the job.
             replica: its number.
             container: `trainer`, `ros-master`, or `sim-<group>-<number>`.
-            follow: wait for more until the container has ended.
-            tail: the last so many lines only; None: all that the node has kept.
-            deadline_s: for all of it.
+            follow: whether to wait for further lines until the container has ended.
+            tail: number of last lines; None: all lines that the node has kept.
+            deadline_s: for the whole call.
 
         Raises:
-            NoSuchJob: there is none of that name.
+            NoSuchJob: no job has this name.
             NoPod: the replica has no pod or no such container, or its container did not start.
         """
         job = self.get(name)
@@ -199,8 +199,8 @@ class Client:
             )
         except NotFound as error:
             raise NoPod(
-                f"pod {pod.name}: is gone, and its log with it; "
-                f"`palaestra describe {name}` has the last lines of an attempt that has ended"
+                f"pod {pod.name}: does not exist any more, nor does its log; "
+                f"`palaestra describe {name}` shows the last lines of the last attempt"
             ) from error
         except Invalid as error:
             known = _containers(job, replica)
@@ -209,19 +209,19 @@ class Client:
                     f"pod {pod.name}: has no container {container}; it has {', '.join(known)}"
                 ) from error
             raise NoPod(
-                f"pod {pod.name}: {error.message}; `palaestra describe {name}` names what it waits for"
+                f"pod {pod.name}: {error.message}; `palaestra describe {name}` shows what it waits for"
             ) from error
 
     def events(self, name: str) -> tuple[Happening, ...]:
-        """Return the events about a job and about what was made for it, oldest first.
+        """Return the events about a job and the objects created for it, oldest first.
 
         Raises:
-            NoSuchJob: there is none of that name.
+            NoSuchJob: no job has this name.
         """
         return happenings(self.api, self.get(name))
 
     def suspend(self, name: str) -> TrainingJob:
-        """Let the pods of a job be deleted after a checkpoint; raises as `resume`."""
+        """Suspend a job: its pods save a checkpoint and are deleted; raises the same errors as `resume`."""
         try:
             return self._suspended(name, suspend=True)
         except Invalid as error:
@@ -229,22 +229,22 @@ class Client:
             raise
 
     def resume(self, name: str) -> TrainingJob:
-        """Let a suspended job go on.
+        """Resume a suspended job.
 
         Raises:
-            NoSuchJob: there is none of that name.
-            QueueDecides: it is in a queue of Kueue's.
+            NoSuchJob: no job has this name.
+            QueueDecides: the job is in a Kueue queue.
         """
         job = self._suspended(name, suspend=False)
         _check_queue(job)
         return job
 
     def delete(self, name: str, *, deadline_s: float | None = None) -> None:
-        """Delete a job and its pods; with a deadline, wait until it is gone. Claims stay with `retain: Keep`.
+        """Delete a job and its pods; with a deadline, wait for that. With `retain: Keep`, claims stay.
 
         Raises:
-            NoSuchJob: there is none of that name.
-            TookTooLong: it is still there after `deadline_s`.
+            NoSuchJob: no job has this name.
+            TookTooLong: the job still exists after `deadline_s`.
         """
         found = self.raw(name)
         propagation = "Background" if deadline_s is None else "Foreground"
@@ -260,12 +260,12 @@ class Client:
     def fetch(self, name: str, *, replica: int = 0, into: Path, deadline_s: float = FETCH_S) -> Path:
         """Copy policy, evaluations and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
 
-        Needs the rights to make and delete pods and to run commands in them.
+        Needs the rights to create and delete pods and to run commands in them.
 
         Raises:
-            NoSuchJob: there is none of that name.
-            NotFetched: the folder is there already, the run is not, or it cannot be read.
-            TookTooLong: it took more than `deadline_s`; nothing was written.
+            NoSuchJob: no job has this name.
+            NotFetched: the folder exists already, or the run does not exist or cannot be read.
+            TookTooLong: `deadline_s` passed; nothing was written.
         """
         deadline = time.monotonic() + deadline_s
         return fetch(self.api, self.get(name), replica, into, deadline=deadline)
@@ -286,7 +286,7 @@ def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
         name = job.metadata.name
         raise NoPod(
             f"job {name}: replica {replica} has no pod; "
-            f"the job has {job.spec.replicas}, and `palaestra describe {name}` tells what they wait for"
+            f"the job has {job.spec.replicas} replicas, and `palaestra describe {name}` shows why they wait"
         )
     return pod
 
@@ -299,10 +299,10 @@ def _containers(job: TrainingJob, replica: int) -> tuple[str, ...]:
 
 
 def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:
-    """Return if no queue decides when a job runs.
+    """Return if the job has no queue.
 
     Raises:
-        QueueDecides: one does; from the API server's `refusal`, if it was that.
+        QueueDecides: the job has a queue; chained to the API server's `refusal`, if any.
     """
     queue = job.spec.scheduling.queue_name
     if queue is not None:
@@ -310,7 +310,7 @@ def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:
 
 
 def _data(job: TrainingJob | Mapping[str, Any] | Path) -> Any:
-    """Return a job as plain data, as far as it was given."""
+    """Return a job as plain data, with only the fields that were given."""
     if isinstance(job, TrainingJob):
         given = job.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"status"})
         return {**given, "apiVersion": API_VERSION, "kind": KIND}

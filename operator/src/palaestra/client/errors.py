@@ -1,16 +1,16 @@
-"""What a client of a cluster can be told instead of what it asked for.
+"""The errors of a client of a cluster.
 
-ClientError
-├── NotInstalled        the cluster does not know TrainingJobs
-├── NoSuchNamespace     the namespace does not exist
-├── NoSuchJob           there is no such TrainingJob, or it was deleted meanwhile
-├── QueueDecides        a job in a queue is suspended and resumed by Kueue alone
-├── EndedOtherwise      the job ended, and not as it was waited for
-├── TookTooLong         a deadline passed; the same call may be made again
-├── NoPod               a replica has no pod, or no such container, whose log could be read
-└── NotFetched          a run could not be copied; nothing was written
+    ClientError
+    ├── NotInstalled        the cluster has no TrainingJob definition
+    ├── NoSuchNamespace     the namespace does not exist
+    ├── NoSuchJob           the TrainingJob does not exist, or was deleted meanwhile
+    ├── QueueDecides        only Kueue suspends and resumes a job in a queue
+    ├── EndedOtherwise      the job ended in another phase than expected
+    ├── TookTooLong         a deadline passed; the same call may be repeated
+    ├── NoPod               a replica has no pod or no such container, so no log
+    └── NotFetched          a run could not be copied; nothing was written
 
-What the API server itself refuses is an ApiError (palaestra.cluster.errors).
+If the API server refuses a request, that is an ApiError (palaestra.cluster.errors).
 """
 
 from typing import Self
@@ -22,16 +22,16 @@ INSTALL = "`palaestra crd | kubectl apply --server-side -f -`"
 
 
 class ClientError(PalaestraError):
-    """A cluster does not have, or do, what it was asked for."""
+    """A cluster does not have a requested object, or did not do what was requested."""
 
 
 class NotInstalled(ClientError):
-    """The cluster does not know TrainingJobs; retrying cannot help."""
+    """The cluster has no TrainingJob definition; retrying cannot help."""
 
     def __init__(self) -> None:
         super().__init__(
-            f"{API_VERSION}: the cluster does not know TrainingJobs; install them with {INSTALL}, or choose "
-            "another cluster with --context; `palaestra doctor` tells what else is missing"
+            f"{API_VERSION}: the cluster has no TrainingJob definition; install it with {INSTALL}, or choose "
+            "another cluster with --context; `palaestra doctor` shows what else is missing"
         )
 
 
@@ -47,40 +47,40 @@ class NoSuchNamespace(ClientError, LookupError):
 
 
 class NoSuchJob(ClientError, LookupError):
-    """There is no such TrainingJob, or it was deleted meanwhile."""
+    """The TrainingJob does not exist, or was deleted meanwhile."""
 
     @classmethod
     def of(cls, name: str, namespace: str) -> Self:
         """Return the error about a job of this name."""
         return cls(
-            f"job {name}: there is none in namespace {namespace}; "
-            "`palaestra get` lists those of a namespace, -A those of all"
+            f"job {name}: does not exist in namespace {namespace}; "
+            "`palaestra get` lists the jobs of a namespace, -A of all namespaces"
         )
 
 
 class QueueDecides(ClientError):
-    """A job in a queue is suspended and resumed by Kueue alone."""
+    """Only Kueue suspends and resumes a job in a queue."""
 
     @classmethod
     def of(cls, name: str, namespace: str, queue: str) -> Self:
         """Return the error about a job in this queue."""
         return cls(
-            f"job {name}: Kueue decides when it runs, since it is in the queue {queue}; to stop it, delete "
+            f"job {name}: Kueue decides when it runs, because it is in queue {queue}; to stop it, delete "
             "it, or set spec.active of its Workloads to false "
             f"(`kubectl get workloads -n {namespace}` lists them)"
         )
 
 
 class EndedOtherwise(ClientError):
-    """The job ended, and not as it was waited for."""
+    """The job ended in another phase than expected."""
 
 
 class TookTooLong(ClientError, TimeoutError):
-    """A deadline passed; the same call may be made again."""
+    """A deadline passed; the same call may be repeated."""
 
 
 class NoPod(ClientError, LookupError):
-    """A replica has no pod, or no such container, whose log could be read."""
+    """A replica has no pod or no such container, so there is no log."""
 
 
 class NotFetched(ClientError):

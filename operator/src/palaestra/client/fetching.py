@@ -1,7 +1,7 @@
-"""Copy a run's results out of its volume: from the pod that runs, or with a pod of its own.
+"""Copy a run's results out of its volume: from the running pod, or with a temporary pod.
 
-The folder is written whole or not at all: beside its place first, then renamed. Why a command in a container
-carries it, docs/decisions/0011 says.
+The target folder appears complete or not at all: the files are written to a temporary folder beside it, which
+is then renamed. docs/decisions/0011 explains why a command in a container sends the files.
 """
 
 import io
@@ -37,12 +37,12 @@ PARTS = (
     "attempts.jsonl",
     "tensorboard",
 )
-GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # a replica that has no pod is about to get one
+GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # A replica in these phases without a pod will get one.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A container that sees a run directory."""
+    """A container that has a run directory mounted."""
 
     namespace: str
     pod: str
@@ -54,13 +54,13 @@ def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: flo
     """Return the new folder `into/<job>/<replica>`: policy, evaluations and TensorBoard data of a run.
 
     Raises:
-        NotFetched: the folder is there already, the run is not, or it cannot be read or written.
+        NotFetched: the folder exists already, the run does not exist, or one of them cannot be accessed.
         TookTooLong: the deadline, on the monotonic clock, passed.
         ApiError: the API server refuses.
     """
     target = into / job.metadata.name / str(replica)
     if target.exists():
-        raise NotFetched(f"{target}: is there already; move it away, or name another folder")
+        raise NotFetched(f"{target}: already exists; move it away, or choose another folder")
     with _source(api, job, replica, deadline) as source, _with_remedies(source, target, deadline):
         _copy(api, source, target, deadline)
     return target
@@ -68,7 +68,7 @@ def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: flo
 
 @contextmanager
 def _with_remedies(source: Source, target: Path, deadline: float) -> Iterator[None]:
-    """Raise what goes wrong in the block as an error that names the place and the remedy."""
+    """Turn errors in the block into errors that name the place and the remedy."""
     try:
         yield
     except Unreachable as error:
@@ -82,10 +82,10 @@ def _with_remedies(source: Source, target: Path, deadline: float) -> Iterator[No
     except CommandFailed as error:
         raise NotFetched(
             f"{source.directory} in pod {source.pod}: cannot be read ({error}); "
-            "type the same command when the run has ended"
+            "run the same command again when the training has ended"
         ) from error
     except (OSError, tarfile.TarError) as error:
-        raise NotFetched(f"{target}: {error}; choose a folder that can be written") from error
+        raise NotFetched(f"{target}: {error}; choose a writable folder") from error
 
 
 def _copy(api: Api, source: Source, target: Path, deadline: float) -> None:
@@ -101,17 +101,17 @@ def _copy(api: Api, source: Source, target: Path, deadline: float) -> None:
         unpack(chunks, partial)
         if not any(partial.iterdir()):
             raise NotFetched(
-                f"{source.directory} in pod {source.pod}: holds nothing yet; "
+                f"{source.directory} in pod {source.pod}: is still empty; "
                 "try again after the first evaluation"
             )
         partial.rename(target)
 
 
 def unpack(chunks: Iterator[bytes], into: Path) -> None:
-    """Write the files of a tar that comes in chunks into a folder, and read it to its end.
+    """Write the files of a tar stream into a folder, and read the stream to its end.
 
     Raises:
-        TarError: it is no tar, or a member of it is no file, or would land elsewhere.
+        TarError: it is not a tar, or a member is not a file or has a path outside of the folder.
         OSError: a file cannot be written.
     """
     with tarfile.open(fileobj=_Stream(chunks), mode="r|") as tar:
@@ -124,12 +124,12 @@ def unpack(chunks: Iterator[bytes], into: Path) -> None:
             file.parent.mkdir(parents=True, exist_ok=True)
             with content, file.open("xb") as target:
                 shutil.copyfileobj(content, target)
-    for _ in chunks:  # the word about success comes last
+    for _ in chunks:  # The exit code of the command comes last.
         pass
 
 
 class _Stream(io.RawIOBase):
-    """Chunks that come one by one, as a file that is read."""
+    """An iterator of chunks as a readable file."""
 
     def __init__(self, chunks: Iterator[bytes]) -> None:
         self._chunks = chunks
@@ -140,7 +140,7 @@ class _Stream(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
-        """Fill the buffer with what has come and return how much that is; 0 at the end."""
+        """Copy received bytes into the buffer and return their number; 0 at the end."""
         while not self._rest:
             try:
                 self._rest = next(self._chunks)
@@ -153,7 +153,7 @@ class _Stream(io.RawIOBase):
 
 @contextmanager
 def _source(api: Api, job: TrainingJob, replica: int, deadline: float) -> Iterator[Source]:
-    """Lend a container that sees the run: the trainer while it runs, else one that is made for it."""
+    """Yield a container with the run mounted: the trainer while it runs, else a temporary one."""
     template = _template(api, job, replica)
     directory = run_directory(template)
     running = _running(api, job, replica)
@@ -162,8 +162,8 @@ def _source(api: Api, job: TrainingJob, replica: int, deadline: float) -> Iterat
         return
     if job.spec.storage.ephemeral:
         raise NotFetched(
-            f"job {job.metadata.name}: spec.storage.ephemeral: the run went with its pod; "
-            "fetch while it runs, or make the next job without it"
+            f"job {job.metadata.name}: spec.storage.ephemeral: the run was deleted with its pod; "
+            "fetch while the job runs, or create the next job without ephemeral"
         )
     with _reader(api, job, replica, template, deadline) as pod:
         yield Source(namespace=job.metadata.namespace, pod=pod, container=CONTAINER, directory=directory)
@@ -175,8 +175,8 @@ def _template(api: Api, job: TrainingJob, replica: int) -> Object:
         template: Object = api.get(JOBS, job.metadata.namespace, name)["spec"]["template"]
     except NotFound:
         raise NotFetched(
-            f"job {job.metadata.name}: replica {replica} was not planned, so it has no run; "
-            f"the job has {job.spec.replicas}, and `palaestra describe` tells why one is not begun"
+            f"job {job.metadata.name}: replica {replica} was not created, so it has no run; "
+            f"the job has {job.spec.replicas} replicas, and `palaestra describe` shows why one waits"
         ) from None
     return template
 
@@ -185,7 +185,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
     """Return the name of the replica's pod if it runs, None if it has ended.
 
     Raises:
-        NotFetched: it is about to start, so its volume must be left to it, or is just ending.
+        NotFetched: the pod is about to start and needs its volume, or is just ending.
     """
     known = next((each for each in job.status.replicas if each.index == replica), None)
     name = known.pod.name if known is not None and known.pod is not None else None
@@ -193,24 +193,24 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
     phase = status.get("phase")
     if phase == "Pending":
         raise NotFetched(
-            f"pod {name}: is about to start, and its volume may not be held by another; "
-            "type the same command when it runs"
+            f"pod {name}: is about to start, and no other pod may use its volume; "
+            "run the same command again when it runs"
         )
     if phase == "Running" and _trainer_ended(status):  # and the pod's simulators are stopped
-        raise NotFetched(f"pod {name}: its trainer has just ended; type the same command in a minute")
+        raise NotFetched(f"pod {name}: its trainer has just ended; run the same command again in a minute")
     if phase == "Running":
         return name
     if phase != "Succeeded" and known is not None and known.phase in GOES_ON:
         again = " again" if name is not None else ""
         raise NotFetched(
-            f"job {job.metadata.name}: replica {replica} is about to be started{again}, and its volume may "
-            "not be held by another; type the same command when it runs"
+            f"job {job.metadata.name}: replica {replica} is about to be started{again}, and no other pod may "
+            "use its volume; run the same command again when it runs"
         )
     return None
 
 
 def _status(api: Api, namespace: str, name: str) -> Object:
-    """Return the status of a pod; of one that is gone, nothing."""
+    """Return the status of a pod; an empty one if the pod does not exist."""
     try:
         status: Object = api.get(PODS, namespace, name)["status"]
     except NotFound:
@@ -225,9 +225,9 @@ def _trainer_ended(status: Object) -> bool:
 
 @contextmanager
 def _reader(api: Api, job: TrainingJob, replica: int, template: Object, deadline: float) -> Iterator[str]:
-    """Lend a pod that reads the volume; it is deleted however this ends.
+    """Yield a temporary pod that reads the volume, and delete it in any case.
 
-    If that fails, what came of the copy is still the news: the pod ends by itself at our deadline.
+    An error of the deletion is ignored, because the pod ends by itself at the deadline.
     """
     name = f"{job.metadata.name}-{replica}-fetch-{secrets.token_hex(3)}"
     lives_s = max(round(deadline - time.monotonic()), 1)
@@ -254,14 +254,14 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
             why = hindrance(each) or why
     except TookTooLong:
         raise TookTooLong(
-            f"pod {name}: did not start in time ({why or 'nothing is told of it'}); "
-            "remove what hinders it, or allow more time with --timeout"
+            f"pod {name}: did not start in time ({why or 'no reason reported'}); "
+            "fix the cause, or allow more time with --timeout"
         ) from None
-    raise NotFetched(f"pod {name}: was deleted or ended before it was used; type the same command again")
+    raise NotFetched(f"pod {name}: was deleted or ended before it was used; run the same command again")
 
 
 def hindrance(pod: Object) -> str:
-    """Return what keeps a pod from running, in the cluster's words; empty: nothing is told."""
+    """Return why a pod does not run, as the cluster reports it; empty: no reason reported."""
     status = pod["status"]
     waiting = [(each.get("state") or {}).get("waiting") for each in status.get("containerStatuses", ())]
     unmet = [each for each in status.get("conditions", ()) if each.get("status") == "False"]

@@ -1,6 +1,6 @@
-"""One object as it is and as it changes, until it is deleted or a deadline passes.
+"""The changes of one object, until it is deleted or a deadline passes.
 
-A watch that ends, breaks or is forgotten is begun again from what is there; what was told is not told twice.
+A watch that ends, fails or expires is restarted from the current object; no version is yielded twice.
 """
 
 import threading
@@ -16,27 +16,27 @@ DELETED, BOOKMARK = "DELETED", "BOOKMARK"
 
 
 class _Gone(Exception):
-    """The object is not there."""
+    """The object does not exist."""
 
 
 def changes(
     api: Api, resource: Resource, namespace: str, name: str, *, deadline: float, uid: str = ""
 ) -> Iterator[Object]:
-    """Yield the object as it is now, then after each change; ends where there is none, or none any more.
+    """Yield the object, then yield it again after each change, until it does not exist.
 
-    Another object that has taken its name since is not it.
+    A new object of the same name ends the iteration.
 
     Args:
         api: the cluster.
-        resource: its kind.
-        namespace: where it is.
-        name: which one.
+        resource: kind of the object.
+        namespace: of the object.
+        name: of the object.
         deadline: on the monotonic clock.
-        uid: of the one that is meant; by default the first that is seen.
+        uid: of the object; empty: of the first object seen.
 
     Raises:
         TookTooLong: the deadline passed.
-        ApiError: the API server refuses; what may pass is tried again once the object was seen.
+        ApiError: the API server refuses. Retryable errors are retried once the object was seen.
     """
     told, failures = "", 0
     while True:
@@ -58,15 +58,15 @@ def changes(
         threading.Event().wait(min(api.limits.again.wait_s(failures), _left(deadline)))
         if not _left(deadline):
             raise TookTooLong(
-                f"{resource.kind} {name}: did not come to what was waited for in time; "
-                f"wait longer, or look at it with `kubectl describe {resource.plural} {name}`"
+                f"{resource.kind} {name}: did not reach the expected state in time; "
+                f"wait longer, or see `kubectl describe {resource.plural} {name}`"
             )
 
 
 def _until_the_watch_ends(
     api: Api, resource: Resource, namespace: str, name: str, deadline: float
 ) -> Iterator[Object]:
-    """Yield the object as it is, then after each change; raises _Gone."""
+    """Yield the object, then yield it again after each change; raises _Gone."""
     only = f"metadata.name={name}"
     [page] = api.pages(resource, namespace, fields=only)
     if not page.items:

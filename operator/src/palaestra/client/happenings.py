@@ -1,4 +1,4 @@
-"""The events about a TrainingJob and about what was made for it, oldest first."""
+"""The events about a TrainingJob and the objects created for it, oldest first."""
 
 import re
 from collections.abc import Mapping
@@ -21,13 +21,13 @@ class Happening:
     """One event.
 
     Attributes:
-        time: when it happened last.
-        warning: whether it is more than news.
-        about: kind and name: `Pod/job-0-x7k2p`.
-        reason: what, in one word; for those about the TrainingJob see docs/operations.md.
-        message: what, in a sentence.
-        count: how often.
-        container: of the pod that `about` names; empty: the pod as a whole, or no pod.
+        time: of the last occurrence.
+        warning: whether its type is Warning.
+        about: kind and name of the object: `Pod/job-0-x7k2p`.
+        reason: one word; docs/operations.md explains those about the TrainingJob.
+        message: one sentence.
+        count: number of occurrences.
+        container: of the pod in `about`; empty: the whole pod, or another object.
     """
 
     time: datetime
@@ -40,7 +40,7 @@ class Happening:
 
 
 def happenings(api: Api, job: TrainingJob) -> tuple[Happening, ...]:
-    """Return what is known of a job's past; a cluster forgets events after an hour.
+    """Return the events of a job; by default Kubernetes deletes events after an hour.
 
     Raises:
         ApiError: the API server refuses.

@@ -1,8 +1,8 @@
 """Write parts of a folder to standard output as one tar: run as `python3 -I -c TEXT FOLDER NAME...`.
 
-Its text is sent to a container, so it needs the standard library only. A run may go on meanwhile: each file
-is opened first and measured then, so one that grows is cut where it was, and one that is replaced is whole.
-What is not there is left out.
+The text of this file is sent to a container, so it uses the standard library only. The run may continue
+meanwhile. Each file is opened before its size is read: a growing file is truncated at that size, and a file
+that is replaced meanwhile is complete. Missing files are skipped.
 """
 
 import os

@@ -1,8 +1,8 @@
-"""The pod with which the volume of a run is read when its own pod has ended.
+"""The pod that reads the volume of a run after the run's own pod has ended.
 
-Pure. It is made from the template of the replica's Job, as that stands in the cluster: so it is secured,
-scheduled and pulled as the pods of the run were, with the trainer's image that the job has kept. It can
-only read the volume, holds no token, and ends by itself though nobody deletes it.
+Pure. The pod is built from the template of the replica's Job in the cluster, so it has the same security,
+scheduling, pull secrets and trainer image as the run's pods. It mounts the volume read-only, has no token,
+and ends by itself even if it is not deleted.
 """
 
 import copy
@@ -21,10 +21,10 @@ RESOURCES = {"requests": {"cpu": "10m", "memory": "32Mi"}, "limits": {"memory": 
 
 
 def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_s: int) -> dict[str, Any]:
-    """Return the pod; it goes with the TrainingJob.
+    """Return the pod; it is deleted with the TrainingJob.
 
     Args:
-        job: whose run is read.
+        job: the job of the run.
         template: the pod template of the replica's Job.
         name: of the pod, different each time.
         lives_s: whole seconds after which it ends by itself.
@@ -52,7 +52,7 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
 
 
 def _reader(trainer: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
-    """Return the container: the trainer's image and rights, and of its mounts the run, to be read only."""
+    """Return the container: the trainer's image and security, with only the run mounted, read-only."""
     return {
         "name": CONTAINER,
         "image": trainer["image"],
@@ -72,5 +72,5 @@ def trainer_of(template: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def run_directory(template: Mapping[str, Any]) -> str:
-    """Return where the run lies for the trainer, and for the reading pod."""
+    """Return the path of the run in the trainer and in the reading pod."""
     return next(str(each["value"]) for each in trainer_of(template)["env"] if each["name"] == RUN_VARIABLE)

@@ -1,4 +1,4 @@
-"""The progress of a job in lines, for a person who waits for it: its phases, and why replicas wait."""
+"""The progress of a job as lines of text: its phases, and why replicas wait."""
 
 import re
 from collections.abc import Iterator
@@ -10,14 +10,14 @@ _NUMBERS = re.compile(r"\d+")
 
 
 class News:
-    """Reports each phase that a job comes to, and each reason why a replica waits, once.
+    """Reports each phase of a job, and each reason why a replica waits, once.
 
-    The kubelet alternates between two phrases and counts its tries: a phrase that was reported, and one
-    with another number, is reported again only after the reason has changed.
+    The kubelet alternates between two messages and counts its retries. A known message, or one that differs
+    only in its numbers, is reported again only after the reason has changed.
     """
 
     def __init__(self, name: str) -> None:
-        """Begin with nothing reported; `name` stands in front of each line."""
+        """Start with nothing reported; each line begins with `name`."""
         self._name = name
         self._phase = ""
         self._reported: set[tuple[object, ...]] = set()
@@ -35,7 +35,7 @@ class News:
 
 
 def _waits(replica: ReplicaStatus) -> bool:
-    """Return whether a replica reports trouble, or a queue, and not a step on its way."""
+    """Return whether a replica reports a problem or a queue, and not normal progress."""
     if replica.reason is None or replica.phase in TERMINAL:
         return False
     reason = Reason.known(replica.reason)

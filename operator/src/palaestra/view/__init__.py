@@ -1,7 +1,7 @@
-"""TrainingJobs for people's eyes. Pure: from what is known to text; the clock is passed in.
+"""TrainingJobs as text. Pure: the clock is passed in.
 
-`tables` and `sparkline` draw, `durations` says how long, `describe` tells all of one job, `history` keeps
-what a job's figures were, and `live` shows it as it moves.
+`tables` and `sparkline` draw, `durations` formats durations, `describe` prints one job in full, `history`
+keeps past figures of a job, and `live` shows its progress.
 """
 
 from palaestra.view.describe import describe, happened, progress

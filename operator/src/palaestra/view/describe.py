@@ -1,4 +1,4 @@
-"""Everything that is known of one job, as `palaestra describe` prints it."""
+"""The text that `palaestra describe` prints about one job."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
@@ -15,7 +15,7 @@ Row = tuple[str, str]
 
 
 def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
-    """Return the lines about a job; what is not known is left out."""
+    """Return the lines about a job, without unknown values."""
     lines = lines_of([(f"{name}:", told) for name, told in _facts(job, created, now) if told])
     lines += ["", "Conditions:", *_indented(_conditions(job.status.conditions, now))]
     for replica in job.status.replicas:
@@ -24,9 +24,9 @@ def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
 
 
 def happened(happenings: Sequence[Happening], now: datetime) -> list[str]:
-    """Return the lines about events: when, whether a warning, reason, object with container, message."""
+    """Return the lines about events: age, type, reason, object with container, message."""
     if not happenings:
-        return ["none that the cluster remembers"]
+        return ["none that the cluster still has"]
     rows = [
         (
             short((now - each.time).total_seconds()) + (f" (x{each.count})" if each.count > 1 else ""),
@@ -45,7 +45,7 @@ def _facts(job: TrainingJob, created: datetime, now: datetime) -> Iterator[Row]:
     yield "Name", job.metadata.name
     yield "Namespace", job.metadata.namespace
     yield "Created", ago(created, now)
-    yield "Phase", str(status.phase or "not seen by an operator yet")
+    yield "Phase", str(status.phase or "not reconciled by an operator yet")
     yield "Suspended", "by spec.suspend" if job.spec.suspend else ""
     yield "Started", ago(status.start_time, now)
     yield "Ended", ago(status.completion_time, now)
@@ -54,11 +54,11 @@ def _facts(job: TrainingJob, created: datetime, now: datetime) -> Iterator[Row]:
     yield "Simulators", ", ".join(f"{each.name}: {each.count} x {each.role}" for each in job.spec.simulators)
     yield "Queue", job.spec.scheduling.queue_name or ""
     if storage.ephemeral:
-        yield "Storage", "in the pod, and gone with it"
+        yield "Storage", "in the pod, deleted with it"
     elif storage.existing_claim:
         yield "Storage", f"claim {storage.existing_claim}"
     else:
-        yield "Storage", f"a claim of {storage.size} a replica, retain {storage.retain}"
+        yield "Storage", f"a claim of {storage.size} per replica, retain {storage.retain}"
     yield "Trainer image", trainer.image or (status.release.trainer if status.release else "")
 
 
@@ -102,14 +102,14 @@ def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
         counts = replica.faults.model_dump()
         slow = counts.pop("slow")
         yield "Faults", _counts(counts)
-        yield "Slow steps", f"{slow:,}, which are no faults" if slow else ""
+        yield "Slow steps", f"{slow:,} (not faults)" if slow else ""
     yield "Memory kills", ", ".join(f"{each.container} {each.times}" for each in replica.memory_kills)
     yield "Steps lost", f"{replica.steps_lost:,}" if replica.steps_lost else ""
     yield "Time spent", _shares(replica.goodput) if replica.goodput else ""
 
 
 def progress(replica: ReplicaStatus) -> str:
-    """Return how far a replica is, how quick, and what is left; empty before it is known."""
+    """Return a replica's step, speed and remaining time; empty while the step is unknown."""
     if replica.step is None:
         return ""
     told = f"{replica.step:,}"
@@ -152,7 +152,7 @@ def _simulators(replica: ReplicaStatus) -> list[str]:
 def _attempt(attempt: LastAttempt) -> list[str]:
     lines = [f"{attempt.attempt}, {attempt.reason}: {attempt.message}"]
     if attempt.log:
-        lines += ["its last lines:", *_indented(list(attempt.log))]
+        lines += ["last lines of its log:", *_indented(list(attempt.log))]
     return lines
 
 

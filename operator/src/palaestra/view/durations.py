@@ -1,4 +1,4 @@
-"""How long, in the two largest units: `45s`, `3m12s`, `2h5m`, `3d4h`."""
+"""Durations in their two largest units: `45s`, `3m12s`, `2h5m`, `3d4h`."""
 
 from datetime import datetime
 
@@ -7,7 +7,7 @@ UNITS = (("d", DAY), ("h", HOUR), ("m", MINUTE), ("s", 1))
 
 
 def short(seconds: float) -> str:
-    """Return a duration as people read it; 0s for what is less than a second, or lies ahead."""
+    """Return a duration for people; `0s` for less than a second and for a negative duration."""
     left = max(int(seconds), 0)
     parts: list[tuple[int, str]] = []
     for unit, size in UNITS:

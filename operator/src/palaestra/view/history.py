@@ -1,4 +1,4 @@
-"""What a job's figures were, as far back as somebody has watched."""
+"""Past figures of a job, since the watch began."""
 
 from collections import defaultdict, deque
 from dataclasses import dataclass
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from palaestra.api import Status
 from palaestra.api.status import ReplicaStatus
 
-MOST = 40  # of each figure: as many as fit into a line beside the others
+MOST = 40  # Values of each figure; as many as fit into one line.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figures:
-    """The figures of a replica at one step; None: not known then."""
+    """The figures of a replica at one step; None: unknown at that step."""
 
     step: int
     steps_per_second: float | None
@@ -38,7 +38,7 @@ class History:
         self._figures: defaultdict[int, deque[Figures]] = defaultdict(lambda: deque(maxlen=MOST))
 
     def add(self, status: Status) -> None:
-        """Take notice of a status; what did not move since the last one is left out."""
+        """Add the figures of a status; a replica without a change is skipped."""
         for replica in status.replicas:
             figures, known = Figures.of(replica), self._figures[replica.index]
             if figures is not None and (not known or known[-1] != figures):

@@ -1,4 +1,4 @@
-"""A job as it moves: what `palaestra watch` draws again each second."""
+"""The progress of a job, which `palaestra watch` redraws each second."""
 
 from datetime import datetime
 
@@ -26,12 +26,12 @@ BAR = 60
 
 
 def live(job: TrainingJob, history: History, now: datetime) -> Group:
-    """Return what is drawn of a job; figures are as old as its status, ages are of `now`."""
+    """Return the drawing of a job; figures are as old as its status, ages are relative to `now`."""
     status = job.status
-    phase = str(status.phase or "not seen by an operator yet")
+    phase = str(status.phase or "not reconciled by an operator yet")
     heading = Text.assemble((job.metadata.name, "bold"), "  ", (phase, _colour(status.phase)))
     heading.append(f"  {status.running} replicas" if status.running else "")
-    heading.append(f"  began {ago(status.start_time, now)}" if status.start_time else "")
+    heading.append(f"  started {ago(status.start_time, now)}" if status.start_time else "")
     parts: list[RenderableType] = [heading, Text(why(status), style="dim")]
     for replica in status.replicas:
         parts += [Text(), *_replica(replica, history.of(replica.index), now)]

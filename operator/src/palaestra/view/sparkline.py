@@ -1,4 +1,4 @@
-"""A line of figures in as many characters."""
+"""A bar chart in one line of text, one character per value."""
 
 from collections.abc import Sequence
 
@@ -9,12 +9,12 @@ UNKNOWN = " "
 def sparkline(
     values: Sequence[float | None], *, lowest: float | None = None, highest: float | None = None
 ) -> str:
-    """Return one character a value, the higher the larger; a space for what is not known.
+    """Return one bar character per value, higher for larger values; a space for an unknown value.
 
     Args:
         values: oldest first.
-        lowest: what the lowest bar stands for; None: the least of the values.
-        highest: what the highest bar stands for; None: the greatest of them.
+        lowest: value of the lowest bar; None: the smallest value.
+        highest: value of the highest bar; None: the largest value.
     """
     known = [value for value in values if value is not None]
     if not known:

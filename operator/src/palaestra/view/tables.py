@@ -1,4 +1,4 @@
-"""Rows under headings, as wide as they need to be."""
+"""Text tables with aligned columns."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ NOTHING = "-"
 
 
 def lines_of(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return one line a row, its cells below each other; the last column is as long as it is."""
+    """Return one line per row with aligned columns; the last column is not padded."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     return [
         GAP.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
@@ -16,12 +16,12 @@ def lines_of(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def server_table(table: Mapping[str, Any], *, wide: bool = False, namespaces: bool = False) -> list[str]:
-    """Return the lines of a `Table` that an API server made: the columns that the CRD names.
+    """Return the lines of an API server's `Table`, with the columns that the CRD defines.
 
     Args:
-        table: its answer.
-        wide: with the columns that are left out where there is little room.
-        namespaces: with a first column for the namespace.
+        table: the API server's answer.
+        wide: whether to include the low-priority columns.
+        namespaces: whether to add a first column for the namespace.
     """
     shown = [
         place
