@@ -30,7 +30,7 @@ app.kubernetes.io/component: {{ .component }}
 {{- if ne $image (printf "palaestra-%s:%s" .name .root.Chart.AppVersion) }}{{ $image }}{{ end -}}
 {{- end }}
 
-{{/* What *restricted* Pod Security asks of a pod, and the user of all our images. */}}
+{{/* Pod settings that *restricted* Pod Security requires, and the user of all our images. */}}
 {{- define "palaestra.podSecurity" -}}
 runAsNonRoot: true
 runAsUser: 65532
@@ -39,7 +39,7 @@ seccompProfile:
   type: RuntimeDefault
 {{- end }}
 
-{{/* What it asks of a container. */}}
+{{/* Container settings that *restricted* Pod Security requires. */}}
 {{- define "palaestra.containerSecurity" -}}
 allowPrivilegeEscalation: false
 capabilities:
@@ -53,7 +53,7 @@ readOnlyRootFilesystem: true
 {{- .Values.test.namespace | default (first .Values.watchNamespaces) | default .Release.Namespace -}}
 {{- end }}
 
-{{/* What the operator uses in the namespaces of jobs, and nothing else. */}}
+{{/* The operator's rights in the namespaces of jobs. */}}
 {{- define "palaestra.jobRules" -}}
 - apiGroups: [palaestra.dev]
   resources: [trainingjobs]
@@ -71,7 +71,7 @@ readOnlyRootFilesystem: true
 - apiGroups: [""]
   resources: [pods]
   verbs: [list, watch]
-# A pod that no kubelet heals gets a new one; an eviction heeds disruption budgets, a deletion would not.
+# The operator evicts pods that the kubelet cannot recover; an eviction respects disruption budgets.
 - apiGroups: [""]
   resources: [pods/eviction]
   verbs: [create]
@@ -84,7 +84,7 @@ readOnlyRootFilesystem: true
 - apiGroups: [""]
   resources: [events]
   verbs: [get, list, create, patch] # list: why a Job's pods could not be made
-# Why Kueue does not admit a Job: authors of TrainingJobs need not be allowed to read Workloads.
+# The status reports why Kueue does not admit a Job; authors of TrainingJobs often may not read Workloads.
 - apiGroups: [kueue.x-k8s.io]
   resources: [workloads]
   verbs: [list]
