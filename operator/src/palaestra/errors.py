@@ -1,19 +1,19 @@
 """Everything that palaestra raises.
 
     PalaestraError
-    ├── TrainingJobError         a TrainingJob cannot be used as it stands
-    │   ├── SpecErrors           what its author wrote is wrong: never retried
-    │   └── PlanError            no plan can be made of it (palaestra.plan.errors)
-    ├── LocalError               the local runner cannot go on (palaestra.local.errors)
-    ├── ApiError                 an API server answers otherwise, or not at all (palaestra.cluster.errors)
-    └── NotConfigured            no API server is named (palaestra.cluster.errors)
+    ├── TrainingJobError         a TrainingJob cannot be used
+    │   ├── SpecErrors           the spec is wrong: never retried
+    │   └── PlanError            the job cannot be planned (palaestra.plan.errors)
+    ├── LocalError               the local runner cannot continue (palaestra.local.errors)
+    ├── ApiError                 an API server returned an error, or no answer (palaestra.cluster.errors)
+    └── NotConfigured            no API server is configured (palaestra.cluster.errors)
 
 A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.
 """
 
 
 class PalaestraError(Exception):
-    """Whatever this package raises on purpose."""
+    """The base class of this package's errors."""
 
 
 class TrainingJobError(PalaestraError):
@@ -24,7 +24,7 @@ class SpecErrors(TrainingJobError, ValueError):
     """All the mistakes in one TrainingJob; retrying cannot help.
 
     Attributes:
-        name: what was read, as its author knows it: the path of a file.
+        name: the path of the file that was read.
         problems: one line for each mistake, "<path>: <fact>; <remedy>"; never empty.
     """
 

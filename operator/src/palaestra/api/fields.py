@@ -1,8 +1,8 @@
-"""The kinds of value that a TrainingJob is made of, each bounded.
+"""The types of a TrainingJob's values, each bounded.
 
-Everything has a largest size: an API server estimates what a rule may cost from the largest
-object that the schema admits, and refuses a schema whose strings, lists or maps may grow for ever.
-Patterns are read by two engines, Rust's here and Go's in the API server: plain ASCII classes only.
+Every type has a largest size: an API server estimates the cost of a rule from the largest object that the
+schema allows, and refuses a schema with unbounded strings, lists or maps. Two engines read the patterns,
+Rust's here and Go's in the API server, so they use plain ASCII classes only.
 """
 
 import json
@@ -98,7 +98,7 @@ KNOWN_ONES = WrapValidator(_without_unknown_words)
 
 
 class Named(Protocol):
-    """An item of a list whose items are told apart by their names."""
+    """An item of a list whose items have unique names."""
 
     @property
     def name(self) -> str:

@@ -1,8 +1,8 @@
-"""A TrainingJob from YAML or plain data, with all its mistakes at once, and back.
+"""Load a TrainingJob from YAML or plain data, reporting all mistakes at once, and dump it.
 
-Pydantic stops at the first layer of mistakes: it judges no rule of an object that has a wrong
-field. So what is wrong is told, taken away, and the rest looked at again, until something whole is
-left; then the rules are judged, but for those that read what was taken away.
+Pydantic does not check the rules of an object that has a wrong field. So each wrong field is reported and
+removed, and the rest is validated again, until it is valid. Then the rules are checked, except those that
+read a removed field.
 """
 
 import re
@@ -23,7 +23,7 @@ _KEY = "[key]"  # pydantic's last piece of a path when a mapping's key is wrong,
 
 _HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
 
-# What is put where something required is wrong as a whole, so that the rest can be looked at.
+# Stand-ins for required objects that are wrong as a whole, so that the rest can be validated.
 _STAND_INS: dict[Path, Any] = {("metadata",): {"name": "stand-in"}, ("spec",): {}}
 
 

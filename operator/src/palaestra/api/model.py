@@ -1,8 +1,8 @@
 """What every part of a TrainingJob has in common: its configuration and its rules.
 
 A rule is a sentence about several fields at once. Its Python check, its CEL expression and its
-message stand beside one another in one `Rule`, so that a laptop and an API server refuse the same
-job with the same words. Rules are collected, not raised one by one: all mistakes are told at once.
+message are in one `Rule`, so that a laptop and an API server refuse the same job with the same message.
+Broken rules are collected, so that all mistakes are reported at once.
 """
 
 from collections.abc import Callable
@@ -29,10 +29,10 @@ FIELDS_ONLY: Final = {"rules": "later"}
 class Rule:
     """One claim about an object that several of its fields must hold together.
 
-    `message` is "<fact>; <remedy>". `field` is where it is reported: a path below the object, in
-    camelCase, with dots; empty for the object itself. `cel` sees the object, defaults applied, as
-    `self`, and names every field that `holds` reads. An API server cannot look into free objects
-    such as options: a rule about them has no `cel`, and `reads` names the fields.
+    `message` is "<fact>; <remedy>". `field` is the path of the reported field below the object, in camelCase
+    with dots; empty for the object itself. In `cel`, `self` is the object with its defaults; the expression
+    names every field that `holds` reads. An API server cannot read free objects such as options. A rule about
+    them has no `cel`, and `reads` names the fields.
     """
 
     holds: Callable[[Any], bool]

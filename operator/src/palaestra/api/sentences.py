@@ -1,4 +1,4 @@
-"""What is wrong with a field, in a sentence for its author: the fact and the remedy."""
+"""Error messages about fields, for the author of a job: the fact and the remedy."""
 
 import difflib
 import json

@@ -230,7 +230,7 @@ def how_it_failed(it: Situation, pod: PodView) -> str:
     word = it.seen.terminations.get(pod.uid)
     trainer = pod.trainer
     if trainer is not None and killed_for_memory(trainer):
-        return "the trainer was killed for its memory"
+        return "the trainer was killed because it ran out of memory"
     code = exit_code(pod)
     if word is not None and word.reason:
         return f"exit code {code}, {word.reason}"

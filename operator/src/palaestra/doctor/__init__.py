@@ -1,12 +1,12 @@
-"""Look at a cluster, and tell what keeps TrainingJobs from running in it, with the remedy.
+"""Check a cluster and report why TrainingJobs do not run in it, with the remedy.
 
-    finding         what a check comes to
+    finding         the result of a check
     examining       all checks in their order
     platform        the cluster: version, sidecars, storage, the CRD
     installation    the operator: running, leading, its rights, its metrics
-    rights          what the operator needs, and what a person does
+    rights          the rights of the operator and of users
 
-Nothing is changed: what has to be tried is a dry run.
+Nothing is changed: where a check must try something, it does a dry run.
 """
 
 from palaestra.doctor.examining import CHECKS, examine

@@ -22,8 +22,8 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     ("operator's rights", operator_rights),
     ("metrics", metrics),
 )
-# Where one of the first is wrong, the others would say nothing or mislead: RBAC grants rights in a namespace
-# that does not exist, too.
+# If the key check fails, the other checks would fail too or mislead: RBAC also grants rights in a namespace
+# that does not exist.
 POINTLESS: Mapping[Check, frozenset[Check]] = {
     answers: frozenset(check for _, check in CHECKS),
     namespace: frozenset({own_rights, sidecars, operator_rights}),
@@ -31,7 +31,7 @@ POINTLESS: Mapping[Check, frozenset[Check]] = {
 
 
 def examine(site: Site) -> Iterator[Finding]:
-    """Yield what each check comes to; skip those that `POINTLESS` names after one that is wrong."""
+    """Yield the findings of each check; after a failed check, skip those that `POINTLESS` lists for it."""
     skipped: frozenset[Check] = frozenset()
     for what, check in CHECKS:
         if check in skipped:
@@ -46,6 +46,6 @@ def _findings(what: str, check: Check, site: Site) -> Iterator[Finding]:
     try:
         yield from check(site)
     except Forbidden as error:
-        yield unknown(what, f"you may not look: {error.message}", "ask somebody who may")
+        yield unknown(what, f"you have no permission: {error.message}", "ask a cluster administrator")
     except ApiError as error:
-        yield wrong(what, str(error), "look at the API server and the way to it")
+        yield wrong(what, str(error), "check the API server and the connection to it")

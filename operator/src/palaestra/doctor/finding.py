@@ -1,4 +1,4 @@
-"""What a check comes to, and what it is given."""
+"""The input and the result of a check."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from palaestra.cluster import Api
 
 
 class Verdict(StrEnum):
-    """How something is."""
+    """The result of a check."""
 
     RIGHT = "ok"
     WARNING = "warning"  # it works; something about it may surprise later
@@ -18,13 +18,13 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One line of what the doctor tells.
+    """One line of the doctor's report.
 
     Attributes:
-        what: was looked at.
-        verdict: how it is.
-        fact: what was seen, in a sentence.
-        remedy: what to do about it; empty where it is right.
+        what: the subject of the check.
+        verdict: the result.
+        fact: the observation, in a sentence.
+        remedy: the action to take; empty if the result is right.
     """
 
     what: str
@@ -35,12 +35,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """What is looked at.
+    """The cluster and namespaces to check.
 
     Attributes:
-        api: the cluster, as the person who asks.
-        namespace: where that person has jobs.
-        operator_namespace: where the operator is installed.
+        api: the cluster, with the user's credentials.
+        namespace: of the user's jobs.
+        operator_namespace: of the operator.
     """
 
     api: Api
@@ -52,20 +52,20 @@ Check = Callable[[Site], Iterator[Finding]]
 
 
 def right(what: str, fact: str) -> Finding:
-    """Return that something is as it must be."""
+    """Return the finding that a subject is right."""
     return Finding(what=what, verdict=Verdict.RIGHT, fact=fact)
 
 
 def wrong(what: str, fact: str, remedy: str) -> Finding:
-    """Return that something is not as it must be."""
+    """Return the finding that a subject is wrong."""
     return Finding(what=what, verdict=Verdict.WRONG, fact=fact, remedy=remedy)
 
 
 def warning(what: str, fact: str, remedy: str) -> Finding:
-    """Return that something works, and that it could be better."""
+    """Return the finding that a subject works but may cause problems later."""
     return Finding(what=what, verdict=Verdict.WARNING, fact=fact, remedy=remedy)
 
 
 def unknown(what: str, fact: str, remedy: str) -> Finding:
-    """Return that something could not be seen."""
+    """Return the finding that a subject could not be checked."""
     return Finding(what=what, verdict=Verdict.UNKNOWN, fact=fact, remedy=remedy)

@@ -56,7 +56,7 @@ class Metrics:
     def written(self, job: Object, status: Object) -> None:
         """Count what happened to a TrainingJob, by the status that it had and the one that was written.
 
-        Whoever writes a change counts it, so that no change counts twice.
+        The operator that writes a change counts it, so that no change counts twice.
         """
         old = job.get("status") or {}
         if status["phase"] == Phase.RUNNING and not _has_run(old):

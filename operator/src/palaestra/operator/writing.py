@@ -16,7 +16,7 @@ Object = Mapping[str, Any]
 
 
 class NotLeading(PalaestraError):
-    """Another operator may lead by now, so nothing is written; whoever leads looks at the job."""
+    """Another operator may lead by now, so nothing is written; the leader reconciles the job."""
 
 
 class Writer:
