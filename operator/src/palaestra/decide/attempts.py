@@ -1,6 +1,6 @@
-"""How one attempt of a replica ended, by its pod and its trainer's last word: the first check that knows.
+"""Why one attempt of a replica ended, by its pod and its trainer's last report: the first check that holds.
 
-Why a pod was taken comes before what its trainer then did, as the Job's podFailurePolicy has it.
+The cause of a disruption comes before the trainer's reaction to it, as in the Job's podFailurePolicy.
 """
 
 from collections.abc import Callable
@@ -85,7 +85,7 @@ def disrupted(attempt: Attempt) -> Told | None:
 
 
 def gone(attempt: Attempt) -> Told | None:
-    """The pod went without a trace; it is told as what it was counted as."""
+    """The pod is gone; report the cause under which its restart was counted."""
     if attempt.pod is not None:
         return None
     before, after = attempt.it.old.restarts, attempt.it.counted.restarts
@@ -115,14 +115,14 @@ def deleted(attempt: Attempt) -> Told | None:
 
 
 def interrupted(attempt: Attempt) -> Told | None:
-    """The trainer has saved and stopped, and nobody says why it had to."""
+    """The trainer saved a checkpoint and stopped for an unknown reason."""
     if attempt.code != ExitCode.INTERRUPTED or attempt.pod is None:
         return None
     return told(Reason.INTERRUPTED, pod=attempt.name, how=how_it_failed(attempt.it, attempt.pod))
 
 
 def configuration_refused(attempt: Attempt) -> Told | None:
-    """The trainer says: do not try this again."""
+    """The trainer refused its configuration; retrying cannot help."""
     return _of_code(attempt, ExitCode.CONFIGURATION, Reason.CONFIGURATION_REFUSED)
 
 
@@ -132,12 +132,12 @@ def simulator_budget_spent(attempt: Attempt) -> Told | None:
 
 
 def diverged(attempt: Attempt) -> Told | None:
-    """The learner did."""
+    """The learner diverged."""
     return _of_code(attempt, ExitCode.DIVERGED, Reason.DIVERGED)
 
 
 def trainer_out_of_memory(attempt: Attempt) -> Told | None:
-    """Trying again needs as much memory."""
+    """The trainer ran out of memory; a retry would need as much."""
     trainer = attempt.pod.trainer if attempt.pod is not None else None
     if trainer is None or not killed_for_memory(trainer):
         return None

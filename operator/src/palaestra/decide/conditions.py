@@ -4,8 +4,8 @@ Five are always there, each with a reason whether it holds or not. The subject o
 condition of its phase; of a job that is Pending, it is Accepted while that does not hold, then Running.
 
 Two more are there only while they hold; kstatus reads them, the library by which Flux and `helm --wait` wait.
-A job is `Reconciling` while it is on its way to what its spec asks for, and `Stalled` when it cannot get
-there by itself. A job with neither is as its spec asks: it trains, has succeeded, or is suspended.
+A job is `Reconciling` while it approaches its spec, and `Stalled` when it needs a person to get there. A job
+with neither matches its spec: it trains, has succeeded, or is suspended.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Containers that were killed for their memory: whose, how often, and at which limit.
+"""Containers that were killed because they ran out of memory: which, how often, and at which limit.
 
 On cgroup v2 the kernel kills a container as a whole, its sidecar with it, and the kubelet starts it anew
 within a second. Then nothing but its last end tells a simulator that needed too much from one that crashed.

@@ -133,7 +133,7 @@ def _allows(allowed: tuple[str, ...], key: str) -> bool:
 
 
 def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A queue that nobody serves would be waited for for ever."""
+    """Without Kueue, a job with a queue would wait forever."""
     if job.spec.scheduling.queue_name is None or observed.kueue:
         return None
     return _hold(Reason.NO_KUEUE)
@@ -145,7 +145,7 @@ def sources_are_there(job: TrainingJob, observed: Observed) -> Hold | None:
 
 
 def sources_are_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
-    """Whoever writes a TrainingJob must not open what they could not open before."""
+    """A TrainingJob must not give its author access to objects that they could not read before."""
     return next((found for each in references(job) if (found := _closed(each, observed))), None)
 
 

@@ -1,4 +1,4 @@
-"""Whose doing it is that a Job is suspended, or is not: the operator's, a queue's or somebody else's."""
+"""What suspended or resumed a Job: the operator, a queue, or another field manager."""
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import PodReference

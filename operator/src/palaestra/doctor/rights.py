@@ -1,4 +1,4 @@
-"""Who may do what: asked of the API server, which knows, instead of read from roles.
+"""Rights, checked with access reviews of the API server instead of by reading roles.
 
 The table of the operator's rights is compared with the installed role by a test.
 """

@@ -1,4 +1,4 @@
-"""Who wrote a field of an object, by the API server's own record: `metadata.managedFields`."""
+"""The field manager that wrote a field of an object, as recorded in `metadata.managedFields`."""
 
 from palaestra.observe.reading import part, parts, text
 from palaestra.observe.views import Raw

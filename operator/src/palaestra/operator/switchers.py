@@ -1,4 +1,4 @@
-"""Who suspended or resumed a Job of ours, where the operator did not: its field manager.
+"""The field manager that suspended or resumed a Job of ours, if it was not the operator.
 
 The caches hold no managedFields, which are half of an object, so a Job that differs from what the operator
 set is read once for each change of its spec.

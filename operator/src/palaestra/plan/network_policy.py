@@ -1,4 +1,4 @@
-"""Who may talk to the pods of a job: the second layer behind loopback, as ROS 1 has no authentication.
+"""The NetworkPolicy of a job's pods: the second layer behind loopback, as ROS 1 has no authentication.
 
 Ingress: metrics, the trainer's status and the simulators' states, from the operator's pods and from the
 monitoring namespace. What the containers of a pod say to each other is on loopback, which no policy sees;
