@@ -18,4 +18,4 @@ def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
     )
 
     assert ended.returncode == 75, ended.stderr
-    assert "nothing was begun" in ended.stderr
+    assert "nothing was started" in ended.stderr

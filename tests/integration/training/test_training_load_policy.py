@@ -45,5 +45,5 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
 
 def test_a_folder_without_a_model_is_refused(tmp_path):
     """With the remedy."""
-    with pytest.raises(ConfigurationError, match=r"model.zip: is not there; train first"):
+    with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         load_policy(tmp_path)

@@ -172,7 +172,7 @@ def test_a_broken_spare_fails_one_restart_and_the_next_one_succeeds(pair, number
     it = pair().begin()
     os.kill(pid_of(it.second), number)
 
-    with pytest.raises(SimulatorDead, match="its standby does not answer any more"):
+    with pytest.raises(SimulatorDead, match="its standby no longer answers"):
         it.member.restart()
     it.member.restart()
 

@@ -272,7 +272,7 @@ def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator
 
     message = str(refusal.value)
     assert message.startswith("environment.id: Hall-v0: expected ")
-    assert message.endswith("; mend the environment")
+    assert message.endswith("; fix the environment")
     assert [fact for fact in facts if fact not in message] == []
 
 

@@ -118,7 +118,7 @@ def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_p
 
     assert code == 2
     assert "resumeFrom: " in last_word().reason
-    assert "nobody has no checkpoint; name the run of another job" in last_word().reason
+    assert "nobody has no checkpoint; give the run of another job" in last_word().reason
     assert members == {}
     assert not directory.attempts.exists()
 

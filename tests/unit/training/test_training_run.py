@@ -178,7 +178,7 @@ def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, dir
 
     assert code == 81
     assert last_word().reason == (
-        "Diverged: episode 0, step 1: collect-0: the reward is nan (term walk); mend the environment's reward"
+        "Diverged: episode 0, step 1: collect-0: the reward is nan (term walk); fix the environment's reward"
     )
     assert checkpoint.newest(directory.checkpoints) is None
 
@@ -284,7 +284,7 @@ def test_tensorboard_shows_no_step_twice_when_a_run_was_resumed(play, job, direc
 
 def test_measuring_needs_a_model_and_somebody_who_evaluates(job, directory):
     """Each with its own remedy."""
-    with pytest.raises(ConfigurationError, match=r"model.zip: is not there; train first"):
+    with pytest.raises(ConfigurationError, match=r"model.zip: does not exist; train first"):
         measure(job(), directory.model, lambda _: [], episodes=1, stream="B")
     with pytest.raises(ConfigurationError, match="none has role Evaluate"):
         measure(job(evaluators=0), directory.model, lambda _: [], episodes=1, stream="B")

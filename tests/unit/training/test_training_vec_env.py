@@ -304,7 +304,7 @@ def test_an_observation_that_is_no_number_is_the_environment_s_mistake(make_env,
         walk(env, 1)
 
     place = "episode 0, step 1: collect-0: environment Corridor: observation[1] is nan"
-    assert str(refusal.value) == f"{place}; mend the environment"
+    assert str(refusal.value) == f"{place}; fix the environment"
 
 
 def test_an_observation_of_a_reset_that_is_no_number_is_the_environment_s_mistake(make_env, make_member):

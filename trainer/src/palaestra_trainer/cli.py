@@ -27,15 +27,15 @@ log = structlog.get_logger(__name__)
 EXIT_CODES = """\
 exit codes:
   0   done
-  2   the configuration is wrong; trying again cannot help
-  75  interrupted by a signal, or the ROS master was lost, and saved; start it again to go on
+  2   the configuration is wrong; a retry cannot help
+  75  interrupted by a signal or the loss of the ROS master; state saved; start it again to resume
   80  a simulator failed more often than its restart limit allows
   81  diverged: a number of the environment, a loss or a weight is NaN or infinite
   82  stalled, or a simulator hung: no environment step for stallDeadlineSeconds
-  1   anything else; trying again may help
+  1   any other error; a retry may help
 """
 TRAIN = f"""\
-Train a policy as a training.yaml says, in the simulators that it names.
+Train a policy as training.yaml describes, in the simulators that it lists.
 
 reads:
   the configuration ({CONFIG_VARIABLE}), the newest checkpoint of the run directory
@@ -46,14 +46,14 @@ writes:
   (PALAESTRA_TERMINATION_LOG); on a claim, the link
   tensorboard/<job>-<first 8 of its UID>/<replica> at its top
 
-A run directory with a checkpoint is resumed; one that is finished is reported.
+A run directory with a checkpoint is resumed. If the run is finished, its result is reported.
 """
 EVAL = f"""\
-Measure the model.zip of a run directory on episodes with seeds of a stream of their own.
+Evaluate the model.zip of a run directory, on episodes with seeds from a stream that training did not use.
 
 reads:
-  RUN_DIR/model.zip, RUN_DIR/training.yaml, RUN_DIR/hyperparameters.json; the simulators of
-  {CONFIG_VARIABLE}, or without it processes that load the worlds in RUN_DIR
+  RUN_DIR/model.zip, RUN_DIR/training.yaml, RUN_DIR/hyperparameters.json; the simulators in
+  {CONFIG_VARIABLE}, or, if it is not set, local processes that load the worlds in RUN_DIR
 writes:
   one JSON object to standard output
 """
@@ -62,12 +62,12 @@ writes:
 EVAL_EXIT_CODES = """\
 exit codes:
   0   done
-  2   the configuration or the run directory is wrong; trying again cannot help
+  2   the configuration or the run directory is wrong; a retry cannot help
   80  a simulator failed more often than its restart limit allows
   130 ended by Ctrl-C; nothing is written
-  1   anything else; trying again may help
+  1   any other error; a retry may help
 """
-KEYBOARD_INTERRUPT = 130  # what shells make of an end by SIGINT
+KEYBOARD_INTERRUPT = 130  # the exit status that shells give a process ended by SIGINT
 
 
 def train(arguments: Sequence[str] | None = None) -> int:
@@ -76,7 +76,7 @@ def train(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, help=f"training.yaml (default: ${CONFIG_VARIABLE})")
     parser.add_argument("--run", type=Path, help=f"run directory (default: ${RUN_VARIABLE})")
     parser.add_argument(
-        "--resume", action="store_true", help="refuse to begin a new run; go on with an old one"
+        "--resume", action="store_true", help="only resume an existing run; never begin a new one"
     )
     chosen = parser.parse_args(arguments)
     configure_logs()
@@ -86,7 +86,7 @@ def train(arguments: Sequence[str] | None = None) -> int:
     except (TrainerError, OSError) as error:
         return _refuse(error)
     with leaving_when_asked():
-        # Imported here, because a wrong configuration should be told at once, not in 3 s.
+        # Imported here, so that a wrong configuration is reported at once, not after 3 s of imports.
         from palaestra_trainer import display, training  # noqa: PLC0415
         from palaestra_trainer.simulators.connect import connect_members  # noqa: PLC0415
 
@@ -103,18 +103,18 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-eval`; return its exit code."""
     parser = _parser("palaestra-eval", EVAL, EVAL_EXIT_CODES)
     parser.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
-    parser.add_argument("--episodes", type=whole(1), default=100, help="how many (default: 100)")
+    parser.add_argument("--episodes", type=whole(1), default=100, help="number of episodes (default: 100)")
     parser.add_argument(
         "--seeds",
         default="B",
-        help="name of the stream of seeds (default: B; the model was chosen on A, confirmed on C)",
+        help="name of the seed stream (default: B; A selects the model, C confirms it)",
     )
     chosen = parser.parse_args(arguments)
     configure_logs()
     try:
         result = _evaluate(chosen.run, chosen.episodes, chosen.seeds)
     except KeyboardInterrupt:
-        log.error("ended by Ctrl-C")  # noqa: TRY400 - a person's wish needs no traceback
+        log.error("ended by Ctrl-C")  # noqa: TRY400 - the user asked for it; a traceback would not help
         return KEYBOARD_INTERRUPT
     except (TrainerError, OSError) as error:
         code = _refuse(error)
@@ -148,7 +148,7 @@ def _parser(name: str, description: str, exit_codes: str) -> argparse.ArgumentPa
 def _run_directory(chosen: Path | None) -> Path:
     name = chosen or os.environ.get(RUN_VARIABLE)
     if not name:
-        raise ConfigurationError(f"{RUN_VARIABLE}: is not set; let it name the run directory")
+        raise ConfigurationError(f"{RUN_VARIABLE}: is not set; set it to the run directory")
     return Path(name)
 
 

@@ -1,9 +1,9 @@
-"""What happens between rollouts: evaluating, saving, resting, ending.
+"""The work between rollouts: evaluate, save, rest and end.
 
-A rollout boundary is the one moment at which the model's state is whole:
-nothing collected is yet to be learned from. Everything that reads or keeps the
-model happens there. What is amid a rollout when the run is interrupted is
-played again after it resumes, with the same seeds and the same random numbers.
+The model's state is complete only at a rollout boundary, because no collected
+data waits to be learned from. So everything that reads or saves the model
+happens there. If a run is interrupted during a rollout, that rollout is played
+again after the resume, with the same seeds and the same random numbers.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 log = structlog.get_logger(__name__)
 
-# Learning phases shorter than this are not worth two service calls a simulator, nor a copy of the model.
+# A shorter learning phase is not worth two service calls per simulator, nor a copy of the model.
 LONG_LEARNING_S = 0.5
 COUNTED_BY_STEP = ("episodes", "extra_steps")
 
 
 @dataclass(frozen=True, slots=True)
 class Resumed:
-    """What an attempt goes on from."""
+    """The checkpoint that an attempt resumes from, and its state."""
 
     checkpoint: Checkpoint
     state: State
 
 
 class Conductor(BaseCallback):
-    """The callback that conducts one attempt."""
+    """The Stable-Baselines3 callback that runs one attempt."""
 
     def __init__(self, run: Run, env: SimulatorsVecEnv, resumed: Resumed | None = None) -> None:
         super().__init__()
@@ -67,7 +67,7 @@ class Conductor(BaseCallback):
         self._resting = False
 
     def finish(self) -> None:
-        """Evaluate and save what training ended with, and confirm the best policy."""
+        """Evaluate and save the final model, and confirm the best policy."""
         self._learner.check(self.model.num_timesteps)
         self._mark_boundary()
         if self._evaluated != self._step:
@@ -76,7 +76,7 @@ class Conductor(BaseCallback):
         self._selection.finish(self._step)
 
     def save(self) -> None:
-        """Save the state of the last boundary, if there has been one; the model is put back to it."""
+        """Put the model back to the last boundary and save it there; before the first boundary do nothing."""
         run, state = self._run, self._boundary
         if state is None:
             return
@@ -85,7 +85,7 @@ class Conductor(BaseCallback):
             self._before_update.put_back(self.model)
         started = time.monotonic()
         with run.progress.spending(Cause.CHECKPOINTING):
-            # What is counted by step is played again; faults and time are over for good.
+            # Steps after the boundary are played again, so their counts are dropped; faults and time stay.
             counters = run.progress.counted(kept=step).to_json() | state.rollout["counters"]
             manifest = checkpoint.describe(run.configuration, step, counters)
             if self._saver.save(self.model, state, manifest):
@@ -98,9 +98,9 @@ class Conductor(BaseCallback):
         self._saved = step
 
     def leave_update(self, *_step: object) -> None:
-        """Raise Interrupted before a gradient step if a signal has come and the update takes too long.
+        """Raise Interrupted before a gradient step if a signal has arrived and the update takes too long.
 
-        Only where the tensors before the update are kept; what was collected for it is played again.
+        It does so only if the tensors from before the update are kept. The update's data is collected again.
         """
         if self._before_update is not None and patience.is_over():
             self._run.interruption.check()
@@ -113,7 +113,7 @@ class Conductor(BaseCallback):
         if self._rollout_ended is not None and self._updates_so_far() != self._updates:
             self._learning_s = time.monotonic() - self._rollout_ended
         if self._resumed:
-            # State-dependent exploration has drawn its noise for this rollout a second time.
+            # State-dependent exploration has drawn its noise twice for this rollout.
             self._resumed.put_back(self.model)
             self._resumed = None
         self._learner.check(self.model.num_timesteps)
@@ -135,7 +135,7 @@ class Conductor(BaseCallback):
         self._record_rewards(infos, self.locals["dones"])
         if self._run.display.due:
             self._run.display.show(self._run.progress.status())
-        # A rollout may take longer than the run is given to end: it is dropped, and played again.
+        # A rollout may take longer than the grace period, so it is dropped and played again.
         self._run.interruption.check()
         return True
 
@@ -147,11 +147,11 @@ class Conductor(BaseCallback):
             self._env.pause()
             self._resting = True
         first = self._learning_s is None and self._step > getattr(self.model, "learning_starts", -1)
-        if first or self._resting:  # it may be long, or was the last time
+        if first or self._resting:  # the first update may be long, and so may one like the last
             self._before_update = Tensors.of(self.model)
 
     def _updates_so_far(self) -> int:
-        return int(self.model._n_updates)  # noqa: SLF001 - told nowhere else
+        return int(self.model._n_updates)  # noqa: SLF001 - no public name has it
 
     def _mark_boundary(self) -> None:
         self._before_update = None

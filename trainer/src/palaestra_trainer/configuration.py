@@ -1,16 +1,16 @@
-"""What one replica is to do: the training.yaml of a run, checked as a whole.
+"""The training.yaml of one replica: what to train, checked as a whole.
 
-The plan writes the file, everything in this package reads it through here. A
-wrong file is refused before anything is started, with all its mistakes at
-once, each as field, fact and remedy. Which hyperparameters an algorithm takes
-is not known here but in `palaestra_trainer.algorithms`: reading a
-configuration must not cost the import of a learning library.
+The plan writes the file, and everything in this package reads it through this
+module. A wrong file is refused before anything starts. All its mistakes are
+reported at once, each with field, fact and remedy. The hyperparameters of each
+algorithm are defined in `palaestra_trainer.algorithms`, not here, because
+reading a configuration must not import a learning library.
 
-Unknown fields are logged and ignored. A job may name a `trainer.image` of its
-own, older than the operator that writes the file, and a newer operator writes
-a new field only where the job sets it. A person's mistakes do not come here:
-the job is checked before the file is written. A value that is not known is
-refused: it changes what is learned.
+Unknown fields are logged and ignored. A job may name a `trainer.image` that is
+older than the operator that writes the file, and a newer operator writes a new
+field only if the job sets it. Users' typing mistakes do not get here: the job
+is checked before the file is written. An unknown value is refused, because it
+would change the training.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from palaestra_trainer.errors import ConfigurationError
 
 log = structlog.get_logger(__name__)
 
-_UNKNOWN = "extra_forbidden"  # pydantic's name of the mistake
+_UNKNOWN = "extra_forbidden"  # pydantic's type of this error
 
 CONFIG_VARIABLE = "PALAESTRA_CONFIG"
-CONFIRM_EPISODES = 100  # a rate of 95 % is then known to within 4 %
+CONFIRM_EPISODES = 100  # with these, a rate of 95 % is known to within 4 %
 
 Positive = Annotated[int, Field(ge=1)]
 Role = Literal["Collect", "Evaluate"]
@@ -44,7 +44,7 @@ DEFAULT_REWARD: Reward = "Dense"
 
 
 class _Section(BaseModel):
-    """A part of the file: camelCase in YAML, immutable; `parse` decides on unknown fields."""
+    """A section of the file: camelCase in YAML, immutable; `parse` handles unknown fields."""
 
     model_config = ConfigDict(
         alias_generator=to_camel,
@@ -55,11 +55,11 @@ class _Section(BaseModel):
 
 
 class Environment(_Section):
-    """Which gymnasium environment is trained in.
+    """The gymnasium environment to train in.
 
     Attributes:
-        id: the name under which it is registered with gymnasium.
-        reward: Dense gives one each step, Sparse at the end of an episode only.
+        id: name under which the environment is registered with gymnasium.
+        reward: Dense gives a reward at each step, Sparse only at the end of an episode.
         options: keyword arguments of the environment.
     """
 
@@ -69,11 +69,11 @@ class Environment(_Section):
 
 
 class Normalize(_Section):
-    """What is brought to one scale before it is learned from, see `algorithms.normalization`.
+    """Observations and rewards that are scaled before learning, see `algorithms.normalization`.
 
     Attributes:
-        observations: each by its running mean and deviation.
-        rewards: by the running deviation of the discounted return.
+        observations: whether each is scaled by its running mean and deviation.
+        rewards: whether they are scaled by the running deviation of the discounted return.
         clip_observations: the largest absolute value of a normalized observation.
         clip_rewards: the largest absolute value of a normalized reward.
     """
@@ -85,12 +85,12 @@ class Normalize(_Section):
 
 
 class Algorithm(_Section):
-    """What learns.
+    """The learning algorithm.
 
     Attributes:
-        name: one of the table of algorithms.
-        hyperparameters: what differs from its defaults there.
-        normalize: what is normalized; None: nothing.
+        name: a name in the table of algorithms.
+        hyperparameters: values that differ from that table's defaults.
+        normalize: which values are normalized; None: none.
     """
 
     name: str = "DQN"
@@ -99,15 +99,15 @@ class Algorithm(_Section):
 
 
 class Evaluation(_Section):
-    """How often the policy is measured, on how many episodes, and when that is enough.
+    """How often and on how many episodes the policy is evaluated, and the success rate that ends training.
 
     Attributes:
-        every_steps: environment steps between two evaluations; 0: none.
-        episodes: episodes of one evaluation, of all evaluating simulators together.
+        every_steps: environment steps between two evaluations; 0: no evaluations.
+        episodes: episodes of one evaluation, shared among all evaluating simulators.
         stop_at_success_rate: training ends when this share (0 to 1) succeeds, in an evaluation and then in
             its confirmation.
-        confirm_episodes: episodes of a confirmation; 0: none; None: `CONFIRM_EPISODES`, and no field in the
-            file, since a trainer of a5276f3 refuses it.
+        confirm_episodes: episodes of a confirmation; 0: no confirmation; None: `CONFIRM_EPISODES`. None is
+            left out of the file, since a trainer of a5276f3 refuses the field.
     """
 
     every_steps: Annotated[int, Field(ge=0)] = 2500
@@ -117,12 +117,12 @@ class Evaluation(_Section):
 
     @property
     def confirming(self) -> int:
-        """Episodes of a confirmation; 0: none."""
+        """Episodes of a confirmation; 0: no confirmation."""
         return CONFIRM_EPISODES if self.confirm_episodes is None else self.confirm_episodes
 
 
 class Checkpoint(_Section):
-    """How often a resumable state is saved, and how many of the newest are kept."""
+    """How often a checkpoint is saved, and how many of the newest are kept."""
 
     every_steps: Positive = 5000
     keep: Positive = 3
@@ -132,9 +132,9 @@ class Recycle(_Section):
     """When a healthy simulator is restarted between episodes: at the first limit that it reaches.
 
     Attributes:
-        after_resets: so many resets after it came into use.
-        after_minutes: so many minutes after it came into use.
-        above_memory_bytes: when all of its processes together have more than this.
+        after_resets: resets since it came into use.
+        after_minutes: minutes since it came into use; time as a standby does not count.
+        above_memory_bytes: memory of all of its processes together.
     """
 
     after_resets: Positive | None = None
@@ -143,7 +143,7 @@ class Recycle(_Section):
 
 
 class Restart(_Section):
-    """How many faults of one simulator are borne: `limit` restarts within any `within_seconds`."""
+    """The faults that one simulator may have: `limit` restarts within any `within_seconds`."""
 
     limit: Annotated[int, Field(ge=0)] = 10
     within_seconds: Annotated[float, Field(gt=0)] = 600
@@ -155,14 +155,14 @@ class SimulatorConfiguration(_Section):
     Attributes:
         name: `<group>-<index>`, unique in the file.
         role: Collect gathers experience, Evaluate measures the policy.
-        min_simulators: how many of its group are enough to go on with; None: all of them.
+        min_simulators: how many simulators of its group the run needs to continue; None: all of them.
         control: address of its sidecar's control port.
         driver: how it is started: stub, webots or command.
         options: its command-line options.
         world: path of its generated world.
         names_prefix: readable start of the ROS names of its robots.
-        standby: its sidecar has a second simulator, which stands by for this one.
-        start_deadline_seconds: it must have answered this long after its start.
+        standby: whether its sidecar has a second simulator that stands by for this one.
+        start_deadline_seconds: seconds within which it must answer after its start.
     """
 
     name: str
@@ -182,16 +182,16 @@ class SimulatorConfiguration(_Section):
 
 
 class Configuration(_Section):
-    """Everything one replica needs to know; the resolved TrainingJob for it.
+    """The complete configuration of one replica: the resolved TrainingJob for it.
 
     Attributes:
-        seed: the job's seed plus the replica's index; every other seed follows from it.
-        device: where the model lives; cuda: on the GPU that the job asked for, if PyTorch sees one.
-        steps: valid environment steps that the run lasts, of all simulators together.
-        resume_from: the run directory of another job; a run that has no checkpoint of its own goes on
-            from the newest one there.
-        stall_deadline_seconds: without an environment step for this long, the run is given up.
-        command: a program of the user's that replaces the built-in loop; not used here.
+        seed: the job's seed plus the replica's index; all other seeds are derived from it.
+        device: device of the model; cuda: the GPU that the job requested, if PyTorch finds one.
+        steps: valid environment steps of the whole run, all simulators together.
+        resume_from: the run directory of another job; a run without a checkpoint of its own resumes from
+            the newest checkpoint there.
+        stall_deadline_seconds: the run fails after this long without an environment step.
+        command: the user's own program that replaces the built-in loop; not used here.
         status_address: `host:port` of /metrics, /status and /healthz.
     """
 
@@ -228,10 +228,10 @@ class Configuration(_Section):
 
 
 def load(path: Path | None = None) -> Configuration:
-    """Return the configuration in `path`, or in the file that PALAESTRA_CONFIG names.
+    """Return the configuration in `path`, or by default in the file that PALAESTRA_CONFIG names.
 
     Raises:
-        ConfigurationError: no such file, not YAML, or wrong; one line for each mistake.
+        ConfigurationError: the file is missing, not YAML, or wrong; one line for each mistake.
     """
     chosen = path or _path_of_environment(os.environ)
     try:
@@ -265,13 +265,13 @@ def parse(content: object, *, source: str = "training.yaml") -> Configuration:
 
 
 def dump(configuration: Configuration) -> str:
-    """Return the YAML text that `load` reads as an equal configuration."""
+    """Return YAML text from which `load` reads an equal configuration."""
     content = configuration.model_dump(mode="json", by_alias=True, exclude_none=True)
-    return yaml.safe_dump(content, sort_keys=False)  # ASCII: some characters are line ends to YAML
+    return yaml.safe_dump(content, sort_keys=False)  # ASCII: YAML takes some other characters for line ends
 
 
 def nearest(word: str, known: Mapping[str, object] | list[str]) -> str:
-    """Return the remedy for a name nobody knows: the nearest known one, or all of them."""
+    """Return the remedy for an unknown name: the most similar known name, or all of them."""
     close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
     return f"did you mean {close[0]}?" if close else f"use one of {', '.join(sorted(known))}"
 
@@ -279,7 +279,7 @@ def nearest(word: str, known: Mapping[str, object] | list[str]) -> str:
 def _path_of_environment(environment: Mapping[str, str]) -> Path:
     name = environment.get(CONFIG_VARIABLE)
     if not name:
-        raise ConfigurationError(f"{CONFIG_VARIABLE}: is not set; let it name the training.yaml of the run")
+        raise ConfigurationError(f"{CONFIG_VARIABLE}: is not set; set it to the path of a training.yaml")
     return Path(name)
 
 

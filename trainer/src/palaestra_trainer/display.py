@@ -1,4 +1,4 @@
-"""What a person sees of a run: a bar on a terminal, a line now and then elsewhere."""
+"""The progress of a run for a person: a bar on a terminal, elsewhere a log line every few seconds."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Display(Protocol):
 
     @property
     def due(self) -> bool:
-        """Whether it is time to show again; cheap, asked at every step."""
+        """Whether it is time to show again; cheap, called at every step."""
         ...
 
     def show(self, status: TrainerStatus) -> None:
@@ -57,7 +57,7 @@ class _Paced:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Nothing has to be put away."""
+        """Do nothing: nothing is open."""
 
     @property
     def due(self) -> bool:
@@ -69,7 +69,7 @@ class _Paced:
 
 
 class Lines(_Paced):
-    """A log line now and then."""
+    """A log line every few seconds."""
 
     def __init__(self, every_s: float = 10.0) -> None:
         super().__init__()

@@ -1,18 +1,18 @@
-"""What can go wrong in a trainer, and whether trying again can help.
+"""The errors of a trainer, and whether a retry can help.
 
 TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
-├── UnreadableAnswer     the ROS master or a node answered with no answer of ROS
+├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
-├── Diverged             a number of the learner's is none; don't retry       exit 81
+├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
 ├── NoSuchSensor         this robot does not have it
-├── NoReading            a robot was asked before its sensors have told anything
-├── Paused               a step was asked for while the simulation is paused
-└── SimulatorFault       one simulator broke; restart it and go on
+├── NoReading            a sensor was read before its first message arrived
+├── Paused               a step was requested while the simulation is paused
+└── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed
     ├── SimulatorHung    it is connected and does not answer in time
-    └── WrongData        it answered, with something that cannot be right
+    └── WrongData        it answered with invalid data
         └── WorldMisfit  its world lacks a device or node that the program needs
 """
 
@@ -24,7 +24,7 @@ FaultKind = Literal["dead", "hung", "wrong_data"]
 
 
 class TrainerError(Exception):
-    """Everything this package raises on purpose."""
+    """The base of all errors that this package raises on purpose."""
 
 
 class ConfigurationError(TrainerError, ValueError):
@@ -32,11 +32,11 @@ class ConfigurationError(TrainerError, ValueError):
 
 
 class MasterLost(TrainerError, ConnectionError):
-    """The ROS master does not answer: names are lost and nothing registers again."""
+    """The ROS master does not answer; its names are lost and nodes do not register again."""
 
 
 class UnreadableAnswer(TrainerError, ValueError):
-    """The ROS master or a node answered with something that is no answer of ROS.
+    """The ROS master or a node answered with an invalid ROS response.
 
     Services and topics raise it as a fault of the simulator that they belong to.
     """
@@ -55,18 +55,18 @@ class NoSuchSensor(TrainerError, NotImplementedError):
 
 
 class NoReading(TrainerError, RuntimeError):
-    """A sensor has told nothing yet; the first readings come with the first period."""
+    """A sensor has sent no reading yet; the first readings arrive with its first sampling period."""
 
 
 class Paused(TrainerError, RuntimeError):
-    """The simulation is paused, and a step would block its controller for ever.
+    """The simulation is paused; a step would block its controller forever.
 
-    A mistake of the caller: the simulator is well, and restarting it cannot help.
+    This is a mistake of the caller: the simulator is healthy, and a restart cannot help.
     """
 
 
 class SimulatorFault(TrainerError):
-    """One simulator broke; it alone is to be restarted.
+    """One simulator failed; restart only that one.
 
     Attributes:
         simulator: the ROS name or group name of the simulator.
@@ -92,14 +92,14 @@ class SimulatorHung(SimulatorFault, TimeoutError):
 
 
 class WrongData(SimulatorFault, ValueError):
-    """It answered with data that cannot be right."""
+    """It answered with invalid data."""
 
     kind = "wrong_data"
 
 
 class WorldMisfit(WrongData):
-    """Its world lacks a device or node that the program needs, by a complete list or a definite answer.
+    """Its world lacks a device or node that the program needs; a complete list or a clear answer shows that.
 
-    A fault like others where the world was right before. Where the second process in a row says so before a
-    run's first step, the configuration is wrong.
+    If an earlier process had a right world, this is a fault like others. If two processes in a row report it
+    before the run's first step, the configuration is wrong.
     """

@@ -1,8 +1,8 @@
-"""Measuring a policy: whole episodes with given seeds, and what came of them.
+"""Evaluate a policy: play whole episodes with given seeds and return their results.
 
-A faulted episode is played again with its seed, by whichever simulator is free,
-so an evaluation always has all of its episodes and two policies are compared on
-the same ones.
+If a fault cuts an episode, a free simulator plays it again with the same seed.
+So an evaluation always has all of its episodes, and two policies are compared
+on the same ones.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from palaestra_trainer.simulators.member import Member
 
 
 class Policy(Protocol):
-    """Whatever chooses an action for an observation; every Stable-Baselines3 model does."""
+    """Anything that chooses an action for an observation; every Stable-Baselines3 model does."""
 
     def predict(
         self,
@@ -42,14 +42,14 @@ class Policy(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
-    """How one episode went.
+    """The result of one episode.
 
     Attributes:
-        seed: the seed it was reset with.
+        seed: seed of its reset.
         total_reward: undiscounted sum of its rewards.
-        length: its environment steps.
-        success: what the environment reported at its end (`info["is_success"]`); None: it reported nothing.
-        outcome: how it ended, in a word of the environment's (`info["outcome"]`); None: it has none.
+        length: number of environment steps.
+        success: the last step's `info["is_success"]`; None: the environment did not report it.
+        outcome: the last step's `info["outcome"]`, a word of the environment; None: it did not report one.
     """
 
     seed: int
@@ -59,7 +59,7 @@ class Episode:
     outcome: str | None = None
 
     def record(self) -> dict[str, Any]:
-        """Return it as a part of a line of evaluations.jsonl, without what was not reported."""
+        """Return the episode as part of a line of evaluations.jsonl, without unreported values."""
         known = {"success": self.success, "outcome": self.outcome}
         return {"seed": self.seed, "return": round(self.total_reward, 4), "length": self.length} | {
             name: value for name, value in known.items() if value is not None
@@ -68,13 +68,13 @@ class Episode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluation:
-    """The episodes of one evaluation, never none, and what it took to play them.
+    """The episodes of one evaluation, at least one, and the faults and time that they took.
 
     Attributes:
         episodes: in the order of their seeds.
         faults: episodes that a fault cut and that were played again.
         steps_lost: steps of those episodes, up to the faults.
-        seconds: wall time of all of them together.
+        seconds: wall time of the whole evaluation.
     """
 
     episodes: tuple[Episode, ...]
@@ -84,17 +84,17 @@ class Evaluation:
 
     @property
     def success_rate(self) -> float | None:
-        """Share of episodes that succeeded, 0 to 1; None: no episode reported whether it did."""
+        """Share of episodes that succeeded, 0 to 1; None: no episode reported its success."""
         return fmean(map(bool, successes)) if (successes := self._successes()) else None
 
     @property
     def success_interval(self) -> SuccessInterval | None:
-        """The 95 % interval around `success_rate`; None as there."""
+        """The 95 % interval around `success_rate`; None if that is None."""
         successes = self._successes()
         return wilson(sum(map(bool, successes)), len(successes)) if successes else None
 
     def _successes(self) -> list[bool | None]:
-        """Return what each episode reported: an environment may report success and never failure."""
+        """Return the success of each episode; an environment may report success and never failure."""
         successes = [episode.success for episode in self.episodes]
         return [] if all(success is None for success in successes) else successes
 
@@ -110,7 +110,7 @@ class Evaluation:
 
     @property
     def score(self) -> tuple[float, float]:
-        """What the best evaluation has most of: success, then return."""
+        """The rank of an evaluation: its success rate, then its mean return; the best has the highest."""
         return (self.success_rate or 0.0, self.mean_return)
 
     def summary(self) -> dict[str, float | int | None]:
@@ -125,7 +125,7 @@ class Evaluation:
         }
 
     def record(self) -> dict[str, Any]:
-        """Return the means, the interval and each episode, as a line of evaluations.jsonl has them."""
+        """Return the means, the interval and each episode, as in a line of evaluations.jsonl."""
         interval = self.success_interval
         return {
             **self.summary(),
@@ -137,13 +137,13 @@ class Evaluation:
 def evaluate(
     policy: Policy, member: Member | Keeper, seeds: Iterable[int], check: Check = go_on
 ) -> Evaluation:
-    """Return how `policy` does in one episode for each of `seeds`, choosing greedily.
+    """Return the evaluation of `policy`, deterministic, in one episode for each of `seeds`.
 
     Args:
-        policy: what chooses the actions.
-        member: the simulator it is played in, or the keeper of one.
-        seeds: at least one; a faulted episode is played again with its own.
-        check: called before each step, and while a simulator is waited for; raises to give the evaluation up.
+        policy: chooses the actions.
+        member: the simulator for the episodes, or the keeper of one.
+        seeds: at least one; an episode that a fault cut is played again with its seed.
+        check: called before each step and during waits for a simulator; raises to cancel the evaluation.
 
     Raises:
         FaultBudgetSpent: the simulator broke more often than its budget allows.
@@ -155,9 +155,9 @@ def evaluate(
 def evaluate_on_all(
     policy: Policy, keepers: Sequence[Keeper], seeds: Iterable[int], check: Check = go_on
 ) -> Evaluation:
-    """Return the same as `evaluate`, with the episodes dealt out to several simulators at once.
+    """Return the same as `evaluate`, with the episodes distributed over several simulators at once.
 
-    One that breaks leaves its episode to the others while it is mended, and if it is given up.
+    If a simulator breaks, another one plays its episode, during the repair and if the simulator is given up.
     """
     started = time.monotonic()
     games = _Games(policy, seeds)
@@ -178,14 +178,14 @@ def evaluate_on_all(
 
 
 class _Games:
-    """The episodes of one evaluation: those to be played, and those that were.
+    """The episodes of one evaluation: those still to play, and those that are complete.
 
-    Each is played by one thread, and put back if it was cut: so whoever is free stays until the last one is
-    over, as it may become its turn again.
+    One thread plays an episode at a time and puts it back if a fault cuts it. So an idle thread stays until
+    the last episode is complete, because it may have to play that one again.
 
     Attributes:
-        faults: episodes that were cut.
-        steps_lost: steps of theirs.
+        faults: number of episodes that were cut.
+        steps_lost: steps of those episodes.
     """
 
     def __init__(self, policy: Policy, seeds: Iterable[int]) -> None:
@@ -198,7 +198,7 @@ class _Games:
 
     @property
     def missing(self) -> int:
-        """How many episodes have not been played to their end."""
+        """Number of episodes that are not complete."""
         return self._wanted - len(self._played)
 
     def in_order(self) -> tuple[Episode, ...]:
@@ -206,7 +206,7 @@ class _Games:
         return tuple(self._played[place] for place in sorted(self._played))
 
     def play_on(self, keeper: Keeper, check: Check) -> None:
-        """Play until none is missing, or the simulator is given up."""
+        """Play until all episodes are complete, or the simulator is given up."""
         while self.missing and not keeper.lost:
             check()
             if work := keeper.under_way:
@@ -257,10 +257,10 @@ def _play_at_once(games: _Games, keepers: Sequence[Keeper], check: Check) -> Non
 
 
 def _play(policy: Policy, keeper: Keeper, seed: int, check: Check, rewards: list[float]) -> Episode:
-    """Play an episode to its end; whatever cuts it, `rewards` has that of each step that was taken."""
+    """Play an episode to its end; if an error cuts it, `rewards` holds the reward of each step until then."""
     observation, _ = keeper.reset(seed, check=check)
     info: dict[str, Any] = {}
-    memory: Any = None  # of a recurrent policy
+    memory: Any = None  # the state of a recurrent policy
     over = False
     while not over:
         check()

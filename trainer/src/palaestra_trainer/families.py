@@ -1,7 +1,7 @@
-"""Every metric of a trainer, by name; `palaestra_trainer.metrics` reads their values.
+"""The definition of every metric of a trainer, by name; `palaestra_trainer.metrics` reads the values.
 
-A run's own go on from attempt to attempt, as they are kept in its checkpoints; those of its simulators
-begin at 0 with each attempt. Which job and which replica is said by whoever scrapes, not here.
+Metrics of the run continue from attempt to attempt, because they are kept in its checkpoints. Metrics of its
+simulators begin at 0 with each attempt. Prometheus adds the labels of job and replica when it scrapes.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from palaestra_sim.protocol.metrics import Family, Label, counter, gauge, histogram
 from palaestra_sim.protocol.status import Cause, FaultKind, SimulatorRole
 
-# Returns have no scale that is known beforehand, and are negative as often as not: so the buckets are
-# the same on both sides of 0, and each is at most two and a half times as wide as the one before.
+# The scale of returns is not known in advance, and they are often negative. So the buckets are the same on
+# both sides of 0, and each is at most two and a half times as wide as the one before.
 DECADES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 RETURNS = (*(-each for each in reversed(DECADES)), 0.0, *DECADES)
 LENGTHS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
@@ -20,7 +20,7 @@ CHECKPOINT_S = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 QUANTILES = (0.0, 0.1, 0.5, 0.9, 1.0)
 RECYCLED = "recycled"
 GIVEN_UP = "given_up"
-# Of what Stable-Baselines3 logs: its own names, without what stands before the slash.
+# The names that Stable-Baselines3 logs, without the part before the slash.
 LOSSES = (
     "loss",
     "policy_loss",
@@ -42,21 +42,21 @@ CAUSE = Label(name="cause", values=(*(kind for kind in FaultKind if kind is not 
 
 STEPS = counter("palaestra_trainer_steps_total", "Valid environment steps so far.")
 TARGET_STEPS = gauge("palaestra_trainer_target_steps", "Steps at which the run ends.")
-STEPS_PER_SECOND = gauge("palaestra_trainer_steps_per_second", "Speed of the last half minute.")
+STEPS_PER_SECOND = gauge("palaestra_trainer_steps_per_second", "Speed over the last 30 seconds.")
 STEPS_LOST = counter(
     "palaestra_trainer_steps_lost_total",
-    "Valid steps played in vain: in episodes that a fault cut, or played again after an interruption.",
+    "Valid steps lost: in episodes that a fault cut, or played again after an interruption.",
 )
 EXTRA_STEPS = counter(
-    "palaestra_trainer_extra_steps_total", "Simulation steps taken because a message had not come."
+    "palaestra_trainer_extra_steps_total", "Simulation steps taken because a message was late."
 )
-IDLE = gauge("palaestra_trainer_idle_seconds", "Since the last environment step of any simulator.")
+IDLE = gauge("palaestra_trainer_idle_seconds", "Seconds since the last environment step of any simulator.")
 STALL_DEADLINE = gauge(
-    "palaestra_trainer_stall_deadline_seconds", "After so many idle seconds the trainer ends itself."
+    "palaestra_trainer_stall_deadline_seconds", "Idle seconds after which the trainer ends as stalled."
 )
 SECONDS = counter(
     "palaestra_trainer_seconds_total",
-    "Wall clock by what it was spent on.",
+    "Wall-clock time by cause.",
     Label(name="cause", values=tuple(Cause)),
 )
 
@@ -72,7 +72,7 @@ RETURN_MEAN = gauge(
 )
 RETURN_QUANTILE = gauge(
     "palaestra_trainer_episode_return_quantile",
-    "Returns of the last 100 training episodes in order: the least, the median, the greatest.",
+    "Quantiles of the returns of the last 100 training episodes: minimum, median, maximum.",
     Label(name="rank", values=tuple(f"{each:g}" for each in QUANTILES)),
 )
 LENGTH = histogram(
@@ -114,7 +114,7 @@ LOSS = gauge(
 )
 EXPLORATION = gauge(
     "palaestra_trainer_exploration",
-    "How much is tried at random: DQN's exploration_rate, SAC's ent_coef, the std of actions that are drawn.",
+    "Amount of exploration: DQN's exploration_rate, SAC's ent_coef, the std of the actions' distribution.",
     Label(name="measure", values=MEASURES),
 )
 LEARNING_RATE = gauge("palaestra_trainer_learning_rate", "Learning rate of the last update.")
@@ -128,46 +128,46 @@ CHECKPOINT_TIME = gauge(
     "Unix time at which this attempt wrote its newest checkpoint.",
 )
 CHECKPOINT_DURATION = histogram(
-    "palaestra_trainer_checkpoint_duration_seconds", "Time that writing a checkpoint took.", CHECKPOINT_S
+    "palaestra_trainer_checkpoint_duration_seconds", "Time to write a checkpoint.", CHECKPOINT_S
 )
 CHECKPOINT_SIZE = gauge(
     "palaestra_trainer_checkpoint_size_bytes",
-    "Files of the newest checkpoint of this attempt, those that it shares with older ones too.",
+    "Size of the newest checkpoint of this attempt, with the files that it shares with older ones.",
 )
 CHECKPOINT_FAILURES = counter(
-    "palaestra_trainer_checkpoint_failures_total", "Checkpoints of this attempt that a full disk refused."
+    "palaestra_trainer_checkpoint_failures_total", "Checkpoints of this attempt not written: disk full."
 )
 
 SIMULATORS = gauge(
-    "palaestra_trainer_simulators", "Simulators by how they stand, as the trainer sees them.", ROLE, STATE
+    "palaestra_trainer_simulators", "Simulators by role and state, as the trainer sees them.", ROLE, STATE
 )
 BUILD = gauge(
     "palaestra_trainer_build_info",
-    "Always 1; the label tells the release.",
+    "Always 1; the label holds the release.",
     Label(name="version", bound="release"),
 )
 
 FAULTS = counter(
     "palaestra_simulator_faults_total",
-    "Faults that the trainer met; `slow` counts steps that took too long, which are no faults.",
+    "Faults that the trainer detected; `slow` counts steps that took too long, which are not faults.",
     SIMULATOR,
     KIND,
 )
 RESTARTS = counter(
     "palaestra_simulator_restarts_total",
-    "Restarts by the fault that they mended; recycled: a healthy one, for its wear.",
+    "Restarts by the fault that caused them; recycled: of a healthy simulator, at a recycling limit.",
     SIMULATOR,
     CAUSE,
 )
 BUDGET = gauge(
     "palaestra_simulator_restart_budget_spent_ratio",
-    "Share of restart.limit that was spent within restart.withinSeconds; 1: the next fault is the last.",
+    "Share of restart.limit spent within restart.withinSeconds; at 1, the next fault is final.",
     SIMULATOR,
 )
 RESETS = counter("palaestra_simulator_resets_total", "Episodes begun, in training and evaluation.", SIMULATOR)
 STEP_DURATION = histogram(
     "palaestra_simulator_step_duration_seconds",
-    "Time from asking for an environment step to having it, without what was done for other simulators.",
+    "Time from the request for an environment step to its result, without work for other simulators.",
     STEP_S,
     SIMULATOR,
 )

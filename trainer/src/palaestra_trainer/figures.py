@@ -1,4 +1,4 @@
-"""What an attempt has come to that only /metrics shows; nothing of it is kept for the next attempt."""
+"""Figures of one attempt that only /metrics shows; they are not kept for the next attempt."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ def _successes() -> deque[bool]:
 
 @dataclass(slots=True)
 class Figures:
-    """Written by training's thread, read by any.
+    """Written by the training thread, read by any thread.
 
     Attributes:
-        returns: of training episodes.
-        lengths: of training episodes, in steps.
-        successes: whether each of the last training episodes succeeded, where its environment says so.
-        evaluations: how many there were.
-        evaluation: the last one; None before it.
-        saves: seconds that writing each checkpoint took.
-        saved_at: Unix time of the newest checkpoint; None before it.
-        saved_bytes: size of its files; None before it.
-        saves_refused: checkpoints that could not be written.
-        logged: what the learner logged last, by its name in TensorBoard.
-        meters: what each simulator has done, by its name.
+        returns: returns of training episodes.
+        lengths: lengths of training episodes, in steps.
+        successes: success of each of the last training episodes, if the environment reports it.
+        evaluations: number of evaluations.
+        evaluation: the last evaluation; None before the first.
+        saves: seconds to write each checkpoint.
+        saved_at: Unix time of the newest checkpoint; None before the first.
+        saved_bytes: size of its files; None before the first.
+        saves_refused: number of checkpoints that could not be written.
+        logged: the values that the learner logged last, by their names in TensorBoard.
+        meters: the counts of each simulator, by its name.
     """
 
     returns: Tally = field(default_factory=families.RETURN.tally)
@@ -65,13 +65,13 @@ class Figures:
         self.evaluations += 1
 
     def saved(self, seconds: float, size_bytes: int) -> None:
-        """Count a checkpoint of so many bytes, which took so many seconds."""
+        """Count a checkpoint with its size and the time it took to write."""
         self.saves.observe(seconds)
         self.saved_at, self.saved_bytes = time.time(), size_bytes
 
 
 class Logged(KVWriter):
-    """An output of Stable-Baselines3's logger: what TensorBoard is told, `figures` know too."""
+    """An output of Stable-Baselines3's logger: gives `figures` the values that TensorBoard gets."""
 
     def __init__(self, figures: Figures) -> None:
         self._figures = figures
@@ -79,9 +79,9 @@ class Logged(KVWriter):
     def write(
         self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0
     ) -> None:
-        """Remember the newest value of each name."""
+        """Keep the newest value of each name."""
         del key_excluded, step
         self._figures.logged = {**self._figures.logged, **key_values}
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: nothing is open."""

@@ -1,8 +1,8 @@
-"""What the wall clock of a run was spent on.
+"""Account for the wall clock of a run, by cause.
 
-A ledger with one entry a cause. Every second since it was opened belongs to exactly one of them, so
-that they add up to the wall clock. Only the thread that opened it spends: what others do meanwhile,
-such as mending one simulator of several, costs the run nothing that it waits for.
+Every second since the start is booked on exactly one cause, so the causes add up to the wall clock. Only the
+thread that created the ledger books time. Work of other threads, such as the repair of one of several
+simulators, does not delay the run, so it is not booked.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ TRAINING = (Cause.STEPPING, Cause.TRANSPORT, Cause.LEARNING)
 
 
 class Goodput:
-    """The ledger of one attempt, which begins with starting.
+    """The ledger of one attempt; it begins with the cause `starting`.
 
-    A vector step is spent on transport; of that, what the thread waited for simulators is stepping.
+    A vector step is booked on transport, except the time that the thread waited for simulators, which is
+    booked on stepping.
 
     Args:
-        clock: tells seconds, from any origin.
-        waited: tells the seconds that the calling thread has waited for simulators, from any origin.
+        clock: returns seconds, from any origin.
+        waited: returns the seconds that the calling thread has waited for simulators, from any origin.
     """
 
     def __init__(
@@ -42,12 +43,12 @@ class Goodput:
 
     @property
     def cause(self) -> Cause:
-        """What time is spent on now."""
+        """The cause that time is booked on now."""
         return self._cause
 
     @contextmanager
     def spending(self, cause: Cause) -> Iterator[None]:
-        """Spend the time inside on `cause`, but for what an inner one takes; other threads spend nothing."""
+        """Book the time inside on `cause`, except that of inner contexts; no effect in other threads."""
         if threading.get_ident() != self._owner:
             yield
             return
@@ -58,14 +59,14 @@ class Goodput:
             self._turn_to(before)
 
     def in_vain(self) -> None:
-        """What the step under way waited, it waited for a broken simulator."""
+        """Count this step's wait as recovering, not as stepping."""
         self._in_vain |= threading.get_ident() == self._owner
 
     def seconds(self) -> dict[str, float]:
-        """Return the seconds spent on each cause so far; may be called from any thread.
+        """Return the seconds booked on each cause so far; may be called from any thread.
 
-        They add up to the wall clock, without a step that is under way: how it is to be shared out is
-        known at its end only, and no cause may ever shrink.
+        They add up to the wall clock without the current step. How to divide that step among the causes is
+        known only at its end, and no cause may ever decrease.
         """
         with self._lock:
             seconds = dict(self._seconds)
@@ -74,7 +75,7 @@ class Goodput:
         return {cause.value: spent for cause, spent in seconds.items()}
 
     def _turn_to(self, cause: Cause) -> Cause:
-        """Book the time since the last turn; return the cause it was spent on."""
+        """Book the time since the last call and switch to `cause`; return the previous cause."""
         with self._lock:
             before, now, waited = self._cause, self._clock(), self._waited()
             spent = now - self._since
@@ -89,6 +90,6 @@ class Goodput:
 
 
 def trained_share(seconds: Mapping[str, float]) -> float | None:
-    """Return which part of the wall clock trained, 0 to 1; None before any time was spent."""
+    """Return the share of the wall clock that trained, 0 to 1; None before any time was booked."""
     total = sum(seconds.values())
     return sum(seconds.get(cause, 0.0) for cause in TRAINING) / total if total > 0 else None

@@ -1,11 +1,11 @@
-"""Being asked to end: SIGTERM and SIGINT.
+"""Handle SIGTERM and SIGINT.
 
-The first signal is noted, and the run ends at the next place where it looks: at
-a boundary with a checkpoint, or while simulators start, when there is nothing
-to save, without waiting for one to come up. Nothing is raised out of the
-handler itself: it may run amid a lock's release. What is waited for meanwhile
-is waited for `patience.LEFT_S` seconds more. A second signal ends the
-process at once, and so does one that comes before the run listens.
+The first signal is recorded. The run ends where it next checks for it: at a
+boundary with a checkpoint, or, while simulators start, at once and without a
+checkpoint, because there is nothing to save. The handler itself raises nothing,
+because it may run while a lock is released. Waits that are under way may last
+`patience.LEFT_S` seconds more. A second signal ends the process at once, and so
+does a signal that arrives before the run listens.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ Check = Callable[[], None]
 
 
 def go_on() -> None:
-    """Check nothing."""
+    """Do nothing."""
 
 
 class Interrupted(TrainerError):
-    """A signal asked the run to end; it can go on later."""
+    """A signal interrupted the run; it can be resumed later."""
 
 
 @contextmanager
 def leaving_when_asked() -> Iterator[None]:
-    """Let a signal end the process at once as interrupted, wherever inside no `Interruption` listens.
+    """Let a signal end the process at once as interrupted, except while an `Interruption` listens.
 
-    For the seconds of its imports: it would die of the signal, or as the first process of a container
-    not notice it, though there is nothing to save yet.
+    It covers the seconds of imports. Without it the signal would kill the process, or, if the process is the
+    first of a container, have no effect, although there is nothing to save yet.
     """
     before = {number: signal.signal(number, _leave) for number in SIGNALS}
     try:
@@ -52,15 +52,15 @@ def leaving_when_asked() -> Iterator[None]:
 
 def _leave(number: int, frame: FrameType | None) -> None:
     del frame
-    os.write(2, f"{signal.Signals(number).name}: ending; nothing was begun\n".encode())
+    os.write(2, f"{signal.Signals(number).name}: ending; nothing was started\n".encode())
     os._exit(ExitCode.INTERRUPTED)
 
 
 class Interruption:
-    """Listens to the signals while it is entered; only from the main thread.
+    """Listens to the signals while it is entered; use it only in the main thread.
 
     Attributes:
-        requested: the signal that came; None so far.
+        requested: the signal that arrived; None until then.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class Interruption:
         self._before: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> Self:
-        """Begin to listen."""
+        """Install the signal handlers."""
         self._before = {number: signal.signal(number, self._note) for number in SIGNALS}
         return self
 
@@ -78,13 +78,13 @@ class Interruption:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put back who listened before."""
+        """Restore the previous handlers."""
         for number, before in self._before.items():
             signal.signal(number, before)
         patience.renew()
 
     def check(self) -> None:
-        """Raise Interrupted if a signal has come."""
+        """Raise Interrupted if a signal has arrived."""
         if self.requested is not None:
             raise Interrupted(f"{self.requested.name} received")
 
@@ -94,5 +94,5 @@ class Interruption:
         patience.end()
         for later in SIGNALS:
             signal.signal(later, signal.SIG_DFL)
-        # Not by a logger: this may run amid another line of it.
+        # Not by a logger: this may run while the logger writes a line.
         os.write(2, f"{self.requested.name}: ending; {HURRY}\n".encode())

@@ -1,4 +1,4 @@
-"""How far a share of a few episodes may be from the true one."""
+"""The confidence interval of a success rate that was measured on a few episodes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ CONFIDENCE = 0.95
 def wilson(successes: int, episodes: int) -> SuccessInterval:
     """Return the Wilson score interval of a success rate, rounded to four decimals.
 
-    Unlike the normal approximation it stays within 0 and 1, and has a width also where all or no episodes
+    Unlike the normal approximation, it stays within 0 and 1, and has a width even if all or no episodes
     succeed. Source: Wilson (1927), Journal of the American Statistical Association 22.
 
     Raises:
-        ValueError: there is no episode, or more successes than episodes.
+        ValueError: there are no episodes, or more successes than episodes.
     """
     if not 0 <= successes <= episodes or episodes == 0:
         raise ValueError(f"{successes} of {episodes} episodes: not a share")

@@ -1,8 +1,8 @@
-"""What a run has come to since its last checkpoint, for the attempt after one that was killed.
+"""The counters of a run since its last checkpoint, for the attempt after one that was killed.
 
-Whoever is killed saves nothing. Its steps are played again, but its time and its faults are over for good;
-so these are written down every few seconds. Nobody waits for the disk: a killed process loses nothing by
-that, and what a dead machine loses was not needed to go on.
+A killed process saves nothing. Its steps are played again, but its time and its faults are not undone, so
+they are written to a file every few seconds. The write does not wait for the disk: a killed process loses
+nothing by that, and a machine that dies loses only data that a resume does not need.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class Journal:
     """One file in a run directory.
 
     Args:
-        path: the file; it need not be there.
-        clock: seconds, of any origin.
+        path: the file; it may be missing.
+        clock: returns seconds, from any origin.
     """
 
     def __init__(self, path: Path, clock: Callable[[], float] = time.monotonic) -> None:
@@ -36,7 +36,7 @@ class Journal:
         self._next = clock() + EVERY_S
 
     def keep(self, progress: Progress) -> None:
-        """Write down where the run stands, if that was not done in the last seconds."""
+        """Write the counters to the file, unless that was done in the last seconds."""
         if self._clock() < self._next:
             return
         content = {"step": progress.step, "counters": progress.counted().to_json()}
@@ -49,9 +49,9 @@ class Journal:
         self._next = self._clock() + EVERY_S
 
     def regained(self, step: int, saved: Counters) -> Counters:
-        """Return the counters of a run that goes on from `step`.
+        """Return the counters of a run that resumes from `step`.
 
-        Those that were `saved` with that step, unless the run went on after it without saving again.
+        They are the `saved` ones of that step, unless the run continued after it without another checkpoint.
         """
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))

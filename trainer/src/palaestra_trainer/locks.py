@@ -1,8 +1,8 @@
-"""Locks between processes of one machine, each on a file, that the kernel frees with their process.
+"""Locks between processes of one machine, each on a file; the kernel releases them when their process ends.
 
-They are POSIX record locks, which a forked process does not inherit. It would inherit those of `flock`, and
-of the libraries above it, but a worker that was forked must neither share its parent's lock nor release it.
-Within one process a record lock excludes nothing, so a set has those of this one.
+They are POSIX record locks, which a forked process does not inherit. It would inherit locks of `flock` and
+of libraries that use it. But a forked worker must neither share its parent's lock nor release it. Within
+one process a record lock does not exclude other threads, so a set keeps the locks of this process.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ class FileLock:
 
     @classmethod
     def acquire(cls, path: Path) -> Self | None:
-        """Return the lock on a file, which is made if it is not there; None: it is held, here or elsewhere.
+        """Return the lock on a file, which is created if missing; None: this or another process holds it.
 
         Raises:
             OSError: the file cannot be written.
         """
         with _held_lock:
             mine = (os.getpid(), path)
-            if mine in _held:  # to open and close the file once more would free the lock
+            if mine in _held:  # to open and close the file again would release the lock
                 return None
             descriptor = _locked(path)
             if descriptor is None:
@@ -44,11 +44,11 @@ class FileLock:
 
     @property
     def held(self) -> bool:
-        """Whether this process holds it; a process that was forked since does not."""
+        """Whether this process holds it; a process forked since does not."""
         return self._descriptor is not None and self._owner == os.getpid()
 
     def release(self) -> None:
-        """Free the lock; safe to repeat, without effect in a forked process."""
+        """Release the lock; safe to repeat, without effect in a forked process."""
         with _held_lock:
             if self.held and self._descriptor is not None:
                 os.close(self._descriptor)

@@ -1,6 +1,6 @@
-"""How log lines look: constant message, values as fields, on standard error.
+"""The format of log lines: constant message, values as fields, on standard error.
 
-The last ones are kept: a pod's log dies with it, and its termination message does not.
+The last lines are kept for the termination message, because a pod's log is deleted with the pod.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _last_lines: deque[str] = deque(maxlen=MOST_LINES)
 
 
 def configure_logs() -> None:
-    """Write log lines to whatever standard error is at that moment; a progress bar replaces it."""
+    """Write log lines to the current standard error; a progress bar replaces it."""
     structlog.configure(
         processors=[
             structlog.processors.add_log_level,
@@ -30,7 +30,7 @@ def configure_logs() -> None:
 
 
 def last_lines() -> tuple[str, ...]:
-    """Return the last lines that were logged, the newest last; waits for nobody."""
+    """Return the last lines that were logged, the newest last; never blocks."""
     return tuple(_last_lines)
 
 

@@ -1,4 +1,4 @@
-"""Measuring a saved model on the evaluating simulators of a configuration."""
+"""Evaluate a saved model on the evaluating simulators of a configuration."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ def measure(
     episodes: int,
     stream: str,
 ) -> dict[str, Any]:
-    """Return how the model of a run directory does in the first `episodes` episodes of a stream of seeds.
+    """Return the evaluation of a run directory's model, in the first `episodes` episodes of a seed stream.
 
-    Of the configuration's simulators only the evaluating ones are made and started.
+    Only the configuration's evaluating simulators are created and started.
 
     Raises:
-        ConfigurationError: there is no such model, it doesn't fit, or nothing evaluates.
+        ConfigurationError: the model is missing or does not fit, or no simulator evaluates.
         FaultBudgetSpent: a simulator broke more often than its budget allows.
     """
     evaluating = configuration.with_role("Evaluate")
     if not evaluating:
         raise ConfigurationError("simulators: none has role Evaluate; give one of them that role")
     if not model.exists():
-        raise ConfigurationError(f"{model}: is not there; train first, or name another folder")
+        raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
     use_threads()
     only = configuration.model_copy(update={"simulators": evaluating})
     with ExitStack() as stack:

@@ -1,7 +1,7 @@
-"""The run in Prometheus' words.
+"""Export the state of a run as Prometheus metrics.
 
-Nothing is counted here: at each scrape the numbers are read from `Progress`, so that /metrics and /status
-can't differ. Every family is always there, and has no value while it is not known.
+Nothing is counted here: each scrape reads `Progress`, so that /metrics and /status cannot differ. Every
+family is always present, and has no value while its value is unknown.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.figures import Figures
 from palaestra_trainer.progress import Counters, Progress
 
-# What is read of Stable-Baselines3's log: the value of a label, and the name it is logged under.
+# For each value of the label, the name under which Stable-Baselines3 logs it.
 LOSSES = MappingProxyType({name: f"train/{name}" for name in families.LOSSES})
 MEASURES = MappingProxyType(
     {"exploration_rate": "rollout/exploration_rate", "ent_coef": "train/ent_coef", "std": "train/std"}
@@ -32,7 +32,7 @@ LEARNING_RATE = "train/learning_rate"
 
 
 def constants(configuration: Configuration) -> dict[Family, Values]:
-    """Return what does not change while a run lasts."""
+    """Return the metrics that do not change during a run."""
     return {
         families.CHECKPOINT_INTERVAL: _one(configuration.checkpoint.every_steps),
         families.STALL_DEADLINE: _one(configuration.stall_deadline_seconds),
@@ -40,11 +40,11 @@ def constants(configuration: Configuration) -> dict[Family, Values]:
 
 
 def registry(progress: Progress, known: Mapping[Family, Values] = MappingProxyType({})) -> CollectorRegistry:
-    """Return a registry of its own with everything that is known of a run, and of this process.
+    """Return a new registry with the metrics of a run and of this process.
 
     Args:
-        progress: where the run stands.
-        known: what `constants` returned.
+        progress: state of the run.
+        known: the result of `constants`.
     """
     made = CollectorRegistry()
     made.register(_RunCollector(progress, known))
@@ -147,7 +147,7 @@ def _simulators(figures: Figures) -> dict[Family, Values]:
 
 
 def _one(value: float | None) -> Values:
-    """Return the value of a family without labels; None: it is not known."""
+    """Return the value of a family without labels; None: unknown."""
     return {} if value is None else {(): value}
 
 
@@ -156,7 +156,7 @@ def _logged(logged: Mapping[str, float], names: Mapping[str, str]) -> Values:
 
 
 def _quantiles(values: Sequence[float]) -> Values:
-    """Return the value at each of `QUANTILES`, the nearest one that there is."""
+    """Return the value nearest to each of `QUANTILES`."""
     ordered = sorted(values)
     last = len(ordered) - 1
     return {(f"{share:g}",): ordered[round(share * last)] for share in families.QUANTILES if ordered}

@@ -1,7 +1,7 @@
-"""How long simulators may still be waited for, all together, once the run is asked to end.
+"""How long the run may still wait for simulators, all together, after a signal asked it to end.
 
-Each call has a deadline of its own, but a run may have sixteen simulators that hang, and its grace period
-is one. A signal handler lets patience end: a number is set, and nothing is raised amid a call.
+Each call has its own deadline. But sixteen simulators of a run may hang, and the run has one grace period.
+A signal handler limits the waits by setting a number; it raises nothing in the middle of a call.
 """
 
 from __future__ import annotations
@@ -9,24 +9,24 @@ from __future__ import annotations
 import math
 import time
 
-# Half of the default grace period is the checkpoint's, and a call under way may last its deadline twice.
+# The checkpoint needs half of the default grace period, and a pending call may last twice its deadline.
 LEFT_S = 10.0
 
 _over_at = math.inf
 
 
 def end(after_s: float = LEFT_S) -> None:
-    """Let no wait begin after so many seconds from now."""
-    global _over_at  # noqa: PLW0603 - one process has one end
+    """Let no wait begin later than `after_s` seconds from now."""
+    global _over_at  # noqa: PLW0603 - a process ends once
     _over_at = time.monotonic() + after_s
 
 
 def renew() -> None:
-    """Wait as long as each call's deadline says."""
+    """Remove the limit: each call waits for its own deadline again."""
     global _over_at  # noqa: PLW0603 - as above
     _over_at = math.inf
 
 
 def is_over() -> bool:
-    """Return whether answers that are not there yet are not to be waited for."""
+    """Return whether the time for waits is over."""
     return time.monotonic() > _over_at

@@ -1,4 +1,4 @@
-"""A trained policy for observations as they are, with what its environment was made with."""
+"""A trained policy that takes unnormalized observations, and the settings of its environment."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Policy:
     """A policy with its normalizer.
 
     Attributes:
-        model: Stable-Baselines3's, which learned from normalized observations.
+        model: the Stable-Baselines3 model, which learned from normalized observations.
         environment_id: name of the environment that it learned in.
-        environment_options: keyword arguments of that environment, beside robot and scene.
+        environment_options: keyword arguments of that environment, without robot and scene.
         scale: mean, variance, clip and epsilon of the observations; None: they are not normalized.
     """
 
@@ -54,7 +54,7 @@ class Policy:
 
 
 def load_policy(run_or_zip: str | Path) -> Policy:
-    """Return the policy of a run directory, or of a zip of a model in one.
+    """Return the policy of a run directory, or of a model zip inside one.
 
     Stable-Baselines3 unpickles the zip, so load only files that you trust.
 
@@ -64,7 +64,7 @@ def load_policy(run_or_zip: str | Path) -> Policy:
     path = Path(run_or_zip)
     model = RunDirectory(path).model if path.is_dir() else path
     if not model.is_file():
-        raise ConfigurationError(f"{model}: is not there; train first, or name another folder")
+        raise ConfigurationError(f"{model}: does not exist; train first, or give another run directory")
     configuration = load(RunDirectory(model.parent).configuration)
     environment = configuration.environment
     return Policy(

@@ -1,8 +1,7 @@
-"""How far the run is: the one place that knows, for everybody who shows it.
+"""The progress of a run, in one place, for everything that shows it.
 
-The training loop, the VecEnv and the evaluations tell it what happens, each
-from its own thread; /status, /metrics, the display, the summary and the
-watchdog ask it.
+The training loop, the VecEnv and the evaluations report to it, each from its
+own thread. /status, /metrics, the display, the summary and the watchdog read it.
 """
 
 from __future__ import annotations
@@ -46,16 +45,16 @@ PHASES: Mapping[Cause, str] = MappingProxyType(
 
 @dataclass(slots=True)
 class Counters:
-    """What is counted over all attempts of a run, and therefore kept in its checkpoints.
+    """The counts over all attempts of a run, which its checkpoints therefore keep.
 
     Attributes:
         episodes: collected episodes that ended without a fault.
-        faults: by kind: dead, hung, wrong_data; and slow, which breaks nothing.
+        faults: by kind: dead, hung, wrong_data; and slow, which is not a fault.
         restarts: of simulators, after faults.
         recycled: restarts of healthy simulators.
-        given_up: simulators that the run went on without.
-        extra_steps: simulation steps taken because a message had not come.
-        steps_lost: valid steps played in vain, see `TrainerStatus`.
+        given_up: simulators that the run continued without.
+        extra_steps: simulation steps taken because a message was late.
+        steps_lost: valid steps that were lost, see `TrainerStatus`.
         goodput: seconds spent, by cause.
     """
 
@@ -75,7 +74,7 @@ class Counters:
 
     @property
     def broken(self) -> int:
-        """Faults of all kinds; being slow is none."""
+        """Number of faults of all kinds except slow."""
         return self.faults.total() - self.faults[FaultKind.SLOW]
 
     def to_json(self) -> dict[str, Any]:
@@ -92,18 +91,18 @@ class Counters:
 
 
 class Progress:
-    """Where a run stands; a `Watcher` of its simulators. All methods may be called from any thread.
+    """The state of a run; a `Watcher` of its simulators. All methods may be called from any thread.
 
     Attributes:
         step: valid environment steps so far, over all attempts.
         target: steps at which the run ends.
-        counters: what is counted over all attempts, but for the time of this one: see `counted`.
-        success_rate: that of this attempt's last evaluation or confirmation; None before it, or where the
+        counters: counts over all attempts; the time of this attempt is missing, see `counted`.
+        success_rate: of this attempt's last evaluation or confirmation; None before the first, or if the
             environment reports no success.
-        success_interval: around it; None as there.
-        checkpoint: the newest checkpoint; None without one.
-        attempt: this one's number in the run directory's record; None before it is recorded.
-        figures: what is counted in this attempt only.
+        success_interval: the interval around it; None if it is None.
+        checkpoint: the newest checkpoint; None if there is none.
+        attempt: this attempt's number in the run directory; None before it is recorded.
+        figures: counts of this attempt only.
     """
 
     def __init__(
@@ -131,26 +130,26 @@ class Progress:
 
     @property
     def phase(self) -> str:
-        """What the run does now: starting, training, evaluating, saving, recovering, recycling."""
+        """The run's activity now: starting, training, evaluating, saving, recovering or recycling."""
         return PHASES.get(self._goodput.cause, "training")
 
     @property
     def awaits_simulators(self) -> bool:
-        """Whether the run waits for simulators now, and nothing else."""
+        """Whether the run waits for simulators now, and for nothing else."""
         return self._goodput.cause in {Cause.TRANSPORT, Cause.RECOVERING, Cause.RECYCLING}
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """Spend the time inside on `cause`, see `Goodput`."""
+        """Book the time inside the context on `cause`, see `Goodput`."""
         return self._goodput.spending(cause)
 
     def stepped(self, steps: int) -> None:
-        """Some simulator took environment steps, in training or evaluation."""
+        """Count environment steps of any simulator, in training or evaluation."""
         del steps
         self._moved = self._clock()
         self._moved_at = time.time()
 
     def resumed(self, step: int, counters: Counters) -> None:
-        """The run goes on from the checkpoint at `step`: whoever asks is told so from now on."""
+        """Continue from the checkpoint at `step`: report its step and counters from now on."""
         self.step = step
         self.counters = replace(counters, faults=Counter(counters.faults))
         self.saved(step)
@@ -161,11 +160,11 @@ class Progress:
             return list(self._returns)
 
     def recall(self, returns: Sequence[float]) -> None:
-        """Know the returns of the last episodes before this attempt."""
+        """Restore the returns of the last episodes before this attempt."""
         self._returns.extend(returns)
 
     def fault(self, simulator: str, fault: SimulatorFault) -> None:
-        """Count a fault of a simulator, which is down from now on."""
+        """Count a fault of a simulator and mark it as down."""
         with self._lock:
             self.counters.faults[fault.kind] += 1
             self._goodput.in_vain()
@@ -180,34 +179,34 @@ class Progress:
             )
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """Count a step that took much longer than others; nothing is broken by it."""
+        """Count a step that took much longer than others; it is not a fault."""
         del seconds
         with self._lock:
             self.counters.faults[FaultKind.SLOW] += 1
             self._standings.was_slow(simulator)
 
     def flapping(self, simulator: str) -> None:
-        """A simulator breaks again and again."""
+        """Mark a simulator that fails repeatedly as flapping."""
         with self._lock:
             self._standings.flaps(simulator)
 
     def given_up(self, simulator: str) -> None:
-        """Count a simulator that won't come back; the run goes on without it."""
+        """Mark a simulator as given up; the run continues without it."""
         with self._lock:
             self.counters.given_up += 1
             self._standings.gave_up(simulator)
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Let `ask`, which any thread may call, tell how the simulator's spare is."""
+        """Set the function that returns the state of the simulator's spare; any thread may call it."""
         self._standings.has_standby(simulator, ask)
 
     def started(self, simulator: str) -> None:
-        """A simulator is up for the first time in this attempt."""
+        """Mark a simulator as up, for the first time in this attempt."""
         with self._lock:
             self._standings.is_up(simulator)
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
-        """Count a restart of a simulator, which is up from now on."""
+        """Count a restart of a simulator and mark it as up."""
         with self._lock:
             self._standings.is_up(simulator)
             if recycled:
@@ -218,7 +217,7 @@ class Progress:
                 self._standings.restarted(simulator)
 
     def collected(self, step: int, infos: Sequence[Mapping[str, Any]]) -> None:
-        """Training is at `step`, after a vector step with these infos."""
+        """Set the step of training, and count a vector step by its infos."""
         with self._lock:
             self.step = step
             for info in infos:
@@ -236,7 +235,7 @@ class Progress:
                     self._samples.popleft()
 
     def evaluated(self, evaluation: Evaluation) -> None:
-        """The policy was evaluated."""
+        """Record an evaluation of the policy."""
         with self._lock:
             self.success_rate = evaluation.success_rate
             self.success_interval = evaluation.success_interval
@@ -244,11 +243,11 @@ class Progress:
         self.figures.evaluated(evaluation)
 
     def saved(self, step: int) -> None:
-        """A checkpoint was written."""
+        """Record that a checkpoint was written."""
         self.checkpoint = CheckpointStatus(step=step, time=timestamp(time.time()))
 
     def counted(self, kept: int | None = None) -> Counters:
-        """Return the counters as they are now, or as they will be if the run goes on from step `kept`."""
+        """Return the counters as they are now, or as they will be if the run resumes from step `kept`."""
         lost = 0 if kept is None else max(self.step - kept, 0)
         with self._lock:
             so_far, before = self.counters, self.counters.goodput
@@ -263,7 +262,7 @@ class Progress:
             )
 
     def scalars(self) -> dict[str, float]:
-        """Return what is drawn over the steps, by its name in TensorBoard."""
+        """Return the values to plot over the steps, by their names in TensorBoard."""
         counters = self.counted()
         faults = {f"simulators/faults_{kind}": counters.faults[kind] for kind in FaultKind}
         spent = {f"goodput/{cause}_s": seconds for cause, seconds in counters.goodput.items()}
@@ -280,23 +279,23 @@ class Progress:
             return self._standings.faults_by_kind()
 
     def restarts_by_cause(self) -> Mapping[tuple[str, ...], int]:
-        """Return the restarts in this attempt by simulator and cause: the fault that they mended, or wear."""
+        """Return the restarts in this attempt by simulator and cause: a kind of fault, or recycling."""
         with self._lock:
             return self._standings.restarts_by_cause()
 
     def restarts(self) -> int:
         """Return the restarts of simulators after faults, in this attempt.
 
-        Waits for nobody: the watchdog asks when the others hang.
+        Never blocks: the watchdog calls it while other threads hang.
         """
         return self._standings.restarts()
 
     def faults(self) -> tuple[FaultRecord, ...]:
-        """Return the last faults of this attempt, the newest last; waits for nobody."""
+        """Return the last faults of this attempt, the newest last; never blocks."""
         return tuple(self._standings.faults)
 
     def down(self) -> list[str]:
-        """Return the names of the simulators that are not up; waits for nobody."""
+        """Return the names of the simulators that are not up; never blocks."""
         return self._standings.down()
 
     def idle_s(self) -> float:
@@ -304,7 +303,7 @@ class Progress:
         return self._clock() - self._moved
 
     def steps_per_second(self) -> float | None:
-        """Return the speed of the last half minute; None before a second has passed."""
+        """Return the speed over the last 30 seconds; None before a second has passed."""
         with self._lock:
             if len(self._samples) < 2:  # noqa: PLR2004 - a speed needs two points
                 return None
@@ -312,7 +311,7 @@ class Progress:
             return (self.step - before) / max(self._clock() - then, 1e-9)
 
     def status(self) -> TrainerStatus:
-        """Return what /status tells."""
+        """Return the content of /status."""
         speed, counters = self.steps_per_second(), self.counted()
         with self._lock:
             return TrainerStatus(

@@ -1,7 +1,7 @@
-"""Bringing simulators back to where a checkpoint was made.
+"""Bring simulators back to the state of a checkpoint.
 
-A simulator cannot be saved. Its episode is played again: reset with the same seed, then the same actions.
-Whether that came to the same is seen by the last observation; what did not is told, and is gone on from.
+A simulator cannot be saved. Instead its episode is played again: a reset with the same seed, then the same
+actions. The last observation is compared; a mismatch is logged and training continues from it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ log = structlog.get_logger(__name__)
 
 
 def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
-    """Return the state after each simulator was brought to where it was, or as near to it as it comes.
+    """Return the state after each simulator was brought back to the saved state, or as near as possible.
 
-    One that was broken then, breaks now, or is new in the run begins its next episode.
+    A simulator that was broken at the save, breaks now, or is new in the run begins its next episode.
     """
     before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
     observation = np.asarray(env.resume(before))
@@ -44,7 +44,7 @@ def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
 
 
 def _tell(begun: np.ndarray, observation: np.ndarray, saved: State) -> None:
-    """Warn of simulators that went on with their episode and came to something else."""
+    """Warn of simulators that replayed their episode and reached another observation."""
     rows = zip(begun, observation, saved.observation, strict=False)
     different = sum(not new and not np.array_equal(now, was) for new, now, was in rows)
     if different:
@@ -57,17 +57,17 @@ def _tell(begun: np.ndarray, observation: np.ndarray, saved: State) -> None:
 
 
 def _resized(values: np.ndarray, length: int) -> np.ndarray:
-    """Return as many values, those that are missing 0."""
+    """Return `length` values: missing ones are 0."""
     return np.concatenate([values, np.zeros(length, dtype=values.dtype)])[:length]
 
 
 def _returns_left(saved: State, begun: np.ndarray) -> np.ndarray | None:
-    """Return the discounted rewards of the episodes that go on, if they matter."""
+    """Return the discounted rewards of the episodes that continue; None: they are not needed."""
     known = saved.running_returns
     return None if known is None else np.where(begun, 0.0, _resized(known, len(begun)))
 
 
 def _terms_left(saved: State, begun: np.ndarray) -> list[dict[str, float]]:
-    """Return the sums of reward terms of the episodes that go on."""
+    """Return the sums of reward terms of the episodes that continue."""
     known = [*saved.rollout["terms"], *[{}] * len(begun)]
     return [{} if new else terms for new, terms in zip(begun, known, strict=False)]

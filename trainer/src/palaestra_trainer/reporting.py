@@ -1,7 +1,7 @@
-"""How far a program of one's own is (`trainer.command`), for /status, /metrics and the operator.
+"""Reports of a user's own training program (`trainer.command`), for /status, /metrics and the operator.
 
-The built-in loop reports by itself. Without a report the operator knows no step of a program, so it cannot
-see that attempts which are preempted come forward, and ends the replica as `NoProgress`.
+The built-in loop reports by itself. Without reports the operator does not see a program's steps. It then
+cannot detect progress between preempted attempts, and ends the replica as `NoProgress`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _lock = threading.Lock()
 
 
 class _Reported(Progress):
-    """Where a program of one's own stands; what its time is spent on is not known."""
+    """The progress of a user's own program; how it spends its time is unknown."""
 
     @property
     def phase(self) -> str:
@@ -33,11 +33,11 @@ class _Reported(Progress):
 
 
 def report(step: int, success_rate: float | None) -> None:
-    """Report as `palaestra_trainer.report` says."""
+    """Report as `palaestra_trainer.report` describes."""
     if step < 0:
-        raise ValueError(f"step: {step} is negative; give the environment steps that were learned from")
+        raise ValueError(f"step: {step} is negative; give the number of environment steps learned from")
     if success_rate is not None and not 0 <= success_rate <= 1:
-        raise ValueError(f"success_rate: {success_rate} is no share; give a number from 0 to 1")
+        raise ValueError(f"success_rate: {success_rate} is not a share; give a number from 0 to 1")
     if not os.environ.get(CONFIG_VARIABLE):
         return
     with _lock:
@@ -53,7 +53,7 @@ def report(step: int, success_rate: float | None) -> None:
 
 @cache
 def _served() -> _Reported:
-    """Return the progress of this process, served from the first call on until the process ends."""
+    """Return the progress of this process; the first call starts the status server."""
     configuration = load()
     progress = _Reported(configuration.steps, [])
     StatusServer(configuration.status_address, progress, constants(configuration)).start()

@@ -1,4 +1,4 @@
-"""What belongs to one attempt of a run, for the parts of the training loop that share it."""
+"""The objects of one attempt of a run that the parts of the training loop share."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Run:
     """One attempt of a run, whose simulators are up.
 
     Attributes:
-        configuration: what is trained.
-        directory: where the run is kept.
-        fleet: its simulators.
-        progress: how far it is.
-        interruption: raises once a signal has come.
+        configuration: the configuration of the run.
+        directory: the run directory.
+        fleet: the simulators.
+        progress: the progress of the run.
+        interruption: raises after a signal has arrived.
         display: shows the progress to a person.
     """
 

@@ -1,8 +1,8 @@
-"""The folder of one run on its volume: what is in it, and how it is written.
+"""The folder of one run on its volume: its files, and how they are written.
 
-It says by itself what was run and can be resumed. Whole files are replaced
-atomically (temporary name, fsync, rename, fsync of the folder); lines are
-appended with fsync. So whatever kills a trainer, each file is old or new.
+The folder alone is enough to see what was run and to resume it. Whole files are
+replaced atomically (temporary name, fsync, rename, fsync of the folder); lines
+are appended with fsync. So after a crash each file is either old or new.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ RUN_VARIABLE = "PALAESTRA_RUN"
 
 
 class RunDirectory:
-    """One run directory, which need not be there yet.
+    """One run directory; it may be missing.
 
     Attributes:
         path: the folder itself.
@@ -30,37 +30,37 @@ class RunDirectory:
 
     @property
     def attempts(self) -> Path:
-        """One JSON line an attempt."""
+        """One JSON line per attempt."""
         return self.path / "attempts.jsonl"
 
     @property
     def checkpoints(self) -> Path:
-        """A folder a checkpoint, named by its step."""
+        """One folder per checkpoint, named by its step."""
         return self.path / "checkpoints"
 
     @property
     def configuration(self) -> Path:
-        """What was run."""
+        """The configuration of the run."""
         return self.path / "training.yaml"
 
     @property
     def evaluations(self) -> Path:
-        """One JSON line an evaluation."""
+        """One JSON line per evaluation."""
         return self.path / "evaluations.jsonl"
 
     @property
     def hyperparameters(self) -> Path:
-        """All hyperparameters that the run began with, also those that its job left out."""
+        """All hyperparameters that the run began with, including defaults."""
         return self.path / "hyperparameters.json"
 
     @property
     def confirmations(self) -> Path:
-        """One JSON line a confirmation of an evaluation."""
+        """One JSON line per confirmation of an evaluation."""
         return self.path / "confirmations.jsonl"
 
     @property
     def journal(self) -> Path:
-        """Where the run stood some seconds ago, which matters if it is killed."""
+        """The counters of some seconds ago, used after a kill."""
         return self.path / "journal.json"
 
     @property
@@ -70,7 +70,7 @@ class RunDirectory:
 
     @property
     def summary(self) -> Path:
-        """What the run came to; there once it is finished."""
+        """The result of the run; the file exists once the run is finished."""
         return self.path / "summary.json"
 
     @property
@@ -79,7 +79,7 @@ class RunDirectory:
         return self.path / "tensorboard"
 
     def begin_attempt(self, pod_uid: str, reason: str) -> int:
-        """Record that an attempt begins; return its number, counted from 1."""
+        """Record the start of an attempt; return its number, counted from 1."""
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         append_line(self.attempts, {"pod": pod_uid, "started": started, "reason": reason})
         return sum(1 for _ in read_lines(self.attempts))
@@ -95,7 +95,7 @@ def append_line(path: Path, content: dict[str, Any]) -> None:
 
 
 def read_lines(path: Path) -> Iterator[dict[str, Any]]:
-    """Yield the JSON lines of a file that may be absent; a line torn by a crash is left out."""
+    """Yield the JSON lines of a file that may be missing; skip a line that a crash truncated."""
     if not path.exists():
         return
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -106,7 +106,7 @@ def read_lines(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def drop_lines(path: Path, unwanted: Callable[[dict[str, Any]], bool]) -> None:
-    """Replace a file of JSON lines, which may be absent, by one without the unwanted lines."""
+    """Remove the unwanted lines from a file of JSON lines, which may be missing."""
     lines = list(read_lines(path))
     kept = [line for line in lines if not unwanted(line)]
     if len(kept) < len(lines):
@@ -115,10 +115,10 @@ def drop_lines(path: Path, unwanted: Callable[[dict[str, Any]], bool]) -> None:
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Replace `path` by what `write` writes to the temporary name it is given.
+    """Replace `path` by the file that `write` writes to a temporary name.
 
     Raises:
-        OSError: it could not be written; what was there before is untouched.
+        OSError: the file could not be written; the old file is unchanged.
     """
     with temporary(path) as name:
         write(name)
@@ -129,7 +129,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def temporary(path: Path) -> Iterator[Path]:
-    """Lend a name beside `path`, with its suffix; remove what is left under it at the end."""
+    """Yield a temporary name beside `path`, with its suffix; remove a file of that name at the end."""
     name = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         yield name

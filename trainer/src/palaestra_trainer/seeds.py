@@ -1,10 +1,9 @@
-"""The seed of every episode: a pure function of what the episode is.
+"""The seed of every episode: a pure function of the episode's stream and number.
 
-A process that died and came back plays the same episodes as one that lived,
-because no seed depends on a process's life. Each stream (collecting,
-evaluating, confirming, and any name a person gives to `palaestra-eval --seeds`)
-draws from its own sequence, so that a policy is never chosen on episodes it is
-measured on.
+A run that was killed and resumed plays the same episodes as one that was not,
+because no seed depends on the process. Each stream (collecting, evaluating,
+confirming, and any name given to `palaestra-eval --seeds`) has its own sequence
+of seeds, so that a policy is never evaluated on the episodes that selected it.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 
 COLLECT = "collect"
 EVALUATE = "A"
-CONFIRM = "C"  # B is what `palaestra-eval` measures on
+CONFIRM = "C"  # `palaestra-eval` uses B by default
 
 
 def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> int:
@@ -24,8 +23,8 @@ def episode_seed(run_seed: int, stream: str, simulator: int, episode: int) -> in
 
     Args:
         run_seed: the replica's seed, not negative.
-        stream: what the episode is for.
-        simulator: index of the simulator among those of its role; 0 when
+        stream: the purpose of the episode.
+        simulator: index of the simulator among those of its role; 0 if
             several share one stream, as evaluators do.
         episode: its number, counted from 0 over the whole run.
     """

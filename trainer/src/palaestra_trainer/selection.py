@@ -1,8 +1,9 @@
-"""Which policy of a run is its best, and whether that is good enough to stop.
+"""Select the best policy of a run, and decide whether it is good enough to stop.
 
-The best of many evaluations on the same few episodes looks better than it is, and so does the first that
-reaches a goal. So both are confirmed: measured once more, on episodes of another stream. Each confirmation
-plays the next episodes of that stream; otherwise a policy would be chosen by them after enough attempts.
+The best of many evaluations on the same few episodes looks better than it is. So does the first evaluation
+that reaches a goal. Therefore both are confirmed: evaluated once more, on episodes of another stream. Each
+confirmation plays the next episodes of that stream; otherwise, after many confirmations, the stream itself
+would select a policy.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ _BEST = "evaluation.json"  # a member of model.zip
 
 
 class Enough(TrainerError):
-    """The wanted success rate is reached; the run is done."""
+    """The policy has reached the wanted success rate; the run is done."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Best:
-    """The evaluation that model.zip is from.
+    """The evaluation of the policy in model.zip.
 
     Attributes:
         step: valid environment steps that the policy had learned from.
@@ -53,7 +54,7 @@ class Best:
 
     @property
     def score(self) -> tuple[float, float]:
-        """What the best evaluation has most of, as `Evaluation.score`."""
+        """The rank, as in `Evaluation.score`; the best evaluation has the highest."""
         return (self.success_rate or 0.0, self.mean_return)
 
     @classmethod
@@ -68,11 +69,11 @@ class Best:
 
 
 class Selection:
-    """Evaluates the model of a run, keeps the best policy in model.zip, and confirms what it claims.
+    """Evaluates the model of a run, keeps the best policy in model.zip, and confirms its success rate.
 
     Args:
-        run: its evaluating simulators play; its collecting ones rest meanwhile.
-        model: whose policy is evaluated; it has its logger already.
+        run: its evaluating simulators play; its collecting ones are paused meanwhile.
+        model: the model to evaluate; its logger must be set.
     """
 
     def __init__(self, run: Run, model: BaseAlgorithm) -> None:
@@ -83,18 +84,18 @@ class Selection:
 
     @property
     def measures(self) -> bool:
-        """Whether anything is evaluated in this run."""
+        """Whether this run has evaluations."""
         return self._run.configuration.evaluation.every_steps > 0 and bool(self._run.fleet.evaluating)
 
     def evaluate(self, step: int) -> None:
-        """Evaluate the policy as it is at `step`, and keep it if it is the best one so far.
+        """Evaluate the current policy, and keep it if it is the best so far; `step` is the current step.
 
-        Its line is written last, so that one that was cut, or whose confirmation was, is repeated.
+        The evaluation's line is written last. So an evaluation is repeated if it or its confirmation is cut.
 
         Raises:
             Enough: the goal of the run is reached, and confirmed unless that is turned off.
             ConfigurationError: there is a goal, and the environment reports no success.
-            Interrupted: a signal has come.
+            Interrupted: a signal has arrived.
         """
         wanted = self._run.configuration.evaluation
         evaluation = self._measure(EVALUATE, wanted.episodes)
@@ -108,10 +109,10 @@ class Selection:
             raise Enough(f"{_in_words(self._run.progress)} at step {step}")
 
     def finish(self, step: int) -> None:
-        """Confirm the best policy at the end of training, at `step`; without evaluations write the last one.
+        """Confirm the best policy at the end of training; without evaluations save the last policy.
 
         Raises:
-            Interrupted: a signal has come.
+            Interrupted: a signal has arrived.
         """
         if not self._directory.model.exists():
             replace_file(self._directory.model, lambda path: checkpoint.save_tensors(path, self._model))
@@ -125,8 +126,8 @@ class Selection:
     def _confirmed(self, evaluation: Evaluation, goal: float, step: int) -> bool:
         if evaluation.success_rate is None:
             raise ConfigurationError(
-                "evaluation.stopAtSuccessRate: the environment reports no success; let the info of an "
-                "episode's last step have is_success, or remove stopAtSuccessRate"
+                "evaluation.stopAtSuccessRate: the environment reports no success; set is_success in the "
+                "info of an episode's last step, or remove stopAtSuccessRate"
             )
         if evaluation.success_rate < goal:
             return False
@@ -136,7 +137,7 @@ class Selection:
         return confirmation.success_rate is not None and confirmation.success_rate >= goal
 
     def _confirm(self, step: int, now: int) -> Evaluation:
-        """Measure the model, whose policy is that of `step`, on the next episodes of the stream."""
+        """Evaluate the model, whose policy is that of `step`, on the next episodes of the stream."""
         before = sum(int(line["episodes"]) for line in read_lines(self._directory.confirmations))
         evaluation = self._measure(CONFIRM, self._run.configuration.evaluation.confirming, before)
         self._log("confirm", now, evaluation, of_step=step)
@@ -182,7 +183,7 @@ class Selection:
 
     @contextmanager
     def _acting_as_best(self, best: Best, step: int) -> Iterator[None]:
-        """Let the model be that of model.zip inside; its checkpoint may be written after."""
+        """Load the policy of model.zip into the model inside; its checkpoint may be written after."""
         if best.step == step:
             yield
             return
@@ -198,9 +199,9 @@ class Selection:
 
 
 def best_of(directory: RunDirectory) -> Best | None:
-    """Return the evaluation that model.zip is from; None: it is from none.
+    """Return the evaluation of the policy in model.zip; None: it has none.
 
-    A model.zip of a release up to a5276f3 does not say: it is from the best line of evaluations.jsonl.
+    A model.zip of a release up to a5276f3 does not hold it; then it is the best line of evaluations.jsonl.
     """
     if not directory.model.exists():
         return None
@@ -218,16 +219,16 @@ def confirmation_of(directory: RunDirectory, step: int) -> dict[str, Any] | None
 
 
 def last_evaluated(directory: RunDirectory, step: int) -> int:
-    """Return the step of the last evaluation up to `step`; 0 without one.
+    """Return the step of the last evaluation up to `step`; 0 if there is none.
 
-    One that was due there but cut short is not among them, so that a resumed attempt makes up for it.
+    An evaluation that was due but cut is not in the file, so a resumed attempt repeats it.
     """
     steps = (int(line["step"]) for line in read_lines(directory.evaluations))
     return max((each for each in steps if each <= step), default=0)
 
 
 def forget_after(directory: RunDirectory, step: int) -> None:
-    """Drop the evaluations after `step`, where the run goes on, and the confirmations that follow none."""
+    """Drop evaluations after `step`, from which the run resumes, and confirmations without an evaluation."""
     drop_lines(directory.evaluations, lambda line: line["step"] > step)
     evaluated = last_evaluated(directory, step)
     drop_lines(directory.confirmations, lambda line: line["confirmed_at"] > evaluated)

@@ -1,4 +1,4 @@
-"""How each simulator of a run stands, and what the last faults were. Not locked: `Progress` is."""
+"""The state of each simulator of a run, and the last faults. Not locked: `Progress` holds the lock."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from palaestra_sim.protocol.status import MOST_FAULTS, FaultKind, FaultRecord, S
 from palaestra_trainer.configuration import Role
 from palaestra_trainer.families import RECYCLED
 
-FLAPPING_S = 600.0  # a simulator that nobody has called flapping for so long is steady again
+FLAPPING_S = 600.0  # a simulator is steady again this long after the last call of `flaps`
 AskStandby = Callable[[], str | None]
 
 
 def _none() -> None:
-    """Return the state of a spare that isn't there."""
+    """Return the state of a spare that does not exist."""
 
 
 @dataclass(slots=True)
@@ -33,10 +33,10 @@ class _Standing:
 
 
 class Standings:
-    """What is known of the simulators in this attempt.
+    """The state of the simulators in this attempt.
 
     Attributes:
-        faults: the last ones, the newest last.
+        faults: the last faults, the newest last.
     """
 
     def __init__(self, simulators: Iterable[tuple[str, Role]], clock: Callable[[], float]) -> None:
@@ -45,7 +45,7 @@ class Standings:
         self.faults: deque[FaultRecord] = deque(maxlen=MOST_FAULTS)
 
     def broke(self, fault: FaultRecord) -> None:
-        """A simulator is down from now on."""
+        """Record a fault and mark its simulator as down."""
         self.faults.append(fault)
         standing = self._all[fault.simulator]
         standing.state, standing.last_fault, standing.last_kind = "failed", fault.fact, fault.kind
@@ -56,11 +56,11 @@ class Standings:
         self._all[simulator].faults[FaultKind.SLOW] += 1
 
     def is_up(self, simulator: str) -> None:
-        """A simulator is up from now on."""
+        """Mark a simulator as up."""
         self._all[simulator].state = "ready"
 
     def restarted(self, simulator: str) -> None:
-        """Count a restart of a simulator, which mended its last fault."""
+        """Count a restart of a simulator, by its last fault."""
         standing = self._all[simulator]
         standing.restarts[standing.last_kind] += 1
 
@@ -69,16 +69,16 @@ class Standings:
         self._all[simulator].recycled += 1
 
     def flaps(self, simulator: str) -> None:
-        """A simulator breaks again and again."""
+        """Mark a simulator that fails repeatedly as flapping."""
         self._all[simulator].flapped = self._clock()
 
     def gave_up(self, simulator: str) -> None:
-        """A simulator won't come back."""
+        """Mark a simulator as given up."""
         standing = self._all[simulator]
         standing.state, standing.given_up = "failed", True
 
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
-        """Let `ask`, which any thread may call, tell how the simulator's spare is."""
+        """Set the function that returns the state of the simulator's spare; any thread may call it."""
         self._all[simulator].standby = ask
 
     def restarts(self) -> int:
@@ -86,15 +86,15 @@ class Standings:
         return sum(standing.restarts.total() for standing in self._all.values())
 
     def down(self) -> list[str]:
-        """Return the names of those that are not up, but for those that were given up."""
+        """Return the names of the simulators that are not up, without those that were given up."""
         return [name for name, each in self._all.items() if each.state != "ready" and not each.given_up]
 
     def statuses(self) -> tuple[SimulatorStatus, ...]:
-        """Return what /status tells of each."""
+        """Return the status of each simulator for /status."""
         return tuple(self._status(name, standing) for name, standing in self._all.items())
 
     def faults_by_kind(self) -> dict[tuple[str, ...], int]:
-        """Return how many faults each simulator had of each kind."""
+        """Return the number of faults by simulator and kind."""
         return {
             (name, kind.value): standing.faults[kind]
             for name, standing in self._all.items()
@@ -102,7 +102,7 @@ class Standings:
         }
 
     def restarts_by_cause(self) -> dict[tuple[str, ...], int]:
-        """Return how often each simulator was restarted, by the fault that it mended, or for its wear."""
+        """Return the number of restarts by simulator and cause: a kind of fault, or recycling."""
         mended: dict[tuple[str, ...], int] = {
             (name, kind.value): standing.restarts[kind]
             for name, standing in self._all.items()

@@ -1,4 +1,4 @@
-"""/status, /metrics and /healthz of a trainer."""
+"""The HTTP server of a trainer for /status, /metrics and /healthz."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ READ_DEADLINE_S = 5.0
 
 
 class StatusServer:
-    """Answers while it is entered.
+    """Answers requests while it is entered.
 
     Args:
         address: `host:port`; port 0 takes a free one.
-        progress: what is told.
+        progress: the state of the run.
         known: metrics that do not change, see `metrics.constants`.
 
     Raises:
-        ConfigurationError: the address is taken, or not one of this machine.
+        ConfigurationError: the address is in use, or does not belong to this machine.
     """
 
     def __init__(
@@ -54,16 +54,16 @@ class StatusServer:
 
     @property
     def address(self) -> str:
-        """Where it listens, as `host:port`."""
+        """The address on which it listens, as `host:port`."""
         host, port = self._server.server_address[:2]
         return f"{host!s}:{port}"
 
     def start(self) -> None:
-        """Begin to answer, until the process ends or the context is left."""
+        """Begin to answer requests, until the process ends or the context is left."""
         self._thread.start()
 
     def __enter__(self) -> Self:
-        """Begin to answer."""
+        """Begin to answer requests."""
         self.start()
         return self
 
@@ -73,7 +73,7 @@ class StatusServer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Stop answering and free the address."""
+        """Stop answering and release the address."""
         self._server.shutdown()
         self._server.server_close()
 
@@ -101,7 +101,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self.send_error(HTTPStatus.NOT_FOUND)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - http.server's name
-        """Say nothing: probes ask every few seconds."""
+        """Log nothing: probes send a request every few seconds."""
 
     def _answer(self, content_type: str, text: str) -> None:
         body = text.encode()

@@ -1,4 +1,4 @@
-"""What a run came to, as summary.json says it and `palaestra run` prints it."""
+"""The result of a run, as written to summary.json and printed by `palaestra run`."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ from palaestra_trainer.selection import best_of, confirmation_of
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     """Return the summary of a run that has ended.
 
-    `success_rate`, its `success_interval` and `mean_return` are those of the policy
-    in model.zip, which learned for `best_step` steps: from its confirmation, else
-    from its evaluation; null if there was none. Faults and restarts are of all
-    attempts, and so are `duration_s`, the speed that follows from it, and
-    `goodput`, its seconds by cause, of which `trained_share` trained.
+    `success_rate`, its `success_interval` and `mean_return` belong to the policy
+    in model.zip, which learned for `best_step` steps. They come from its
+    confirmation, else from its evaluation; without one they are null. Faults and
+    restarts are of all attempts, and so are `duration_s`, the speed derived from
+    it, and `goodput`, its seconds by cause; `trained_share` is the share of
+    these that trained.
     """
     measured = _measured(directory)
     counters = progress.counted()
@@ -46,7 +47,7 @@ def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
 
 
 def write_summary(directory: RunDirectory, content: dict[str, Any]) -> None:
-    """Write summary.json, by which the run is finished."""
+    """Write summary.json, which marks the run as finished."""
     text = json.dumps(content, indent=2) + "\n"
 
     def write(path: Path) -> None:
@@ -56,7 +57,7 @@ def write_summary(directory: RunDirectory, content: dict[str, Any]) -> None:
 
 
 def finished(directory: RunDirectory, configuration: Configuration) -> dict[str, Any] | None:
-    """Return the summary if the run is finished; None if it is not, or was prolonged since."""
+    """Return the summary of a finished run; None: it is not finished, or its `steps` were raised since."""
     try:
         content = json.loads(directory.summary.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):
@@ -69,7 +70,7 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
 
 
 def _measured(directory: RunDirectory) -> dict[str, Any]:
-    """Return the line that says most of model.zip; empty: it was never evaluated."""
+    """Return the most reliable measurement of model.zip; empty: it was never evaluated."""
     best = best_of(directory)
     if best is None:
         return {}

@@ -1,11 +1,10 @@
-"""The name under which TensorBoard shows a run that lies on a claim.
+"""The link that gives a run on a claim a readable name in TensorBoard.
 
-There a run lies at `<uid>/<replica>`, and a UID means nothing to a reader. TensorBoard names a run by the
-path on which it finds it, so a link `tensorboard/<job>-<first 8 of the UID>/<replica>` at the top of the
-claim leads to the run's curves. The run does not move: resumes, warm starts and `palaestra fetch` find it
-by its UID.
+On a claim, a run is at `<uid>/<replica>`, and a UID means nothing to a reader. TensorBoard names a run by its
+path. So a link `tensorboard/<job>-<first 8 of the UID>/<replica>` at the top of the claim points to the run's
+curves. The run itself stays where it is: resumes, warm starts and `palaestra fetch` find it by its UID.
 
-Training needs no link. An error is logged once and ends nothing.
+Training does not need the link. An error is logged once and does not end the run.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ FOLDER = "tensorboard"  # the chart's value tensorboard.folder has the same defa
 
 
 def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
-    """Make the link, unless it exists or the run lies on no claim.
+    """Create the link, unless it exists or the run is not on a claim.
 
-    `palaestra run` keeps a run at `<dir>/<job>/<replica>`, which names the job without a link.
+    `palaestra run` keeps a run at `<dir>/<job>/<replica>`, which has the job's name without a link.
     """
     run, uid = directory.path, configuration.uid
     if not uid or (run.parent.name, run.name) != (uid, str(configuration.replica)):
@@ -44,10 +43,10 @@ def link_curves(directory: RunDirectory, configuration: Configuration) -> None:
 
 
 def _folder(name: str, parent: int, stack: ExitStack) -> int:
-    """Return the descriptor of a folder in an open folder; a missing one is made.
+    """Return a descriptor of a folder in an open folder; create the folder if it is missing.
 
-    Other jobs write to the claim too. A job that puts a link in the place of a folder must not choose where
-    this process writes, so a link is refused here, and a descriptor stays on the folder that was opened.
+    Other jobs write to the claim too. A job could replace a folder by a link and so choose where this process
+    writes. Therefore a link is refused here; a descriptor always refers to the folder that was opened.
     """
     with suppress(FileExistsError):
         os.mkdir(name, dir_fd=parent)
@@ -57,12 +56,12 @@ def _folder(name: str, parent: int, stack: ExitStack) -> int:
 
 
 def _link(name: str, target: str, folder: int) -> None:
-    """Let `name` in an open folder lead to `target`; replace a link that leads elsewhere.
+    """Make `name` in an open folder a link to `target`; replace a link with another target.
 
-    A link appears whole or not at all. It needs no temporary name, which TensorBoard could show as a run.
+    The link is created atomically. It needs no temporary name, which TensorBoard could show as a run.
 
     Raises:
-        OSError: the file system has no links, or something that is no link has the name.
+        OSError: the file system supports no links, or the name belongs to something that is not a link.
     """
     try:
         os.symlink(target, name, dir_fd=folder)

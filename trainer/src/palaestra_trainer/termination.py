@@ -1,6 +1,6 @@
-"""How a run ends: which exit code stands for which end, and its last word.
+"""The end of a run: its exit code, and its termination message.
 
-The operator reads both, and nothing else, once the container is gone.
+Once the container is gone, the operator can read only these two.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ UNEXPECTED = 1
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """How a run ended.
+    """The end of a run.
 
     Attributes:
         code: exit code of the process.
-        reason: in one word, for programs.
-        message: in a sentence, for people.
+        reason: one word, for programs.
+        message: a sentence, for people.
     """
 
     code: int
@@ -46,7 +46,7 @@ class End:
     message: str
 
 
-# The first that fits counts.
+# The first match counts.
 ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),
@@ -59,7 +59,7 @@ ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
 
 
 def end_of(error: BaseException) -> End:
-    """Return what an error that ended a run means."""
+    """Return the end that an error means for the run."""
     for kind, code, reason in ENDS:
         if isinstance(error, kind):
             return End(code, reason, str(error))
@@ -72,9 +72,9 @@ def end_of(error: BaseException) -> End:
 def write_last_word(
     word: Termination, environment: Mapping[str, str] = os.environ, default: Path = KUBERNETES_LOG
 ) -> None:
-    """Write the termination message where PALAESTRA_TERMINATION_LOG or Kubernetes wants it.
+    """Write the termination message to the file of PALAESTRA_TERMINATION_LOG or of Kubernetes.
 
-    Outside of Kubernetes there is no default file, and none is made.
+    Outside Kubernetes there is no default file, and none is created.
     """
     chosen = environment.get(TERMINATION_VARIABLE)
     if chosen is None and not default.exists():

@@ -1,7 +1,6 @@
 """One attempt of a run, from a configuration to an exit code.
 
-Brings the parts together in the order in which they can fail: what needs no
-simulator is checked before one is started.
+Errors that need no simulator to be found are found before a simulator starts.
 """
 
 from __future__ import annotations
@@ -57,13 +56,13 @@ LOG_INTERVAL = {"DQN": 10, "SAC": 10, "A2C": 50}  # episodes, or rollouts on pol
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """What an attempt finds around it.
+    """The dependencies of an attempt.
 
     Attributes:
-        make_members: makes the simulators of a configuration, not started yet.
-        display: shows where the run stands.
-        must_resume: refuse to begin a new run.
-        environment: the process's environment variables.
+        make_members: creates the simulators of a configuration, not yet started.
+        display: shows the progress of the run.
+        must_resume: never begin a new run.
+        environment: the environment variables of the process.
     """
 
     make_members: MakeMembers
@@ -80,10 +79,10 @@ def run(
     *,
     must_resume: bool = False,
 ) -> int:
-    """Train until done, resuming if the directory has a checkpoint; return the exit code.
+    """Train until done and return the exit code; resume if the directory has a checkpoint.
 
-    A run that is finished is reported, not repeated. Must be called in the main
-    thread, where signals arrive. `must_resume` refuses to begin a new run.
+    If the run is finished, its result is reported and training is not repeated. Call it in the main thread,
+    where signals arrive. With `must_resume` it never begins a new run.
     """
     around = Surroundings(
         make_members=make_members,
@@ -113,14 +112,14 @@ def run(
 
 
 class Learning(NamedTuple):
-    """A model, and the environment that it learns in."""
+    """A model and its environment."""
 
     env: SimulatorsVecEnv
     model: BaseAlgorithm
 
 
 class Attempt:
-    """One attempt, which plays once."""
+    """One attempt; call `play` once."""
 
     def __init__(
         self,
@@ -136,12 +135,12 @@ class Attempt:
         self._algorithm = configuration.algorithm
 
     def play(self) -> End:
-        """Train; return how it ended. Nothing is left running, whatever happens."""
+        """Train, and return how the run ended. It always stops everything that it started."""
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
             with ExitStack() as stack:
                 self._train(*self._prepare(stack))
-        except Exception as error:  # the process's edge: every end has an exit code
+        except Exception as error:  # the edge of the process: every end has an exit code
             end = end_of(error)
             if end.reason == "Unexpected":
                 log.exception("unexpected error")
@@ -163,10 +162,10 @@ class Attempt:
         )
 
     def _prepare(self, stack: ExitStack) -> tuple[Run, Learning, Checkpoint | None]:
-        """Return a run whose simulators are up, what learns in them, and the checkpoint that it goes on from.
+        """Return a run whose simulators are up, its model and environment, and the checkpoint to resume from.
 
-        The model is made before simulators start, since it refuses wrong values and spaces. The attempt is
-        on record before them too: one that they end is an attempt. What was opened is closed by `stack`.
+        The model is created before simulators start, because it refuses wrong values and spaces. The attempt
+        is recorded before they start too, so that it counts if they fail. `stack` closes everything.
         """
         configuration, progress = self._configuration, self._progress
         algorithms.check(configuration.algorithm)
@@ -175,7 +174,7 @@ class Attempt:
         found = self._newest()
         before = RunDirectory(found.path.parent.parent) if found else None
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
-        self._take_over(found)  # before anything is served: a counter that jumps has grown, to Prometheus
+        self._take_over(found)  # before the server starts: Prometheus takes a jump of a counter for growth
         known = constants(configuration)
         stack.enter_context(StatusServer(configuration.status_address, progress, known))
         stack.enter_context(self._around.display)
@@ -201,7 +200,7 @@ class Attempt:
         return run, learning, found
 
     def _make_model(self, fleet: Fleet, interruption: Interruption, stack: ExitStack) -> Learning:
-        """Return a new model in its environment, which no simulator has to be up for."""
+        """Return a new model with its environment; no simulator has to be up."""
         use_threads(self._around.environment)
         wanted = self._configuration
         env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check)
@@ -209,7 +208,7 @@ class Attempt:
         return Learning(env, algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device))
 
     def _take_over(self, found: Checkpoint | None) -> None:
-        """Let the progress go on from that of the attempts before."""
+        """Set the progress to that of the previous attempts."""
         journal = Journal(self._directory.journal)
         if found is None:
             self._progress.counters = journal.regained(0, Counters())
@@ -222,20 +221,20 @@ class Attempt:
         found = checkpoint.newest(self._directory.checkpoints) or self._of_another_run()
         if found is None and self._around.must_resume:
             raise ConfigurationError(
-                f"{self._directory.path}: has no checkpoint to resume from; leave --resume out"
+                f"{self._directory.path}: has no checkpoint to resume from; remove --resume"
             )
         if found:
             checkpoint.refuse_another_run(found, self._configuration)
         return found
 
     def _of_another_run(self) -> Checkpoint | None:
-        """Return the newest checkpoint of the run that is to be gone on from; None: this one is its own."""
+        """Return the newest checkpoint of the run in `resumeFrom`; None: the run has its own checkpoint."""
         another = self._configuration.resume_from
         if another is None:
             return None
         found = checkpoint.newest(RunDirectory(Path(another)).checkpoints)
         if found is None:
-            raise ConfigurationError(f"resumeFrom: {another} has no checkpoint; name the run of another job")
+            raise ConfigurationError(f"resumeFrom: {another} has no checkpoint; give the run of another job")
         return found
 
     def _train(self, run: Run, learning: Learning, found: Checkpoint | None) -> None:
@@ -250,16 +249,16 @@ class Attempt:
         write_summary(self._directory, summarise(self._directory, self._progress))
 
     def _forget_what_is_played_again(self) -> None:
-        """Let evaluations and curves end where the run goes on; the attempt before got further."""
+        """Remove evaluations and curves after the resumed step, which a previous attempt wrote."""
         step, curves = self._progress.step, self._directory.tensorboard
         forget_after(self._directory, step)
         if curves.exists():
-            # TensorBoard leaves out points from this step on in the files that are older than this mark.
+            # In files older than this mark, TensorBoard hides points from this step on.
             with SummaryWriter(str(curves), purge_step=step + 1):  # type: ignore[no-untyped-call]  # as torch has it
                 pass
 
     def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: Checkpoint) -> Resumed:
-        """Bring model and simulators to where the checkpoint was made."""
+        """Bring model and simulators back to the state of the checkpoint."""
         saved = checkpoint.restore(found, model)
         with self._progress.spending(Cause.RECOVERING):
             state = rejoin(env, saved)
@@ -301,7 +300,7 @@ class Attempt:
             conductor.save()
             raise
         except ValueError:
-            # torch's distributions refuse NaN before anybody else sees it.
+            # PyTorch's distributions raise a ValueError for NaN; report divergence instead.
             Learner(model).check(model.num_timesteps)
             raise
 
@@ -316,13 +315,13 @@ class Attempt:
 
 
 def _interval(summary: Mapping[str, Any]) -> SuccessInterval | None:
-    """Return that of a finished run; one of a release up to a5276f3 has none."""
+    """Return the interval in the summary of a finished run; None in one of a release up to a5276f3."""
     interval = summary.get("success_interval")
     return None if interval is None else SuccessInterval.from_json(interval)
 
 
 def use_threads(environment: Mapping[str, str] = os.environ) -> None:
-    """Let torch use as many threads as OMP_NUM_THREADS says, one by default.
+    """Let PyTorch use as many threads as OMP_NUM_THREADS sets, one by default.
 
     Networks of this size are slower on two threads than on one.
     """

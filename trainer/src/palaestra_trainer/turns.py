@@ -1,10 +1,10 @@
-"""Several simulators in one thread: while one of them computes a step, the others get their turn.
+"""Step several simulators in one thread: while one computes a step, the others get their turn.
 
-A step of an environment is one function that sends, waits and reads. So that the waits of many
-environments fall together, each step runs in a greenlet of its own, and gives up its turn between
-asking its simulator for something long and awaiting the answer: `take_turns` runs them, `let_others` is
-where a turn may end. A simulator that has answered is read while the others still compute.
-Threads did the same at twice the processor time: see docs/decisions/0006-turns-instead-of-threads.md.
+A step of an environment is one function that sends, waits and reads. Each step runs in a greenlet of its
+own, so that the waits of many environments overlap. After a greenlet has sent a long request to its
+simulator, it lets the others run before it waits for the answer. `take_turns` runs the greenlets, and
+`let_others` is where a turn may end. The answer of one simulator is read while the others still compute.
+Threads needed twice the processor time for the same: see docs/decisions/0006-turns-instead-of-threads.md.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from greenlet import getcurrent, greenlet
 from palaestra_trainer import patience
 from palaestra_trainer.waits import count_wait
 
-# After this whoever was asked first waits by itself: deadlines, and whose fault it is, are its own business.
-# Longer than a step takes, since that wait counts as its turn; short beside a deadline, which begins then.
+# After this time the first greenlet waits alone; its own deadline and fault attribution then apply. The time
+# is longer than a step, because the wait counts as its turn, and short beside a deadline, which begins then.
 _SOON_MS = 500
 
 
 class Answer(Protocol):
-    """What can be read once an answer has come."""
+    """An object whose descriptor becomes readable when an answer arrives."""
 
     def fileno(self) -> int:
-        """Return the descriptor to be watched."""
+        """Return the descriptor to watch."""
         ...
 
 
 class _Turn(greenlet):
-    """One work of `take_turns` after another: for each new greenlet Python maps memory, and unmaps it later.
+    """A greenlet for the works of `take_turns`; it is reused, because a new one makes Python map memory.
 
     Attributes:
-        work: what it does, or has done.
+        work: the current or last work.
         done: whether it has finished.
-        result: what `work` has returned.
-        failure: what it has raised instead.
-        away_s: seconds that it has spent in others' turns; those in which all wait are nobody's turn.
-        until: the descriptor of the answer that it waits for; None: it can go on.
+        result: the return value of `work`.
+        failure: the exception that it raised instead.
+        away_s: seconds that it spent in others' turns, without the time in which all of them wait.
+        until: the descriptor of the answer that it waits for; None: it can run.
     """
 
     def __init__(self) -> None:
@@ -64,13 +64,13 @@ class _Turn(greenlet):
         return self
 
     def end(self) -> tuple[Any, Exception | None]:
-        """Return what came of the work, and keep nothing of it."""
+        """Return the result and the failure of the work, and drop both."""
         ended = self.result, self.failure
         self.work = self.result = self.failure = None
         return ended
 
     def _do_works(self) -> None:
-        """Do one work, then, when it is switched to again, the next."""
+        """Do one work, and the next one after the next switch."""
         while self.work is not None and self.parent is not None:
             try:
                 self.result = self.work()
@@ -81,7 +81,7 @@ class _Turn(greenlet):
 
 
 class _Idle(threading.local):
-    """Turns of this thread that have nothing to do."""
+    """Turns of this thread without work."""
 
     def __init__(self) -> None:
         self.turns: list[_Turn] = []
@@ -91,10 +91,10 @@ _idle = _Idle()
 
 
 def let_others(until: Answer | None = None) -> None:
-    """Let the others of `take_turns` go on first; alone, this does nothing.
+    """Let the other works of `take_turns` run first; without others, this does nothing.
 
     Args:
-        until: they may go on until this can be read; by default once each.
+        until: the others may run until this can be read; by default each runs once.
     """
     turn = getcurrent()
     if isinstance(turn, _Turn) and turn.parent is not None:
@@ -105,19 +105,19 @@ def let_others(until: Answer | None = None) -> None:
 
 
 def away_s() -> float:
-    """Return the seconds that the work whose turn it is has spent in others' turns, so far."""
+    """Return the seconds that the current work has spent in others' turns so far."""
     turn = getcurrent()
     return turn.away_s if isinstance(turn, _Turn) else 0.0
 
 
 def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
-    """Return what `works` return, in their order; each runs until it lets others, then the next.
+    """Return the results of `works`, in their order; each runs until it calls `let_others`, then the next.
 
-    All of them are finished before the first error is raised, so that none is left in the middle.
+    All works finish before the first error is raised, so that none is left half done.
 
     Raises:
         Exception: of the first work, in their order, that failed.
-        BaseException: from the work whose turn it is, at once; the others are ended where they stand.
+        BaseException: of the current work, at once; the others are stopped where they are.
     """
     turns = [(_idle.turns.pop() if _idle.turns else _Turn()).begin(work) for work in works]
     waiting = turns
@@ -140,7 +140,7 @@ def take_turns(works: Iterable[Callable[[], Any]]) -> list[Any]:
 
 
 def _ready(turns: list[_Turn]) -> list[_Turn]:
-    """Return those who can go on, one at least, in their order; wait if all of them do."""
+    """Return the turns that can run, at least one, in their order; wait if none can."""
     awaited = [turn.until for turn in turns if turn.until is not None]
     if not awaited or len(turns) == 1:
         return turns

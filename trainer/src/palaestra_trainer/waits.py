@@ -1,4 +1,4 @@
-"""How long this thread has waited for simulators: what is left of a step is the trainer's own doing."""
+"""The time that this thread waited for simulators; the trainer itself uses the rest of a step."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _waits = _Waits()
 
 
 def count_wait(seconds: float) -> None:
-    """Add to what the calling thread has waited."""
+    """Add to the wait of the calling thread."""
     _waits.seconds += seconds
 
 

@@ -1,6 +1,6 @@
-"""The end of a run that no longer moves.
+"""End a run that makes no progress.
 
-A thread of its own, because what it watches for is that the others hang.
+The watchdog has a thread of its own, because it detects that other threads hang.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ log = structlog.get_logger(__name__)
 
 
 class Watchdog:
-    """Gives the process up when `idle_s()` reaches `deadline_s` while it is entered.
+    """Ends the process when `idle_s()` reaches `deadline_s` while it is entered.
 
     Args:
-        idle_s: seconds since anything moved.
-        deadline_s: how long that may be.
-        last_word: called before the process ends, to say so.
+        idle_s: returns the seconds since the last progress.
+        deadline_s: the longest time without progress.
+        last_word: called before the process ends, to report it.
         leave: ends the process; takes the exit code.
     """
 
@@ -71,7 +71,7 @@ class Watchdog:
 
 
 def stalled(progress: Progress) -> End:
-    """Return what it means that no environment has stepped for so long; waits for nobody."""
+    """Return the end of a run whose environments have not stepped for the deadline; never blocks."""
     fact = f"no environment step for {progress.idle_s():.0f} s while {progress.phase}"
     if down := progress.down():
         return End(ExitCode.STALLED, "SimulatorHung", f"{fact}; not up: {', '.join(down)}")

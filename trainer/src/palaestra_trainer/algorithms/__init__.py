@@ -1,4 +1,4 @@
-"""What learns: Stable-Baselines3's algorithms, made safe against faults, and REINFORCE."""
+"""The learning algorithms: Stable-Baselines3's, made safe against faults, and REINFORCE."""
 
 from palaestra_trainer.algorithms.kept import begin_with, begun_with, keep
 from palaestra_trainer.algorithms.normalization import normalizer_of, policy_of

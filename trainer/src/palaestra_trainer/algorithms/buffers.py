@@ -1,8 +1,8 @@
-"""Buffers that no invalid row gets into a loss from.
+"""Buffers that keep invalid rows out of every loss.
 
-An invalid row is one whose simulator broke during the step. The episode was
-cut before it: the last valid row counts as truncated, so its value is
-bootstrapped and nobody is punished for a fault.
+A row is invalid if its simulator broke during the step. The episode is cut
+before it: the last valid row counts as truncated, so its value is bootstrapped
+and the fault is no penalty.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
 
 
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-# Large enough that a million rows are some dozens of files, small enough that few steps cost little.
+# With this size a million rows need only some dozens of files, and a few new steps are cheap to write.
 CHUNK_BYTES = 4 << 20
 
 
 class Positions(NamedTuple):
-    """Where a replay buffer stands.
+    """The write positions of a replay buffer.
 
     Attributes:
-        next: row that the next step is stored in.
-        full: whether every row is in use; else those before `next` are.
-        newest: for each member the row of its last step, None without one.
+        next: row for the next step.
+        full: whether every row is in use; if not, the rows before `next` are.
+        newest: for each member the row of its last step; None if it has none.
     """
 
     next: int
@@ -42,15 +42,15 @@ class Positions(NamedTuple):
 
 
 class ValidReplayBuffer(ReplayBuffer):
-    """A replay buffer of valid rows, one after the other, whatever member they came from.
+    """A replay buffer of valid rows, one after the other, of all members.
 
     Storage is flat (one column), so that a step of n members may append fewer
-    than n rows. Rows are kept on disk in chunks, of which only those that
-    changed are written again.
+    than n rows. Rows are kept on disk in chunks; only changed chunks are written
+    again.
 
     Attributes:
         chunk_rows: rows of one chunk; the last one may have fewer.
-        changed: numbers of the chunks that were written to; whoever keeps them elsewhere clears it.
+        changed: numbers of the chunks that were written to; clear it after saving them.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ValidReplayBuffer(ReplayBuffer):
 
     @property
     def positions(self) -> Positions:
-        """Where the buffer stands; set it to go back to where it stood."""
+        """The write positions of the buffer; set it to restore them."""
         return Positions(self.pos, self.full, tuple(self._newest))
 
     @positions.setter
@@ -90,7 +90,7 @@ class ValidReplayBuffer(ReplayBuffer):
         for row, info in enumerate(infos):
             if info.get("valid", True):
                 one = slice(row, row + 1)
-                # In a full buffer this row may have been another member's newest one.
+                # In a full buffer this row may have been the newest one of another member.
                 self._newest = [None if newest == self.pos else newest for newest in self._newest]
                 self._newest[row] = self.pos
                 self.changed.add(self.pos // self.chunk_rows)
@@ -99,14 +99,14 @@ class ValidReplayBuffer(ReplayBuffer):
                 self._truncate(self._newest[row])
 
     def rows(self, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
-        """Return the rows from `start` to `stop` by column, as they lie in memory: views, (rows, 1, ...)."""
+        """Return the rows from `start` to `stop` by column, as they are in memory: views, (rows, 1, ...)."""
         return {name: getattr(self, name)[start:stop] for name in COLUMNS}
 
     def fill(self, start: int, rows: Mapping[str, np.ndarray]) -> None:
-        """Write rows that `rows` returned to their place; where the buffer stands is not changed.
+        """Write rows that `rows` returned back to their place; the write positions do not change.
 
         Raises:
-            ValueError: they are of another shape.
+            ValueError: they have another shape.
         """
         for name in COLUMNS:
             getattr(self, name)[start : start + len(rows[name])] = rows[name]
@@ -138,15 +138,15 @@ class ValidRolloutBuffer(RolloutBuffer):
         super().reset()
 
     def mark(self, valid: np.ndarray) -> None:
-        """Say which rows of the step that is added next are valid; shape (n_envs,)."""
+        """Set which rows of the next added step are valid; shape (n_envs,)."""
         if self.pos < self.buffer_size:
             self.valid[self.pos] = valid
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
-        """Compute them as for a rollout that was truncated before each invalid row.
+        """Compute both as for a rollout that was truncated before each invalid row.
 
-        An invalid row ends its episode. With its own value as reward its error is 0,
-        so that the row before it sees the value of the state they share, and no more.
+        An invalid row ends its episode. Its reward is set to its own value, so its error is 0. Then the row
+        before it uses the value of the state that they share, and nothing else.
         """
         self.rewards[~self.valid] = self.values[~self.valid]
         super().compute_returns_and_advantage(last_values, dones)
@@ -154,7 +154,7 @@ class ValidRolloutBuffer(RolloutBuffer):
     def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
         """Yield minibatches of valid rows in random order; the last one may be smaller."""
         if not self.generator_ready:
-            next(super().get(1))  # lays the rows of all members in one line
+            next(super().get(1))  # flattens the rows of all members into one column
         rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))  # noqa: NPY002 - SB3's generator, which set_random_seed seeds
         size = batch_size or max(len(rows), 1)
         for start in range(0, len(rows), size):

@@ -1,7 +1,7 @@
-"""Where a model's networks live: on the CPU, unless a job asked for a GPU and PyTorch sees one.
+"""The device of a model's networks: the CPU, unless a job asks for a GPU and PyTorch finds one.
 
-The CPU is the default beside a GPU too: networks of some hundred units learn faster there, and only there is
-a run that was interrupted promised to end with the same numbers.
+The CPU is the default even with a GPU. Networks of some hundred units learn faster on it, and only on the
+CPU does a resumed run end with exactly the same numbers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ log = structlog.get_logger(__name__)
 
 
 def usable(wanted: Device) -> Device:
-    """Return the device to use: `wanted`, or the CPU where PyTorch sees no GPU, which is logged."""
+    """Return the device to use: `wanted`, or the CPU if PyTorch finds no GPU, which is logged."""
     if wanted == "cuda" and not torch.cuda.is_available():
         log.warning(
             "PyTorch sees no GPU, so the CPU is used",

@@ -1,4 +1,4 @@
-"""Whole episodes out of the rows of vector steps, and what they returned."""
+"""Collect whole episodes from the rows of vector steps, with their returns."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class Batch:
     """The steps of some whole episodes, one after the other.
 
     Attributes:
-        observations: what was seen, shape (steps, *observation).
-        actions: what was done, before it was clipped to its bounds; shape (steps, *action).
+        observations: the observation before each step, shape (steps, *observation).
+        actions: the action of each step, before it is clipped to its bounds; shape (steps, *action).
         returns: discounted reward from each step to its episode's end, shape (steps,), float32.
     """
 
@@ -35,7 +35,7 @@ class EpisodeRecorder:
 
     Further episodes of an environment that has its number are dropped, and so
     are episodes with an invalid row. An environment whose last row was invalid is
-    away, perhaps for good: the others don't wait for it.
+    absent, perhaps for good: the others do not wait for it.
     """
 
     def __init__(self, environments: int, wanted: int) -> None:
@@ -46,7 +46,7 @@ class EpisodeRecorder:
 
     @property
     def complete(self) -> bool:
-        """Whether every environment has its number of episodes, but for those that are away."""
+        """Whether every environment has its number of episodes, except absent ones."""
         ready = [len(episodes) == self._wanted for episodes in self._whole]
         return any(ready) and all(done or away for done, away in zip(ready, self._away, strict=True))
 

@@ -1,7 +1,7 @@
-"""Image observations: which policy they get, and where their channels lie.
+"""Image observations: their policy, and the order of their channels.
 
 Environments return images with channels last. Stable-Baselines3 transposes them for PyTorch, so its models
-see channels first. What a checkpoint keeps is as environments return it.
+see channels first. A checkpoint keeps them as environments return them.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage, is_vecen
 from palaestra_trainer.configuration import Normalize
 from palaestra_trainer.errors import ConfigurationError
 
-SMALLEST = 36  # pixels of a side that the convolutions of CnnPolicy need
+SMALLEST = 36  # pixels per side that the convolutions of CnnPolicy need
 
 
 def policy_for(space: spaces.Box, normalize: Normalize | None) -> str:
     """Return the name of Stable-Baselines3's policy for observations of a space.
 
     Raises:
-        ConfigurationError: it is of images that the policy for images cannot take.
+        ConfigurationError: they are images that CnnPolicy cannot take.
     """
     if not is_image_space(space):
         return "MlpPolicy"
@@ -42,9 +42,9 @@ def policy_for(space: spaces.Box, normalize: Normalize | None) -> str:
 
 
 def with_channels_first(env: VecEnv) -> VecEnv:
-    """Return an environment whose images have channels first; any other is returned as it is.
+    """Return an environment whose images have channels first; return any other unchanged.
 
-    Stable-Baselines3 would do the same around a normalizer, which would keep another layout than is learned.
+    Stable-Baselines3 would transpose around a normalizer, whose statistics would then have another layout.
     """
     space = env.observation_space
     if isinstance(space, spaces.Box) and is_image_space(space) and not is_image_space_channels_first(space):
@@ -53,13 +53,13 @@ def with_channels_first(env: VecEnv) -> VecEnv:
 
 
 def as_returned(model: BaseAlgorithm, observations: Any) -> np.ndarray:
-    """Return observations that a model saw as its environments returned them."""
+    """Return observations that a model saw in the layout of its environments."""
     seen = np.asarray(observations)
     return np.moveaxis(seen, 1, -1) if _transposes(model) else seen
 
 
 def as_seen(model: BaseAlgorithm, observations: np.ndarray) -> np.ndarray:
-    """Return observations of a model's environments as the model sees them."""
+    """Return observations of a model's environments in the layout that the model sees."""
     return np.moveaxis(observations, -1, 1) if _transposes(model) else observations
 
 

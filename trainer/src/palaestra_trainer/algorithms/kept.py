@@ -1,7 +1,7 @@
-"""The hyperparameters that a run began with: it goes on with them, whatever the defaults are by then.
+"""The hyperparameters that a run began with; it keeps them even if the defaults change later.
 
-They lie in the run directory, all of them. A run that began at a release without that file goes on with
-what that release gave every environment: the arena's, and MlpPolicy also for images.
+All of them are in the run directory. Releases up to a5276f3 wrote no such file; their runs continue with the
+values that those releases gave every environment: the arena's, and MlpPolicy also for images.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from palaestra_trainer.run_directory import RunDirectory, replace_file
 def begin_with(
     configuration: Configuration, directory: RunDirectory, before: RunDirectory | None
 ) -> Algorithm:
-    """Return what an attempt learns with: the algorithm and all its hyperparameters.
+    """Return the algorithm of an attempt with all its hyperparameters.
 
     Args:
         configuration: of the run.
-        directory: of the run; it may not have begun.
-        before: the run whose checkpoint it goes on from, its own or another; None: there is no checkpoint.
+        directory: of the run; the run may not have begun.
+        before: the run whose checkpoint it resumes from, its own or another; None: there is no checkpoint.
 
     Raises:
-        ConfigurationError: what the run directory says cannot be read.
+        ConfigurationError: the file in the run directory cannot be read.
     """
     if directory.hyperparameters.exists() or not (before or directory.attempts.exists()):
         return _kept(configuration, directory) or resolve(
@@ -35,10 +35,10 @@ def begin_with(
 
 
 def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorithm:
-    """Return what a run that has begun learns with.
+    """Return the algorithm of a run that has begun.
 
     Raises:
-        ConfigurationError: what the run directory says cannot be read.
+        ConfigurationError: the file in the run directory cannot be read.
     """
     algorithm = configuration.algorithm
     before = {**ALGORITHMS[algorithm.name].arena, "policy": "MlpPolicy"}
@@ -46,7 +46,7 @@ def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorit
 
 
 def keep(algorithm: Algorithm, directory: RunDirectory) -> None:
-    """Write what a run begins with into its directory, unless it has begun.
+    """Write the algorithm with which a run begins into its directory, unless the run has begun.
 
     Raises:
         OSError: it could not be written.

@@ -1,9 +1,9 @@
-"""Observations and rewards on one scale: Stable-Baselines3's VecNormalize, which learns from valid rows only.
+"""Normalize observations and rewards: Stable-Baselines3's VecNormalize, with statistics of valid rows only.
 
 Observations are shifted and scaled by their running mean and deviation, rewards scaled by the deviation of
-the discounted return. What a fault spoiled reaches no statistic, as it reaches no loss. What is known so far
-is part of a policy: without it the policy cannot be used, so it is kept in the file of the model. Why so:
-docs/decisions/0010-normalize.md.
+the discounted return. Rows that a fault spoiled enter neither a statistic nor a loss. The statistics are
+part of a policy, which cannot be used without them, so they are kept in the file of the model. The reasons
+are in docs/decisions/0010-normalize.md.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from palaestra_trainer.configuration import Normalize
 
 @dataclass(frozen=True, slots=True)
 class Moments:
-    """Mean and variance of what was seen so far, and how often it was seen; nobody writes to the arrays."""
+    """Mean, variance and number of the samples so far; the arrays are never changed."""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -32,15 +32,15 @@ class Moments:
 
     @classmethod
     def of(cls, running: RunningMeanStd) -> Self:
-        """Return those of Stable-Baselines3's statistics, which go on in new arrays."""
+        """Return the moments of Stable-Baselines3's statistics; updates of these replace the arrays."""
         return cls(running.mean, running.var, running.count)
 
     def put_back(self, running: RunningMeanStd) -> None:
-        """Let the statistics go on from here."""
+        """Restore the statistics from these moments."""
         running.mean, running.var, running.count = self.mean, self.variance, self.count
 
     def to_json(self) -> dict[str, Any]:
-        """Return them as JSON data, exactly."""
+        """Return them as JSON data, without loss of precision."""
         return {
             "mean": np.asarray(self.mean).tolist(),
             "variance": np.asarray(self.variance).tolist(),
@@ -49,10 +49,10 @@ class Moments:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any], shape: tuple[int, ...]) -> Self:
-        """Return what `to_json` wrote.
+        """Return the moments from the result of `to_json`.
 
         Raises:
-            KeyError, TypeError, ValueError: it did not write that, or of another shape.
+            KeyError, TypeError, ValueError: the content is not such a result, or of another shape.
         """
         mean, variance = (np.array(content[name], dtype=np.float64) for name in ("mean", "variance"))
         if mean.shape != shape or variance.shape != shape:
@@ -61,16 +61,16 @@ class Moments:
 
 
 class ValidNormalize(VecNormalize):
-    """VecNormalize of rows of which some may be invalid.
+    """VecNormalize for rows of which some may be invalid.
 
     Args:
-        venv: tells by `info["valid"]` False which rows of a step, or of a reset, are invalid.
-        wanted: what is normalized, and where it is clipped.
+        venv: marks the invalid rows of a step or a reset by `info["valid"]` False.
+        wanted: which values to normalize, and where to clip them.
         gamma: discount of the return that rewards are scaled by.
     """
 
     venv: VecEnv
-    obs_rms: RunningMeanStd  # type: ignore[assignment]  # one Box is observed: make_model takes nothing else
+    obs_rms: RunningMeanStd  # type: ignore[assignment]  # observations are one Box: make_model refuses others
 
     def __init__(self, venv: VecEnv, wanted: Normalize, gamma: float) -> None:
         super().__init__(
@@ -84,7 +84,7 @@ class ValidNormalize(VecNormalize):
 
     @property
     def scales(self) -> Mapping[str, Moments]:
-        """What is known of observations and rewards, of each only if it is normalized; set it to go back."""
+        """The statistics of observations and rewards, each only if normalized; set it to restore them."""
         return {name: Moments.of(running) for name, running in self._running().items()}
 
     @scales.setter
@@ -101,11 +101,11 @@ class ValidNormalize(VecNormalize):
         return self._normalized(observations)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Return a step's rows, normalized with what is known after it; the valid ones become known by it."""
+        """Return a step's rows, normalized by statistics that already include its valid rows."""
         rows, rewards, dones, infos = self.venv.step_wait()
         observations, valid = np.asarray(rows), valid_rows(infos)
         self.old_obs, self.old_reward = observations, rewards
-        # Where no episode could begin, what is shown is the end of the last one.
+        # If no episode could begin, the observation is still the last one of the previous episode.
         blind = dones & ~valid_rows(self.unwrapped.reset_infos)
         self._see(observations[valid & ~blind])
         self._earn(rewards, valid)
@@ -116,24 +116,24 @@ class ValidNormalize(VecNormalize):
         return self._normalized(observations), self.normalize_reward(rewards), dones, infos
 
     def go_on(self, observations: np.ndarray, returns: np.ndarray) -> np.ndarray:
-        """Return the observations, normalized, after going back to where they were the last ones.
+        """Restore the position at which `observations` were the last ones; return them normalized.
 
-        `returns` are the discounted rewards of the episodes then, one a member.
+        `returns` are the discounted rewards of the episodes until then, one per member.
         """
         self.old_obs, self.returns = observations, returns
         return self._normalized(observations)
 
     def to_json(self) -> dict[str, Any]:
-        """Return what a policy needs to know of it, and training to go on, as JSON data."""
+        """Return the statistics that a policy and further training need, as JSON data."""
         clips = self._clips()
         scales = {name: moments.to_json() | {"clip": clips[name]} for name, moments in self.scales.items()}
         return scales | {"epsilon": self.epsilon}
 
     def learn_from_json(self, content: Mapping[str, Any]) -> None:
-        """Know what another one knew that wrote it by `to_json`, and was to normalize the same.
+        """Take over statistics that another normalizer with the same settings wrote by `to_json`.
 
         Raises:
-            KeyError, TypeError, ValueError: it was not written so.
+            KeyError, TypeError, ValueError: the content or its settings are different.
         """
         running, there = self._running(), sorted(content.keys() - {"epsilon"})
         if there != sorted(running):
@@ -166,7 +166,7 @@ class ValidNormalize(VecNormalize):
 
 
 class Normalized:
-    """A policy for observations as they are: it sees them as it saw them when it learned."""
+    """A policy that takes unnormalized observations and normalizes them as during its training."""
 
     def __init__(self, model: BaseAlgorithm, normalizer: ValidNormalize) -> None:
         self._model = model
@@ -185,12 +185,12 @@ class Normalized:
 
 
 def normalizer_of(model: BaseAlgorithm) -> ValidNormalize | None:
-    """Return what normalizes a model's observations and rewards; None: nothing does."""
+    """Return the normalizer of a model's observations and rewards; None: it has none."""
     found = model.get_vec_normalize_env()
     return found if isinstance(found, ValidNormalize) else None
 
 
 def policy_of(model: BaseAlgorithm) -> BaseAlgorithm | Normalized:
-    """Return the policy of a model, for observations as they are; what it knows of them is not changed."""
+    """Return the policy of a model for unnormalized observations; its statistics do not change."""
     normalizer = normalizer_of(model)
     return Normalized(model, normalizer) if normalizer else model

@@ -1,6 +1,6 @@
 """REINFORCE (Williams, 1992), as a Stable-Baselines3 algorithm.
 
-Learns from whole episodes, by the gradient of log pi(a|s) * (G - b): G is the
+It learns from whole episodes, by the gradient of log pi(a|s) * (G - b): G is the
 discounted return from the step on, b an optional baseline. It has save, load,
 predict, callbacks and logger of `BaseAlgorithm`, and uses its policies.
 """
@@ -28,12 +28,12 @@ class REINFORCE(BaseAlgorithm):
     """Monte-Carlo policy gradient.
 
     One update learns from `episodes_per_update` whole episodes of each
-    environment: the same number of each, because taking whatever ends first
-    would prefer short episodes. What an environment plays beyond its number
-    while others finish theirs is dropped, and so is an episode that a fault
-    cut; an environment that is being mended is not waited for. Training ends at
-    the first episode end at or after `total_timesteps`. A truncated
-    episode counts as ended: its return is what was seen.
+    environment. The number is the same for each, because taking the episodes that
+    end first would prefer short ones. Further episodes that an environment plays
+    until the others finish are dropped, and so is an episode that a fault cut. An
+    environment that is being restarted is not waited for. Training ends at the
+    first episode end at or after `total_timesteps`. A truncated episode counts as
+    ended: its return is the sum until then.
 
     Args:
         policy: "MlpPolicy", "CnnPolicy" or a class; an actor-critic one, whose value
@@ -126,7 +126,7 @@ class REINFORCE(BaseAlgorithm):
         reset_num_timesteps: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
         progress_bar: bool = False,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
     ) -> Self:
-        """Return this model, trained until the first episode end at `total_timesteps` or later.
+        """Return this model, trained until the first episode end at or after `total_timesteps`.
 
         `log_interval` counts updates; the other arguments are Stable-Baselines3's.
         """
@@ -148,7 +148,7 @@ class REINFORCE(BaseAlgorithm):
     def collect_episodes(self, callback: BaseCallback) -> Batch | None:
         """Return the whole valid episodes of one update; None if the callback ended training.
 
-        Fewer than `episodes_per_update` of each environment only at the end of training.
+        At the end of training there may be fewer than `episodes_per_update` of each environment.
         """
         assert self.env is not None  # set in __init__ or by set_env()
         self.policy.set_training_mode(False)
@@ -170,13 +170,13 @@ class REINFORCE(BaseAlgorithm):
             if dones.any() and self.num_timesteps >= self._total_timesteps:
                 break
         if not dones.all():
-            # Somebody is amid an episode of the policy that is about to change.
+            # An environment may be in an episode of the policy that is about to change.
             self._last_obs = self.env.reset()  # type: ignore[assignment]  # as in Stable-Baselines3
         callback.on_rollout_end()
         return recorder.batch(self.gamma)
 
     def train(self, batch: Batch) -> None:
-        """Take one gradient step on the episodes in `batch`; none if it is empty."""
+        """Take one gradient step on the episodes in `batch`; no step if it is empty."""
         if not len(batch.returns):
             return
         self.policy.set_training_mode(True)
@@ -222,7 +222,7 @@ class REINFORCE(BaseAlgorithm):
         return loss
 
     def _advantages(self, returns: torch.Tensor, values: torch.Tensor) -> torch.Tensor:
-        """Return G - b of each step, on one scale if that is wanted."""
+        """Return G - b of each step, normalized if that is set."""
         if self.baseline == "none":
             return returns / (returns.square().mean().sqrt() + 1e-8) if self.normalize_advantage else returns
         advantages = returns - values

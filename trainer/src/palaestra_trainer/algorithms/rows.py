@@ -1,8 +1,8 @@
 """Stable-Baselines3's algorithms, which count and learn from valid rows only.
 
-Two mixins make the difference, each by overriding what Stable-Baselines3 calls
-between a step and its storage; nothing of its code is copied. A saved model
-does not name the buffers, so plain Stable-Baselines3 loads it as well.
+Two mixins do this by overriding methods that Stable-Baselines3 calls between a
+step and its storage; no code is copied. A saved model does not contain the names
+of the buffers, so plain Stable-Baselines3 can load it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _BUFFERS = ("replay_buffer_class", "rollout_buffer_class")
 
 
 class ValidRowsCounted(BaseAlgorithm):
-    """Counts valid rows as steps, and nothing of an invalid row as an episode."""
+    """Counts only valid rows as steps; an invalid row never counts as part of an episode."""
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
         valid = valid_rows(infos)
@@ -37,7 +37,7 @@ class ValidRowsCounted(BaseAlgorithm):
 
 
 class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
-    """An off-policy algorithm that stores valid rows, and ends when it has its steps."""
+    """An off-policy algorithm that stores valid rows, and ends at its number of steps."""
 
     def _setup_model(self) -> None:
         self.replay_buffer_class = ValidReplayBuffer
@@ -46,7 +46,7 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, train_freq: TrainFreq, *args: Any, **kwargs: Any
     ) -> RolloutReturn:
-        """Collect as many steps as `train_freq` says, but none beyond the target."""
+        """Collect the steps of `train_freq`, but none beyond the target."""
         if train_freq.unit is TrainFrequencyUnit.STEP:
             missing = math.ceil((self._total_timesteps - self.num_timesteps) / env.num_envs)
             train_freq = train_freq._replace(frequency=max(1, min(train_freq.frequency, missing)))
@@ -62,13 +62,13 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
     """An on-policy algorithm whose rollouts mask invalid rows.
 
     Raises:
-        TypeError: it makes a rollout buffer of its own, so nothing would be masked.
+        TypeError: it creates its own kind of rollout buffer, in which nothing would be masked.
     """
 
     def _masked(self) -> ValidRolloutBuffer:
         if not isinstance(self.rollout_buffer, ValidRolloutBuffer):
             raise TypeError(
-                f"{type(self).__name__}: makes a {type(self.rollout_buffer).__name__}, which learns from "
+                f"{type(self).__name__}: creates a {type(self.rollout_buffer).__name__}, which learns from "
                 "rows that a fault spoiled; use an algorithm that takes rollout_buffer_class"
             )
         return self.rollout_buffer
@@ -105,7 +105,7 @@ class SAC(OffPolicyRows, sb3.SAC):
 
 
 class PPO(OnPolicyRows, sb3.PPO):
-    """Proximal policy optimisation, for discrete and continuous actions."""
+    """Proximal policy optimization, for discrete and continuous actions."""
 
 
 class A2C(OnPolicyRows, sb3.A2C):

@@ -1,7 +1,7 @@
-"""The values of hyperparameters: checked against the signature that takes them, and made what it takes.
+"""The values of hyperparameters: checked against a signature, and converted to what it takes.
 
-A job cannot write a schedule, a tuple or a class. "lin_0.001" is a schedule from 0.001 at the start to 0 at
-the end, a list is a tuple, and activation functions and optimizers have their names in PyTorch.
+A job cannot contain a schedule, a tuple or a class. So "lin_0.001" stands for a schedule from 0.001 at the
+start to 0 at the end, and a list for a tuple. Activation functions and optimizers have their PyTorch names.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: 
 
 
 def mistakes(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> Iterator[str]:
-    """Yield field, fact and remedy of each value that the class does not take; its names are known."""
+    """Yield field, fact and remedy of each value that the class does not accept; its names are known."""
     types = _types(cls)
     for name, value in hyperparameters.items():
         if fact := _refused(value, types[name]):
@@ -46,7 +46,7 @@ def mistakes(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> It
 
 
 def arguments(cls: type[BaseAlgorithm], hyperparameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keyword arguments of the class that these hyperparameters stand for."""
+    """Return the keyword arguments of the class for these hyperparameters."""
     types = _types(cls)
     chosen = {name: _as_python(value, types[name]) for name, value in hyperparameters.items()}
     policy = chosen.get("policy_kwargs") or {}
@@ -62,19 +62,19 @@ def _mistakes_of_policy(types: Mapping[str, Any], given: Mapping[str, Any]) -> I
             yield f"{field}: the policy has no such argument; {nearest(name, known)}"
         elif name in CLASSES:
             if _class(name, value) is None:
-                yield f"{field}: {value!r} is not known; {nearest(str(value), dict(CLASSES[name]))}"
+                yield f"{field}: {value!r} is unknown; {nearest(str(value), dict(CLASSES[name]))}"
         elif fact := _refused(value, types[name]):
             yield f"{field}: {fact}"
 
 
 def _class(argument: str, name: Any) -> type[Any] | None:
-    """Return the class of PyTorch that a policy's argument names, in any case; None if it names none."""
+    """Return the PyTorch class for a policy's argument, in any case; None if there is none of that name."""
     by_name = {known.lower(): cls for known, cls in CLASSES.get(argument, {}).items()}
     return by_name.get(name.lower()) if isinstance(name, str) else None
 
 
 def _refused(value: Any, annotation: Any) -> str:
-    """Return in words why a value is not what an annotation says; "" if it is."""
+    """Return why a value does not match an annotation, as text; "" if it does."""
     if get_origin(annotation) is type:
         return f"{value!r} is refused; a job cannot name this class, leave it out"
     config = ConfigDict(arbitrary_types_allowed=True)
@@ -95,7 +95,7 @@ def _as_python(value: Any, annotation: Any) -> Any:
 
 
 def _words(annotation: Any) -> str:
-    """Return what an annotation takes, for a person who writes YAML."""
+    """Return the accepted values of an annotation, in words for a person who writes YAML."""
     origin, parts = get_origin(annotation), get_args(annotation)
     if annotation in _WORDS:
         return _WORDS[annotation]
@@ -109,5 +109,5 @@ def _words(annotation: Any) -> str:
 
 
 def _types(cls: type[Any]) -> dict[str, Any]:
-    # Stable-Baselines3 names VecEnv in a type, and imports it for type checkers only.
+    # Stable-Baselines3 uses VecEnv in a type, and imports it only for type checkers.
     return get_type_hints(cls.__init__, localns={"VecEnv": VecEnv})

@@ -1,4 +1,4 @@
-"""From an action that a policy chose to the velocity that a robot is told."""
+"""Convert an action of a policy into a velocity of the robot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.environments.options import Options
 from palaestra_trainer.robots.base import SPEED_M_S, TURN_RAD_S, Movement, Twist
 
-SCALE = (SPEED_M_S, SPEED_M_S, TURN_RAD_S)  # what 1 means in a continuous action
+SCALE = (SPEED_M_S, SPEED_M_S, TURN_RAD_S)  # the velocity of 1 in a continuous action
 
 
 def action_space(options: Options) -> spaces.Space[Any]:
@@ -23,7 +23,7 @@ def action_space(options: Options) -> spaces.Space[Any]:
 
 
 def twist(action: Any, options: Options) -> Twist:
-    """Return the velocity that an action of `action_space(options)` asks for, see `RobotinoAbc.drive`."""
+    """Return the velocity of an action of `action_space(options)`, see `RobotinoAbc.drive`."""
     if options.actions == "continuous":
         return _scaled(action)
     return options.movements[int(action)].twist

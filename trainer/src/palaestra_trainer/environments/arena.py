@@ -1,7 +1,7 @@
-"""The arena that the shipped world describes, and the tasks that are drawn in it.
+"""The arena of the shipped world, and the tasks that are drawn in it.
 
-A square floor with four cylinders. The environment needs its measures for two
-things only: to draw starts and targets that are free, and to scale what it observes.
+It is a square floor with four cylinders. The environment needs its dimensions only
+to draw free starts and targets, and to scale observations.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from palaestra_trainer.robots.base import RADIUS_M, Pose
 
 HALF_SIDE_M = 2.0  # from the centre to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
-CYLINDER_RADIUS_M = 0.25  # wide enough that none hides between two of the robot's infrared rays
+CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
 OUTLINE_M = 0.2286  # radius of the body and its bumper in the shipped world
-CLEARANCE_M = 0.10  # between the robot's body and anything else, at the start and on the target
+CLEARANCE_M = 0.10  # between the robot's body and any obstacle, at the start and on the target
 APART_M = 1.0  # least distance from start to target
 
 Point = tuple[float, float]
@@ -43,17 +43,17 @@ def gap(x_m: float, y_m: float) -> float:
 
 
 def free(x_m: float, y_m: float) -> bool:
-    """Return whether a robot can stand there with `CLEARANCE_M` to spare."""
+    """Return whether a robot at this place keeps at least `CLEARANCE_M` from every obstacle."""
     return gap(x_m, y_m) >= RADIUS_M + CLEARANCE_M
 
 
 def apart(one: Point, other: Point) -> bool:
-    """Return whether two points are far enough from each other to make a task."""
+    """Return whether two points are far enough apart to be start and target."""
     return math.dist(one, other) >= APART_M
 
 
 def draw_point(random: np.random.Generator) -> Point:
-    """Return x, y in metres of a free place, all of them equally likely."""
+    """Return x, y in meters of a random free place; all free places are equally likely."""
     while True:
         x_m, y_m = random.uniform(-HALF_SIDE_M, HALF_SIDE_M, size=2).tolist()
         if free(x_m, y_m):
@@ -61,7 +61,7 @@ def draw_point(random: np.random.Generator) -> Point:
 
 
 def draw_task(random: np.random.Generator, start: Pose | None = None, target: Point | None = None) -> Task:
-    """Return a task of free places `APART_M` apart, with any heading; what is given stays."""
+    """Return a task with free places `APART_M` apart and a random heading; given values are kept."""
     heading_rad = float(random.uniform(-math.pi, math.pi))
     while True:
         begin = start or Pose(*draw_point(random), heading_rad)
@@ -74,11 +74,11 @@ def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
     """Return a task whose `start` (x, y, heading; or a Pose) and `target` (x, y) may be chosen.
 
     Raises:
-        ConfigurationError: another name than these, not so many numbers, a target inside a wall or a
-            cylinder, or a start where the robot would be inside of one.
+        ConfigurationError: an unknown name, a wrong number of values, a target inside a wall or a
+            cylinder, or a start at which the robot would touch one.
     """
     if unknown := sorted(set(chosen) - {"start", "target"}):
-        raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
+        raise ConfigurationError(f"reset option {unknown[0]!r} is unknown; use start or target")
     start, target = chosen.get("start"), chosen.get("target")
     if start is not None:
         if not isinstance(start, Pose):
@@ -92,7 +92,7 @@ def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
 
 
 def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
-    """Return the wanted numbers out of whatever numpy takes for a row of them."""
+    """Return the wanted numbers from any value that numpy accepts as a row of numbers."""
     with suppress(TypeError, ValueError):
         row = np.asarray(given, dtype=float)
         if row.shape == (len(wanted),):
@@ -103,10 +103,10 @@ def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
 
 
 def _check_place(name: str, x_m: float, y_m: float, radius_m: float) -> None:
-    """Refuse a place without `radius_m` of free floor around it: the robot would be pushed out of there."""
-    if not gap(x_m, y_m) > radius_m:  # so that NaN is refused too
-        fact = "is in a wall or a cylinder" if not radius_m else "has the robot in a wall or a cylinder"
+    """Refuse a place without `radius_m` of free floor around it; the simulator would push the robot away."""
+    if not gap(x_m, y_m) > radius_m:  # written so that NaN is refused too
+        fact = "is in a wall or a cylinder" if not radius_m else "puts the robot in a wall or a cylinder"
         raise ConfigurationError(
             f"reset option {name}: ({x_m:g}, {y_m:g}) {fact}; choose a free place within"
-            f" {HALF_SIDE_M - radius_m:g} m of the centre on each axis"
+            f" {HALF_SIDE_M - radius_m:g} m of the center on each axis"
         )

@@ -1,4 +1,4 @@
-"""Policies that learned nothing: what a trained one has to be better than.
+"""Policies without learning, as a baseline that a trained policy must beat.
 
 Each is a function of the environment, not of the observation, so that it works with
 every choice of parts; `make bench` prints their success beside the trained policy's.
@@ -14,20 +14,20 @@ from palaestra_trainer.environments.actions import nearest
 from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTargetEnv
 from palaestra_trainer.robots.base import SPEED_M_S
 
-NEAR_M = 0.5 * REACHED_M  # where `straight_to_target` begins to stand
+NEAR_M = 0.5 * REACHED_M  # the distance at which `straight_to_target` stops
 
 Policy = Callable[[MoveToTargetEnv], Any]
 
 
 def random_movement(env: MoveToTargetEnv) -> Any:
-    """Return any action, all equally likely."""
+    """Return a random action; all are equally likely."""
     return env.action_space.sample()
 
 
 def straight_to_target(env: MoveToTargetEnv) -> Any:
-    """Return the action that drives most nearly toward the target, or stands when there.
+    """Return the action whose direction is nearest to the target's; on the target, stop.
 
-    It looks at no sensor, so a cylinder in the way ends it.
+    It uses no sensor, so a cylinder in the way ends the episode.
     """
     forward_m, left_m = env.situation.target_ahead
     distance_m = math.hypot(forward_m, left_m)
@@ -44,7 +44,7 @@ BASELINES: dict[str, Policy] = {
 
 
 def success_rate(env: MoveToTargetEnv, policy: Policy, seeds: Iterable[int]) -> float:
-    """Return the share of episodes, one a seed, in which the policy comes to stand on the target."""
+    """Return the share of episodes, one per seed, in which the policy stops on the target."""
     successes = [_succeeds(env, policy, seed) for seed in seeds]
     return sum(successes) / len(successes)
 

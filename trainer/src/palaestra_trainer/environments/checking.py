@@ -1,8 +1,8 @@
-"""An environment's first reset and first step, held to what gymnasium asks of them.
+"""Check an environment's first reset and first step against gymnasium's API.
 
-gymnasium's own wrapper warns, and training goes on with rows that mean something else. Here the same checks
-raise, and name what was expected and what came. Numbers that are not finite are left to the learner's side,
-which reports them as divergence.
+gymnasium's own wrapper only warns, and training would continue with wrong rows. Here the same checks raise
+an error that names the expected and the actual value. Numbers that are not finite are not checked here: the
+learner reports them as divergence.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ _one_at_a_time = threading.Lock()  # warnings are caught for the whole process
 
 
 def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
-    """Return the environment, which raises ConfigurationError where its first reset or step is wrong.
+    """Return the environment in a wrapper that raises ConfigurationError if its first reset or step is wrong.
 
-    It is checked twice: as a whole, and below the wrappers of `gymnasium.make`, which unpack a step.
+    It is checked twice: around and inside the wrappers of `gymnasium.make`, which unpack a step.
 
     Raises:
         ConfigurationError: its spaces, or the signatures of its methods, are wrong.
@@ -49,11 +49,11 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment whose first reset and first step are checked; what it returns is not changed.
+    """An environment whose first reset and first step are checked; its results are not changed.
 
     Args:
         env: the environment.
-        name: what messages call it.
+        name: its name in messages.
 
     Raises:
         ConfigurationError: its spaces, or the signatures of its methods, are wrong.
@@ -66,10 +66,10 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
         self._check_made()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Return what the environment's reset returns.
+        """Return the result of the environment's reset.
 
         Raises:
-            ConfigurationError: it is the first one, and wrong.
+            ConfigurationError: the first reset is wrong.
         """
         result = self.env.reset(seed=seed, options=options)
         if not self._reset_seen:
@@ -78,10 +78,10 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
         return result
 
     def step(self, action: Any) -> Any:
-        """Return what the environment's step returns.
+        """Return the result of the environment's step.
 
         Raises:
-            ConfigurationError: it is the first one, and wrong.
+            ConfigurationError: the first step is wrong.
         """
         result = self.env.step(action)
         if not self._step_seen:
@@ -120,30 +120,30 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def _wrong(self, expected: str, came: str) -> ConfigurationError:
         return ConfigurationError(
-            f"environment.id: {self._name}: expected {expected}; came {came}; mend the environment"
+            f"environment.id: {self._name}: expected {expected}; got {came}; fix the environment"
         )
 
 
 class _Returned(gymnasium.Env[Any, Any]):
-    """What an environment returned, to be returned once more to gymnasium's checkers."""
+    """An environment that returns a recorded result, for gymnasium's checkers."""
 
     def __init__(self, space: spaces.Space[Any], result: Any) -> None:
         self.observation_space = space
         self._result = result
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
-        """Return it."""
+        """Return the recorded result."""
         del seed, options
         return self._result
 
     def step(self, action: Any) -> Any:
-        """Return it."""
+        """Return the recorded result."""
         del action
         return self._result
 
 
 def mismatch(space: spaces.Space[Any], observation: Any) -> str:
-    """Return in words why an observation is not of its space; "" if it is."""
+    """Return why an observation does not belong to its space, as text; "" if it does."""
     if isinstance(space, spaces.Box):
         return _mismatch_of_box(space, observation)
     return "" if space.contains(observation) else repr(observation)
@@ -165,7 +165,7 @@ def _mismatch_of_box(space: spaces.Box, observation: Any) -> str:
 
 
 def _objections(check: Callable[..., Any], returned: _Returned) -> list[str]:
-    """Return what one of gymnasium's checkers objects to, by a warning or by an exception."""
+    """Return the complaints of one of gymnasium's checkers, from warnings and exceptions."""
     arguments = {"action": None} if check is env_step_passive_checker else {}
     with _one_at_a_time, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

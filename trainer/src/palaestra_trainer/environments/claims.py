@@ -1,4 +1,4 @@
-"""Which process drives which simulator: a lock on one file for each, in the container's scratch folder."""
+"""Claims of processes on simulators: a lock file for each, in the container's scratch folder."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from palaestra_trainer.locks import FileLock
 
 
 class Claim(NamedTuple):
-    """One simulator, and the lock that keeps other environments from it."""
+    """One simulator, and the lock that reserves it for one environment."""
 
     simulator: SimulatorConfiguration
     lock: FileLock
 
 
 def claim(configuration: Configuration, role: Role) -> Claim:
-    """Return a claim on the first simulator with this role that no environment has, in any process.
+    """Return a claim on the first simulator with this role that no environment of any process uses.
 
     Raises:
-        ConfigurationError: there is none left, or the lock's file cannot be written.
+        ConfigurationError: all are in use, or the lock file cannot be written.
     """
     simulators = configuration.with_role(role)
     for simulator in simulators:
@@ -38,15 +38,15 @@ def _lock(path: Path) -> FileLock | None:
         return FileLock.acquire(path)
     except OSError as error:
         raise ConfigurationError(
-            f"{path}: the lock of a simulator cannot be written ({error.strerror}); "
-            "let ROS_LOG_DIR name a folder of this user's"
+            f"{path}: the lock file of a simulator cannot be written ({error.strerror}); "
+            "set ROS_LOG_DIR to a folder that this user can write"
         ) from error
 
 
 def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Path:
-    """Return the lock's file; ROS_LOG_DIR is the scratch folder in every container that the plan describes.
+    """Return the lock's file; ROS_LOG_DIR is the scratch folder in every container of the plan.
 
-    Named by the address, too: outside of a container the folder may be shared by several jobs and users.
+    Its name contains the address too, because outside a container jobs and users may share the folder.
     """
     address = simulator.control or f"{configuration.job}-{configuration.replica}"
     words = re.sub(r"\W+", "-", f"{os.getuid()} {address} {simulator.name}")
@@ -56,7 +56,7 @@ def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Pa
 def _none_left(having_role: int, role: Role, total: int) -> str:
     other = "Evaluate" if role == "Collect" else "Collect"
     return (
-        f"PALAESTRA_CONFIG: {having_role} of {total} simulators have role {role}, and each of them has an "
-        f"environment; add simulators with that role to the job, close an environment, or make one with "
-        f'role="{other}" of those that have it'
+        f"PALAESTRA_CONFIG: {having_role} of {total} simulators have role {role}, and each has an "
+        f"environment; add simulators with that role to the job, close an environment, or create one "
+        f'with role="{other}"'
     )

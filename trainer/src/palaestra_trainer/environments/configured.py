@@ -1,4 +1,4 @@
-"""The simulators that PALAESTRA_CONFIG names, one for each environment that asks."""
+"""The simulators in PALAESTRA_CONFIG, one for each environment that asks."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Configured:
-    """A simulator that is started and this process's own until it is given back.
+    """A started simulator that belongs to one environment of this process until it is released.
 
     Attributes:
         name: as in the configuration.
-        robot: what is driven in it.
-        scene: where its episodes are arranged.
-        release: drops the connections and lets another environment, of any process, have the simulator, which
-            keeps running; safe to repeat, and without effect in a process that was forked.
+        robot: the robot in it.
+        scene: arranges its episodes.
+        release: closes the connections and frees the simulator for another environment of any process. The
+            simulator keeps running. Safe to repeat, and without effect in a forked process.
     """
 
     name: str
@@ -30,10 +30,10 @@ class Configured:
 
 
 def simulator_for(role: Role) -> Configured:
-    """Return the simulator of an environment that was given none, started.
+    """Return a started simulator for an environment that was created without one.
 
-    It is one of PALAESTRA_CONFIG. Where that is not set, as in a notebook, it is a stub with the arena,
-    which is started here and ends when it is released, or with this process.
+    It is one of PALAESTRA_CONFIG. If that is not set, as in a notebook, it is a stub with the arena, which
+    ends when it is released, or with this process.
 
     Raises:
         ConfigurationError: each simulator with this role has an environment.
@@ -55,13 +55,13 @@ def own_simulator() -> Configured:
 
 
 def configured_simulator(role: Role) -> Configured:
-    """Return a simulator with this role that no other environment has, started.
+    """Return a started simulator with this role that no other environment uses.
 
     Raises:
         ConfigurationError: there is no configuration, or each simulator with this role has an environment.
         SimulatorFault: the simulator does not start.
     """
-    # Only here do environments meet ROS, and only where no robot was passed.
+    # Environments use ROS only here, and only if no robot was passed.
     from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
 
     configuration = load()
@@ -82,6 +82,6 @@ def configured_simulator(role: Role) -> Configured:
 
 
 def _alone(configuration: Configuration, name: str) -> Configuration:
-    """Return the configuration with this simulator only; a copy, since validation wants a collector."""
+    """Return a copy with this simulator only; not validated, because validation requires a collector."""
     chosen = tuple(simulator for simulator in configuration.simulators if simulator.name == name)
     return configuration.model_copy(update={"simulators": chosen})

@@ -1,6 +1,6 @@
-"""From a job's environment to the environment itself, whichever class it is.
+"""Create the environment of a job, of any class.
 
-An environment gets what its signature accepts of robot, scene and reward. What does not fit is found here,
+The environment gets robot, scene and reward as far as its signature accepts them. Mismatches are found here,
 before a simulator starts.
 """
 
@@ -25,31 +25,31 @@ from palaestra_trainer.environments.checking import held
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
-_OF_MAKE = ("max_episode_steps",)  # gymnasium.make takes it itself
+_OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
 def make_environment(wanted: Environment, robot: RobotinoAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
-    """Return the environment of a job, which drives `robot` in `scene`; its first reset and step are checked.
+    """Return the environment of a job with `robot` and `scene`; its first reset and step are checked.
 
     Raises:
         ConfigurationError: it is not registered, or its signature does not fit the job.
     """
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
     try:
-        # `held` checks instead of gymnasium's wrapper: warnings would not end the run.
+        # `held` replaces gymnasium's wrapper, whose warnings would not end the run.
         env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
     except ConfigurationError:
         raise
     except (AssertionError, TypeError, ValueError) as error:
         raise ConfigurationError(
-            f"environment.id: {wanted.id} cannot be made ({error}); mend it, or change environment.options"
+            f"environment.id: {wanted.id} cannot be created ({error}); fix it, or change environment.options"
         ) from error
     return held(env, wanted.id)
 
 
 def keywords(wanted: Environment) -> dict[str, Any]:
-    """Return the keyword arguments that a job gives its environment, beside robot and scene.
+    """Return the keyword arguments that a job gives its environment, without robot and scene.
 
     Raises:
         ConfigurationError: it is not registered, or its signature does not fit the job.
@@ -73,7 +73,7 @@ def _mistakes(wanted: Environment, signature: inspect.Signature, given: Mapping[
     if not {"robot", "scene"} & given.keys():
         yield (
             f"environment.id: {wanted.id} accepts neither robot nor scene, so no simulator would be used; "
-            "give it one of these arguments, or **kwargs"
+            "add one of these arguments, or **kwargs"
         )
     if wanted.reward != DEFAULT_REWARD and "reward" not in given:
         yield f"environment.reward: {wanted.id} has no argument reward; remove it, or add the argument"
@@ -83,11 +83,11 @@ def _mistakes(wanted: Environment, signature: inspect.Signature, given: Mapping[
             yield f"environment.options.{name}: {wanted.id} has no such argument; {nearest(name, known)}"
     for name in _required(signature):
         if name not in given:
-            yield f"environment.options.{name}: {wanted.id} needs this argument; add it, or give it a default"
+            yield f"environment.options.{name}: {wanted.id} needs this argument; set it, or give it a default"
 
 
 def _spec(name: str) -> EnvSpec:
-    """Return what is registered under a name as `gymnasium.make` takes it."""
+    """Return the registration of a name in the syntax of `gymnasium.make`."""
     module, _, registered = name.rpartition(":")
     try:
         if module:
@@ -96,24 +96,24 @@ def _spec(name: str) -> EnvSpec:
         return gymnasium.spec(get_env_id(space, plain, version or find_highest_version(space, plain)))
     except (gymnasium.error.Error, ImportError) as error:
         raise ConfigurationError(
-            f"environment.id: {name} cannot be made ({error}); name one that is registered, "
-            "or module:name of one that its module registers"
+            f"environment.id: {name} cannot be created ({error}); use a registered name, "
+            "or module:name with the module that registers it"
         ) from error
 
 
 def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
-    """Return what makes the environment: a class or a function."""
+    """Return the class or function that creates the environment."""
     try:
         creator = (
             load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
         )
     except (AttributeError, ImportError) as error:
         raise ConfigurationError(
-            f"environment.id: the entry point {spec.entry_point} of {name} is not there ({error}); "
+            f"environment.id: the entry point {spec.entry_point} of {name} does not exist ({error}); "
             "correct its registration"
         ) from error
     if creator is None:
-        raise ConfigurationError(f"environment.id: {name} is registered without entry_point; give it one")
+        raise ConfigurationError(f"environment.id: {name} is registered without entry_point; add one")
     return creator
 
 

@@ -1,9 +1,9 @@
 """The task: drive to the target and stand there.
 
-The environment is built from a robot and a scene and knows neither ROS nor Webots:
-it decides what an episode is, what is observed, when it ends and what a step is
-worth. A `SimulatorFault` of the robot passes through it untouched; what a fault
-means for learning is decided by whoever steps the environment.
+The environment is built from a robot and a scene, and depends on neither ROS nor
+Webots. It defines the episode: its observations, its end and its rewards. A
+`SimulatorFault` of the robot passes through it unchanged; the caller that steps
+the environment decides what the fault means for learning.
 """
 
 from __future__ import annotations
@@ -100,16 +100,16 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     ## Start
 
-    `reset(seed=s)` alone decides the episode. Start and target are drawn evenly from the
-    places where the robot has 0.1 m to spare, at least 1 m apart, the heading from all
+    `reset(seed=s)` alone decides the episode. Start and target are drawn uniformly from the
+    places where the robot has 0.1 m to spare, at least 1 m apart, and the heading from all
     directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
 
     ## End of an episode
 
     Terminated: the robot stands on the target (`info["is_success"]`), or it bumped into
-    something. When `max_steps` are taken, `time_up` decides: `"truncated"` (by default with
-    Dense) lets a learner estimate what would have come, `"terminated"` (by default with
-    Sparse) makes that step the last that counts.
+    something. After `max_steps` steps, `time_up` decides: with `"truncated"` (the default for
+    Dense) a learner estimates the value of later steps; with `"terminated"` (the default for
+    Sparse) it counts no later step.
 
     ## Info
 
@@ -117,13 +117,13 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     weighted), `extra_steps` (control periods that a late sensor made necessary).
 
     `render()` is not implemented: it raises NotImplementedError. `close()` leaves the simulator
-    running: its pod ends it, or the program that started it. A simulator of PALAESTRA_CONFIG is free
-    for another environment then, and a stub that `gymnasium.make` started for it alone ends.
+    running; its pod or the program that started it ends it. After `close()` another environment can
+    use a simulator of PALAESTRA_CONFIG, and a stub that `gymnasium.make` started for this one ends.
 
     Args:
-        robot: what is driven.
-        scene: where episodes are arranged.
-        options: what is observed, done and rewarded.
+        robot: the robot to drive.
+        scene: arranges episodes.
+        options: observation, actions and rewards.
         on_close: called by `close`.
     """
 
@@ -146,7 +146,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     @property
     def situation(self) -> Situation:
-        """What is known now, also what is not observed.
+        """The complete state now, including parts that are not observed.
 
         Raises:
             ResetNeeded: no episode has begun.
@@ -158,14 +158,14 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begin an episode; return its first observation, and where it starts and leads.
+        """Begin an episode; return its first observation, and an info with its start and target.
 
         Args:
-            seed: decides the episode; without one it follows from the last.
+            seed: decides the episode; without one, the seed is derived from the last.
             options: `start` (x, y, heading) and `target` (x, y), in metres and radians.
 
         Raises:
-            ConfigurationError: an option is unknown, or lies in a wall or a cylinder.
+            ConfigurationError: an option is unknown, or is in a wall or a cylinder.
             SimulatorFault: as the robot raised it.
         """
         super().reset(seed=seed)
@@ -177,7 +177,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return self._numbers_of(seen), {"start": task.start, "target": task.target}
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
-        """Drive as `action` says for one control period; return what came of it.
+        """Drive according to `action` for one control period; return the result.
 
         Raises:
             ResetNeeded: no episode has begun.
@@ -203,7 +203,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         return self._numbers_of(after), sum(terms.values()), terminated, time_up and not terminates, info
 
     def close(self) -> None:
-        """Give back the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
         if self._on_close is not None:
             self._on_close()
 
@@ -235,16 +235,16 @@ def make(
     role: Role = "Collect",
     **options: Any,
 ) -> MoveToTargetEnv:
-    """Return the environment that `gymnasium.make("MoveToTargetEnv-v0", ...)` asks for.
+    """Return the environment for `gymnasium.make("MoveToTargetEnv-v0", ...)`.
 
     Args:
-        robot: what is driven, together with its `scene`.
-        scene: where episodes are arranged.
-        simulator: called for robot and scene when none are given, once for each environment of `make_vec`;
-            `palaestra_trainer.testing.fake_arena` needs no simulator.
+        robot: the robot to drive, given together with its `scene`.
+        scene: arranges episodes.
+        simulator: returns robot and scene if none are given; called once for each environment of
+            `make_vec`. `palaestra_trainer.testing.fake_arena` needs no simulator.
         role: without `robot` and `simulator`, the environment takes the first simulator of PALAESTRA_CONFIG
-            with this role that no other environment has, in any process. Without PALAESTRA_CONFIG it starts
-            a stub, which ends with `close()` or with this process.
+            with this role that no environment of any process uses. Without PALAESTRA_CONFIG it starts a
+            stub, which ends with `close()` or with this process.
         options: see `Options`; names of movements and parts are text.
 
     Raises:
@@ -252,7 +252,7 @@ def make(
     """
     chosen = parse(options)
     if (robot is None) != (scene is None):
-        raise ConfigurationError("robot, scene: one came without the other; give both or neither")
+        raise ConfigurationError("robot, scene: only one of them was given; give both or neither")
     if robot is not None and scene is not None:
         return MoveToTargetEnv(robot, scene, chosen)
     if simulator is not None:

@@ -1,4 +1,4 @@
-"""What can be varied about the task without touching its code."""
+"""The options of the task, which vary it without changes to its code."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra_trainer.robots.base import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
-# `Sparse` prices giving up, so its episode ends there. `Dense` does not: see docs/environments.md.
+# `Sparse` has a reward for time-up, so its episode ends there. `Dense` does not: see docs/environments.md.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 
 
@@ -22,12 +22,12 @@ class Options:
     """The options of `MoveToTargetEnv`, checked.
 
     Args:
-        reward: `Dense` gives one each step, `Sparse` at the end of an episode only.
+        reward: `Dense` gives a reward at each step, `Sparse` only at the end of an episode.
         observe: the parts of the observation, in this order.
-        movements: what a discrete action chooses from, in this order.
+        movements: the choices of a discrete action, in this order.
         actions: `discrete` (one of `movements`) or `continuous` (a twist).
         max_steps: steps until time is up.
-        time_up: how an episode ends then, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
+        time_up: how an episode then ends, `terminated` or `truncated`; None: `TIME_UP_OF` the reward.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -51,7 +51,7 @@ class Options:
 
 
 def parse(given: Mapping[str, Any]) -> Options:
-    """Return options from what a job file says: movements and parts by name.
+    """Return options from the values in a job file, which has movements and parts by name.
 
     Raises:
         ConfigurationError: one line for every mistake.
@@ -67,7 +67,7 @@ def parse(given: Mapping[str, Any]) -> Options:
 def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
     known = Movement.__members__
     if unknown := [str(it) for it in given if it not in known and it not in known.values()]:
-        raise ConfigurationError(f"movements: {', '.join(unknown)} not known; use {', '.join(known)}")
+        raise ConfigurationError(f"movements: {', '.join(unknown)} unknown; use {', '.join(known)}")
     return tuple(known[it] if isinstance(it, str) else Movement(it) for it in given)
 
 
@@ -76,15 +76,15 @@ def _mistakes(options: Options) -> Iterator[str]:
         yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
     yield from _mistakes_of_parts(options.observe)
     if options.actions not in ACTIONS:
-        yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
+        yield f"actions: {options.actions!r} is unknown; use {' or '.join(ACTIONS)}"
     if not options.movements:
         yield f"movements: is empty; choose from {', '.join(Movement.__members__)}"
     if len(set(options.movements)) < len(options.movements):
-        yield "movements: names a movement twice; name each once"
+        yield "movements: contains a movement twice; name each once"
     if options.max_steps < 1:
         yield f"max_steps: {options.max_steps} leaves no time; use at least 1"
     if options.time_up not in (None, *TIME_UP):
-        yield f"time_up: {options.time_up!r} is not known; use {' or '.join(TIME_UP)}"
+        yield f"time_up: {options.time_up!r} is unknown; use {' or '.join(TIME_UP)}"
 
 
 def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
@@ -94,4 +94,4 @@ def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
     if not names:
         yield f"observe: is empty; choose from {', '.join(PARTS)}"
     if len(set(names)) < len(names):
-        yield "observe: names a part twice; name each once"
+        yield "observe: contains a part twice; name each once"

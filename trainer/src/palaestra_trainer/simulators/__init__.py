@@ -1,1 +1,1 @@
-"""Which simulators there are, started behind a sidecar, and kept going through faults."""
+"""The simulators of a run: started through their sidecars, and restarted after faults."""

@@ -1,4 +1,4 @@
-"""Work in a thread of its own, which does not keep the process from ending."""
+"""Run work in a thread that does not keep the process from ending."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from concurrent.futures import Future
 
 
 def in_background(work: Callable[[], None], name: str) -> Future[None]:
-    """Begin to work in a thread of that name; whoever asks for the result gets what it raised."""
+    """Start `work` in a thread of that name; the returned future raises what `work` raised."""
     future: Future[None] = Future()
 
     def run() -> None:
         try:
             work()
-        except BaseException as error:  # noqa: BLE001 - whoever asks for the result gets it
+        except BaseException as error:  # noqa: BLE001 - the future's result raises it
             future.set_exception(error)
         else:
             future.set_result(None)

@@ -1,4 +1,4 @@
-"""How many faults are borne: of one simulator in a time, and of a group before too few are left."""
+"""Limits on faults: restarts of one simulator within a time, and the least size of a group."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 
 from palaestra_trainer.errors import FaultBudgetSpent, FaultKind, SimulatorFault
 
-# So many restarts in a short time are no accident: whatever comes up breaks again.
+# So many restarts within a short time show a permanent fault.
 FLAPPING = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Care:
-    """How a member is looked after.
+    """The restart limit of a member.
 
     Attributes:
         restart_limit: restarts after faults within any `restart_within_s` seconds.
@@ -28,7 +28,7 @@ class Care:
 
 @dataclass(slots=True)
 class RestartBudget:
-    """How many restarts one simulator has left, by a sliding window of time."""
+    """The restarts that one simulator has left, counted in a sliding window of time."""
 
     simulator: str
     care: Care
@@ -42,19 +42,19 @@ class RestartBudget:
 
     @property
     def spent_share(self) -> float:
-        """Share of `restart_limit` that was spent within `restart_within_s`, 0 to 1; from any thread.
+        """Share of `restart_limit` spent within `restart_within_s`, 0 to 1; callable from any thread.
 
-        Of none, none is spent: nothing could be warned of.
+        It is 0 for a limit of 0: no warning would be possible.
         """
         now, limit = self.clock(), self.care.restart_limit
         recent = sum(now - at < self.care.restart_within_s for at, _ in tuple(self._spent))
         return recent / limit if limit else 0.0
 
     def spend(self, fault: SimulatorFault) -> None:
-        """Take one restart, to mend `fault`.
+        """Take one restart from the budget, to repair `fault`.
 
         Raises:
-            FaultBudgetSpent: `restart_limit` restarts lie within `restart_within_s` already.
+            FaultBudgetSpent: `restart_limit` restarts were already spent within `restart_within_s`.
         """
         now = self.clock()
         while self._spent and now - self._spent[0][0] >= self.care.restart_within_s:
@@ -75,11 +75,11 @@ class RestartBudget:
 
 
 class Group:
-    """The simulators of one kind, and how many of them must be left.
+    """The simulators of one group, and how many of them the run needs.
 
     Args:
-        left: how many there are.
-        least: how many there must be, at least one; None: all of them.
+        left: number of simulators in the group.
+        least: the least number, at least one; None: all of them.
     """
 
     def __init__(self, left: int = 1, least: int | None = None) -> None:
@@ -88,7 +88,7 @@ class Group:
         self._lock = threading.Lock()
 
     def lose_one(self) -> bool:
-        """Return whether the others are enough to go on; if so, there is one less."""
+        """Return whether the run can continue without one more simulator; if so, count it as lost."""
         with self._lock:
             if self._left <= self.least:
                 return False

@@ -1,7 +1,7 @@
-"""Child processes that live no longer than this program: each reads our end of its standard input.
+"""Child processes that end with this program: each reads from a pipe to its standard input.
 
-The kernel closes that end however this program ends, also when it is killed, and the child takes the end of
-file as its order to stop.
+The kernel closes our end of the pipe when this program ends, even by a kill. The child stops at the end of
+file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ANSWER_S = 20.0
 
 
 def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
-    """Return a process of its own session, ended at this program's exit.
+    """Return a process in its own session that ends when this program exits.
 
     Raises:
         ConfigurationError: the program cannot be started.
@@ -36,7 +36,7 @@ def start_child(command: list[str], stderr: int) -> subprocess.Popen[bytes]:
 
 
 def end_child(process: subprocess.Popen[bytes]) -> None:
-    """Close what the process lives on, and wait for its end; safe to repeat."""
+    """Close the pipe that keeps the process alive, and wait for its end; safe to repeat."""
     if process.stdin is not None:
         process.stdin.close()
     process.wait(_ANSWER_S)
@@ -46,29 +46,29 @@ def end_child(process: subprocess.Popen[bytes]) -> None:
 
 
 def drain(process: subprocess.Popen[bytes]) -> None:
-    """Read and drop what the process prints from now on: a full pipe would stop it for ever."""
+    """Read and drop what the process prints from now on; a full pipe would block it forever."""
     for pipe in (process.stdout, process.stderr):
         if pipe is not None:
             threading.Thread(target=_drop, args=(pipe,), daemon=True).start()
 
 
 def _drop(pipe: IO[bytes]) -> None:
-    # The pipe is closed under the reader when the process is ended.
+    # `end_child` closes the pipe while this thread reads.
     with contextlib.suppress(OSError, ValueError):
         while pipe.read1(65536):  # type: ignore[attr-defined]  # Popen's pipes are buffered
             pass
 
 
 def first_line(process: subprocess.Popen[bytes]) -> str:
-    """Return the first line of the process's output, empty if it ended without one.
+    """Return the first line of the process's output; empty if the process ended without output.
 
     Raises:
-        SimulatorDead: it said nothing in time.
+        SimulatorDead: it printed no line in time.
     """
     if process.stdout is None:
         raise ValueError("the process was started without a pipe for its output")
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         if not selector.select(_ANSWER_S):
-            raise SimulatorDead(str(process.args), f"said nothing within {_ANSWER_S:g} s")
+            raise SimulatorDead(str(process.args), f"printed nothing within {_ANSWER_S:g} s")
     return process.stdout.readline().decode(errors="replace")

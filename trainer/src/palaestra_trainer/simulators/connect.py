@@ -1,7 +1,7 @@
-"""From a configuration to simulators with environments, not started yet.
+"""Create the simulators of a configuration with their environments, not yet started.
 
-`connect` finds them behind the sidecars of a pod, `connect_members` those that stand by too, and
-`connect_here` starts sidecars of this program's own.
+`connect` finds them behind the sidecars of a pod, `connect_members` includes standbys, and `connect_here`
+starts sidecars of its own.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-import palaestra_trainer.environments  # noqa: F401 - importing registers what ships
+import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration, load
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError
@@ -25,14 +25,14 @@ from palaestra_trainer.webots import Mode, Webots
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
-    """Return the simulators of a configuration, by default of the one PALAESTRA_CONFIG names, not started.
+    """Return the simulators of a configuration, by default of PALAESTRA_CONFIG, not started.
 
-    Those that stand by are left out: who asks for simulators here keeps to the ones that he got.
+    Standbys are left out, because the caller keeps using the same simulators.
 
     Raises:
-        ConfigurationError: the configuration cannot be read, or names no known environment.
+        ConfigurationError: the configuration cannot be read, or its environment is unknown.
         MasterLost: no ROS master answers.
-        SimulatorDead, SimulatorHung: a sidecar cannot be asked.
+        SimulatorDead, SimulatorHung: a sidecar does not answer.
     """
     chosen = configuration or load()
     ensure_node(f"trainer_r{chosen.replica}")
@@ -40,7 +40,7 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
 
 
 def connect_members(configuration: Configuration) -> list[Member]:
-    """Return the simulators of a configuration for somebody who restarts them, not started.
+    """Return the simulators of a configuration, not started, for a caller that restarts them.
 
     Raises:
         As `connect`.
@@ -55,7 +55,7 @@ def connect_members(configuration: Configuration) -> list[Member]:
 
 
 def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
-    """Return the simulators of a run directory as processes of this program, without a pod: not started.
+    """Return the simulators of a run directory as processes of this program, not started; needs no pod.
 
     Raises:
         ConfigurationError: the run directory lacks a world, or a simulator cannot be started here.
@@ -67,10 +67,10 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
 
 
 class Arena:
-    """A stub with the arena as a process of this program, started; `close` ends it.
+    """A started stub with the arena, as a process of this program; `close` ends it.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: it does not come up in time.
+        SimulatorDead, SimulatorHung, WrongData: it does not start in time.
     """
 
     def __init__(self) -> None:
@@ -91,13 +91,13 @@ class Arena:
 
 
 def _process(configuration: Configuration, entry: SimulatorConfiguration, run: Path) -> ProcessLauncher:
-    # A run directory may have been moved; worlds of the image's own lie outside of it.
+    # A run directory may have been moved; worlds that ship in the image are outside of it.
     inside = run / "worlds" / Path(entry.world).name
     world = inside if inside.exists() else Path(entry.world)
     if not world.exists() or entry.driver == "command":
         raise ConfigurationError(
             f"{entry.name}: {world} with driver {entry.driver} cannot be started here; "
-            "copy the whole run directory, or measure in the pod"
+            "copy the whole run directory, or evaluate in the pod"
         )
     names = (
         f"--job={configuration.job}",

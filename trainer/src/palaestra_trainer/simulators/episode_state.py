@@ -1,4 +1,4 @@
-"""How far an episode is, in what brings it there again: its number, and the actions taken in it."""
+"""The state of an episode as what reproduces it: its number, and the actions taken in it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeState:
-    """How far a member is, so that it can be brought there again through the environment's interface.
+    """The position of a member in its episodes, from which the environment can be brought back there.
 
     Attributes:
-        episode: number of the episode that is under way, or of the next one to begin.
-        actions: those taken in it so far, shape (steps, *action), not to be written to; None: none is under
-            way.
+        episode: number of the current episode, or of the next one to begin.
+        actions: actions taken in it so far, shape (steps, *action), read-only; None: no episode has
+            begun.
     """
 
     episode: int
@@ -23,14 +23,14 @@ class EpisodeState:
 
 
 class ActionLog:
-    """The actions of one episode, which can be looked at cheaply at any time."""
+    """The actions of one episode; reading them is cheap at any time."""
 
     def __init__(self) -> None:
         self._rows = np.empty((0,))
         self._length = 0
 
     def append(self, action: Any) -> None:
-        """Add one action; what `taken` returned before stays as it is."""
+        """Add one action; arrays that `taken` returned before stay unchanged."""
         if self._length == len(self._rows):
             self._grow(np.asarray(action))
         self._rows[self._length] = action

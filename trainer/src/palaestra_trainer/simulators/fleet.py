@@ -1,4 +1,4 @@
-"""All simulators of a run, by role: started and stopped together, resting in turns."""
+"""All simulators of a run, by role: started and stopped together, paused in turns."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member, Watcher
 from palaestra_trainer.simulators.meter import Meter
 
-LONG_S = 5.0  # for simulators to come up; a line reports those that do not, then at twice the time each
+LONG_S = 5.0  # a start longer than this is logged with the missing simulators, again after each doubling
 
 log = structlog.get_logger(__name__)
 
@@ -28,13 +28,13 @@ class Fleet:
     """The keepers of all members of a configuration.
 
     Args:
-        configuration: says how each member is looked after; found by its name.
+        configuration: has the settings of each member, found by its name.
         members: one for each simulator of the configuration.
-        watcher: is told of every fault and restart.
+        watcher: receives every fault and restart.
 
     Attributes:
         collecting: keepers of the members that gather experience, in the configuration's order.
-        evaluating: keepers of those that measure the policy; none if nothing is evaluated.
+        evaluating: keepers of the members that evaluate the policy; empty if nothing is evaluated.
     """
 
     def __init__(self, configuration: Configuration, members: Sequence[Member], watcher: Watcher) -> None:
@@ -52,23 +52,22 @@ class Fleet:
         self._all = [*self.collecting, *self.evaluating]
 
     def meters(self) -> dict[str, Meter]:
-        """Return what counts for each member, by its name."""
+        """Return the counts of each member, by its name."""
         return {keeper.name: keeper.meter for keeper in self._all}
 
     def start(self, check: Check = go_on, *, stepped: bool = False) -> None:
-        """Start all members at once; return when all have been tried, and enough of each group are up.
+        """Start all members at once; return when each was tried once and enough of each group are up.
 
-        Those that are not up yet go on being mended in the background.
+        Members that are not up yet are still started in the background.
 
         Args:
-            check: called every tenth of a second; what it raises, such as `Interrupted`, waits for
-                no member: a try that is under way may go on in its thread, and no other is begun.
-
-            stepped: whether the run has taken steps before, so that its worlds were right.
+            check: called every tenth of a second. What it raises, such as `Interrupted`, does not wait for
+                members: a start that is under way may go on in its thread, and no other begins.
+            stepped: whether the run has taken steps before, which shows that its worlds were right.
 
         Raises:
-            FaultBudgetSpent: too many of a group do not come up, however often it is tried.
-            ConfigurationError: a world lacks what the environment needs; two processes of it said so.
+            FaultBudgetSpent: too many simulators of a group failed to start, within their budgets.
+            ConfigurationError: a world lacks what the environment needs, as two processes of it showed.
         """
         check()
         for keeper in self._all:
@@ -81,7 +80,7 @@ class Fleet:
                 if (waited_s := time.monotonic() - began) >= report_at_s:
                     report_at_s = 2 * waited_s
                     log.info("waiting for simulators", names=self._down(), waited_s=round(waited_s))
-                # Not until one is mended: that one of them has been tried may be enough as well.
+                # Any finished work ends the wait: a first start that failed may be enough too.
                 wait(
                     [work for keeper in self._all if (work := keeper.under_way)],
                     LOOK_EVERY_S,
@@ -92,10 +91,10 @@ class Fleet:
                 keeper.abandon()
             raise
         for keeper in self._all:
-            keeper.stepped = True  # from here on the others may step, whatever becomes of this one
+            keeper.stepped = True  # from here on other members may step, even if this one still starts
 
     def stop(self) -> None:
-        """Stop all members at once, however they are, also those that are being mended."""
+        """Stop all members at once, in any state, also during a repair."""
         stops = [in_background(keeper.stop, f"stop-{keeper.name}") for keeper in self._all]
         wait(stops)
         for stop in stops:
@@ -111,7 +110,7 @@ class Fleet:
 
 @contextmanager
 def running(keepers: Sequence[Keeper]) -> Iterator[None]:
-    """Run the members while inside, let them rest outside."""
+    """Run the members inside the context, pause them outside."""
     for keeper in keepers:
         keeper.run()
     try:
@@ -122,7 +121,7 @@ def running(keepers: Sequence[Keeper]) -> Iterator[None]:
 
 @contextmanager
 def resting(keepers: Sequence[Keeper]) -> Iterator[None]:
-    """Let the members rest while inside, run them outside."""
+    """Pause the members inside the context, run them outside."""
     rest(keepers)
     try:
         yield
@@ -132,19 +131,19 @@ def resting(keepers: Sequence[Keeper]) -> Iterator[None]:
 
 
 def rest(keepers: Sequence[Keeper]) -> None:
-    """Let the members rest."""
+    """Pause the members."""
     for keeper in keepers:
         keeper.pause()
 
 
 def groups_of(configuration: Configuration) -> dict[str, Group]:
-    """Return the groups of a configuration's simulators by name."""
+    """Return the groups of a configuration's simulators, by name."""
     sizes = Counter(simulator.group for simulator in configuration.simulators)
     return {it.group: Group(sizes[it.group], it.min_simulators) for it in configuration.simulators}
 
 
 def care_of(simulator: SimulatorConfiguration) -> Care:
-    """Return how the configuration wants one member to be looked after."""
+    """Return the restart limit of one member from the configuration."""
     return Care(
         restart_limit=simulator.restart.limit,
         restart_within_s=simulator.restart.within_seconds,

@@ -12,7 +12,7 @@ from palaestra_trainer.simulators.child import first_line, start_child
 
 
 def ensure_master() -> None:
-    """Make sure that a ROS master answers, by starting one on a free port if none does.
+    """Start a ROS master on a free port if none answers.
 
     Sets ROS_MASTER_URI and ROS_HOSTNAME of this process to the one it starts.
     """
@@ -22,6 +22,6 @@ def ensure_master() -> None:
         module = [sys.executable, "-m", "palaestra_trainer.simulators.own_master"]
         uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
         if not uri.startswith("http://"):
-            raise MasterLost("a ROS master could not be started; start rosmaster by hand") from None
+            raise MasterLost("a ROS master could not be started; start rosmaster yourself") from None
         os.environ["ROS_MASTER_URI"] = uri
         os.environ["ROS_HOSTNAME"] = "localhost"

@@ -1,6 +1,6 @@
-"""What the training loop needs of a simulator, and whom it tells what happens to it.
+"""The interface of a simulator for the training loop, and of an observer of simulators.
 
-A `Member` is one simulator with the environment that is played in it; a `Watcher` hears of its faults.
+A `Member` is one simulator with its environment; a `Watcher` receives its faults.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Step = tuple[Any, Any, bool, bool, dict[str, Any]]
 
 
 class Member(Protocol):
-    """One simulator and the environment that is played in it."""
+    """One simulator and its environment."""
 
     @property
     def name(self) -> str:
@@ -31,45 +31,45 @@ class Member(Protocol):
         ...
 
     def due(self) -> str | None:
-        """Return why it ought to be recycled before the next episode, in words; None: no reason."""
+        """Return the reason to recycle it before the next episode, as text; None: no reason."""
         ...
 
     def start(self) -> None:
-        """Start the simulator; `SimulatorFault` if it doesn't come up in time."""
+        """Start the simulator; raise `SimulatorFault` if it does not start in time."""
         ...
 
     def stop(self) -> None:
-        """Stop the simulator, however it is."""
+        """Stop the simulator, in any state."""
         ...
 
     def restart(self) -> None:
-        """Stop the simulator, however it is, and start it; `SimulatorFault` if it doesn't come."""
+        """Stop the simulator, in any state, and start it; raise `SimulatorFault` if that fails."""
         ...
 
     def abandon(self) -> None:
-        """Let a start or restart that is under way in another thread fail soon; harmless otherwise."""
+        """Make a start or restart in another thread fail soon; without one, do nothing."""
         ...
 
     def pause(self) -> None:
-        """Let the simulator rest: it uses no processor until `run`."""
+        """Pause the simulator: it uses no processor time until `run`."""
         ...
 
     def run(self) -> None:
-        """End the rest that `pause` began."""
+        """End the pause."""
         ...
 
 
 @runtime_checkable
 class Spared(Protocol):
-    """A member in which a second simulator stands by to take the place of the first."""
+    """A member with a standby: a second simulator that can take the place of the first."""
 
     def spare(self) -> str | None:
-        """Return one of `StandbyState`; None: nobody could take over, now or soon."""
+        """Return one of `StandbyState`; None: no simulator can take over, now or soon."""
         ...
 
 
 class Watcher(Protocol):
-    """Who is told what happens to simulators; called from the thread it happens in."""
+    """Receives the events of simulators; called from the thread in which they happen."""
 
     def stepped(self, steps: int) -> None:
         """`steps` environment steps were taken."""
@@ -84,15 +84,15 @@ class Watcher(Protocol):
         ...
 
     def restarted(self, simulator: str, *, recycled: bool) -> None:
-        """A simulator is up again, after a fault or because it was recycled."""
+        """A simulator is up again, after a fault or after recycling."""
         ...
 
     def slow(self, simulator: str, seconds: float) -> None:
-        """A step took much longer than the simulator's steps usually do; that is no fault."""
+        """A step took much longer than the simulator's usual steps; that is not a fault."""
         ...
 
     def flapping(self, simulator: str) -> None:
-        """A simulator is being restarted, and has been again and again for some time."""
+        """A simulator is being restarted, and has been restarted repeatedly for some time."""
         ...
 
     def given_up(self, simulator: str) -> None:
@@ -100,12 +100,12 @@ class Watcher(Protocol):
         ...
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
-        """What training's thread does inside is spent on `cause`; no turn may end inside."""
+        """Book the time of the training thread inside the context on `cause`; no turn may end inside."""
         ...
 
 
 class Nobody:
-    """A watcher that listens to nothing."""
+    """A watcher that ignores all events."""
 
     def stepped(self, steps: int) -> None:
         """Ignore it."""

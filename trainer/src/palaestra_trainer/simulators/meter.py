@@ -1,4 +1,4 @@
-"""What playing in one simulator comes to."""
+"""The counts of one simulator: steps, resets, simulated time and spent restarts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_trainer.simulators.member import Member
 
 @runtime_checkable
 class Timed(Protocol):
-    """A member that knows how much time it has simulated."""
+    """A member that counts its simulated time."""
 
     @property
     def simulated_s(self) -> float:
@@ -21,15 +21,15 @@ class Timed(Protocol):
 
 
 class Meter:
-    """Counts for one member; written by whoever plays in it, read by any thread.
+    """Counts for one member; written by the thread that steps it, read by any thread.
 
     Attributes:
         steps: seconds that each environment step took.
         resets: episodes begun.
 
     Args:
-        member: what is played in.
-        budget: its restarts.
+        member: the member that is played in.
+        budget: its restart budget.
     """
 
     def __init__(self, member: Member, budget: RestartBudget) -> None:
@@ -40,10 +40,10 @@ class Meter:
 
     @property
     def simulated_s(self) -> float | None:
-        """Simulated seconds; None: the member does not know."""
+        """Simulated seconds; None: the member does not count them."""
         return self._member.simulated_s if isinstance(self._member, Timed) else None
 
     @property
     def budget_spent(self) -> float:
-        """Share of its restarts that is spent by now, 0 to 1."""
+        """Share of its restart budget that is spent now, 0 to 1."""
         return self._budget.spent_share

@@ -1,4 +1,4 @@
-"""Numbers that nothing can be learnt from: NaN and infinity, where they come from."""
+"""Refuse NaN and infinite observations and rewards where they arise; nothing can be learned from them."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from palaestra_trainer.simulators.member import Environment
 def check_observation(simulator: str, env: Environment, observation: Any) -> None:
     """Return if every number of an observation is finite; it may be a mapping of several.
 
-    The robot has checked its sensors before, so what is wrong here comes from the environment's own code.
+    The robot has already checked its sensors, so a wrong number here comes from the environment's own code.
 
     Raises:
-        Diverged: one is not; the message names the environment and the number's place.
+        Diverged: a number is not finite; the message names the environment and the number's place.
     """
     parts = observation if isinstance(observation, Mapping) else {"": observation}
     for name, part in parts.items():
         if fact := _not_finite(part):
             where = f"observation {name}".rstrip()
-            raise Diverged(f"{simulator}: {_name(env)}: {where}{fact}; mend the environment")
+            raise Diverged(f"{simulator}: {_name(env)}: {where}{fact}; fix the environment")
 
 
 def check_reward(simulator: str, reward: Any, info: Mapping[str, Any]) -> None:
     """Return if a reward is finite.
 
     Raises:
-        Diverged: it is not; the message names the terms that are not, where the environment tells them.
+        Diverged: it is not finite; the message names the wrong terms, if the environment reports terms.
     """
     if math.isfinite(reward):
         return
     terms = info.get("reward_terms", {})
     wrong = ", ".join(name for name, value in terms.items() if not math.isfinite(value))
     where = f" (term {wrong})" if wrong else ""
-    raise Diverged(f"{simulator}: the reward is {float(reward)}{where}; mend the environment's reward")
+    raise Diverged(f"{simulator}: the reward is {float(reward)}{where}; fix the environment's reward")
 
 
 def _not_finite(part: Any) -> str:
-    """Return place and value of the first number that is not finite; "" if there is none."""
+    """Return place and value of the first number that is not finite; "" if all are finite."""
     numbers = np.asarray(part)
     if numbers.dtype.kind != "f" or np.isfinite(numbers).all():
         return ""

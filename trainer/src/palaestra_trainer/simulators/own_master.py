@@ -1,7 +1,7 @@
-"""A ROS master that lives as long as the program that started it; `python -m` this module.
+"""A ROS master that ends with the program that started it; `python -m` this module.
 
-It takes a free port and prints its URI. It ends when its standard input closes, which the kernel sees to
-even when its owner is killed.
+It takes a free port and prints its URI. It ends when its standard input closes; the kernel closes it even
+when the owner is killed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def main() -> None:
     """Serve on loopback until standard input closes."""
     logging.basicConfig(level=logging.ERROR)
     os.environ["ROS_HOSTNAME"] = "localhost"
-    # Watched from the start: rosmaster waits for its own server without an end.
+    # Watched from the start: rosmaster waits for its own server without a timeout.
     owned = threading.Thread(target=_end_with_owner)
     owned.start()
     master = Master(0)
@@ -30,7 +30,7 @@ def main() -> None:
 
 def _end_with_owner() -> None:
     sys.stdin.read()
-    os._exit(0)  # the master's server threads know no end
+    os._exit(0)  # the master's server threads never end
 
 
 if __name__ == "__main__":

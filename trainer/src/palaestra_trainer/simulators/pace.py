@@ -1,4 +1,4 @@
-"""Telling a slow step from an ordinary one."""
+"""Detect slow steps."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _FEWEST = 10
 
 
 class Pace:
-    """How long the steps of one simulator take: the median of the last hundred."""
+    """The usual duration of one simulator's steps: the median of the last hundred."""
 
     def __init__(self) -> None:
         self._recent: deque[float] = deque(maxlen=_REMEMBERED)
 
     def slow(self, seconds: float) -> bool:
-        """Return whether a step that took `seconds` was slow, and remember it.
+        """Return whether a step that took `seconds` was slow, and remember its duration.
 
-        Slow is what takes more than 10 times the median and more than 50 ms; nothing is before ten steps
-        have been seen.
+        A step is slow if it takes more than 10 times the median and more than 50 ms. None of the first ten
+        steps is slow.
         """
         slow = seconds > SLOW_S and len(self._recent) >= _FEWEST and seconds > SLOW_TIMES * self._median()
         self._recent.append(seconds)

@@ -1,6 +1,6 @@
-"""Simulators as processes of this machine, for notebooks and scripts: no pod, no runner.
+"""Simulators as processes of this machine, for notebooks and scripts, without a pod or a runner.
 
-The process is a sidecar, so that restarts, kills and clean ends are the same code as in a pod.
+The process is a sidecar, so restarts, kills and clean ends use the same code as in a pod.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class ProcessLauncher(Sidecar):
         world: path of the world, or the name of one that ships.
         driver: stub or webots.
         options: command-line options for the simulator.
-        names: the sidecar's options that give the robots ROS names of their own.
-        suffix: what stands behind the ROS names that the world has.
+        names: sidecar options that set the ROS names of the robots.
+        suffix: text that is appended to the ROS names in the world.
 
     Raises:
-        ConfigurationError: the sidecar refused the world or the driver; its words are in the message.
+        ConfigurationError: the sidecar refused the world or the driver; its output is in the message.
     """
 
     def __init__(
@@ -67,16 +67,16 @@ class ProcessLauncher(Sidecar):
         if found is None:
             _, said = self._process.communicate(timeout=_END_S)
             self._folder.cleanup()
-            raise ConfigurationError(said.decode(errors="replace").strip() or f"the sidecar said {line!r}")
+            raise ConfigurationError(said.decode(errors="replace").strip() or f"the sidecar printed {line!r}")
         drain(self._process)
         super().__init__(f"http://{found[1]}", Path(world).stem)
 
     @classmethod
     def beside_others(cls, world: str | Path, driver: str, options: Sequence[str]) -> ProcessLauncher:
-        """Return a launcher whose ROS names are the world's, with `_2`, `_3`, ... where those are in use.
+        """Return a launcher that keeps the world's ROS names, or appends `_2`, `_3`, ... if those are in use.
 
         Raises:
-            ConfigurationError: as the class; or all names are in use.
+            ConfigurationError: as the class, or all names are in use.
         """
         for number in range(1, _MOST_BESIDE + 1):
             launcher = cls(world, driver, options, suffix="" if number == 1 else f"_{number}")
@@ -88,11 +88,11 @@ class ProcessLauncher(Sidecar):
                 raise
             launcher.close()
         raise ConfigurationError(
-            f"{world}: {_MOST_BESIDE} simulators with its ROS names run already; close those that are unused"
+            f"{world}: {_MOST_BESIDE} simulators with its ROS names are already running; close unused ones"
         )
 
     def reserve(self) -> bool:
-        """Keep others from the ROS names of this simulator until `close`; False: one is in use.
+        """Reserve the ROS names of this simulator until `close`; False: one is in use.
 
         Raises:
             MasterLost: no ROS master answers.
@@ -100,13 +100,13 @@ class ProcessLauncher(Sidecar):
         return self._reservation.take(robot.ros_name for robot in self.state().robots)
 
     def close(self) -> None:
-        """End the sidecar, and the simulator with it."""
+        """End the sidecar and its simulator."""
         end_child(self._process)
         self._reservation.release()
         self._folder.cleanup()
 
 
 def _program(name: str) -> list[str]:
-    """Return the program beside this interpreter, else wherever PATH finds it."""
+    """Return the program beside this interpreter, else the one that PATH finds."""
     beside = Path(sys.executable).with_name(name)
     return [str(beside) if beside.exists() else name]

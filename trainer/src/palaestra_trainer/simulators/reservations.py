@@ -1,6 +1,6 @@
-"""ROS names that no other simulator of this machine may take, from before its start to its end.
+"""Reserve the ROS names of a simulator on this machine, from before its start to its end.
 
-A name is free if no node of it runs and no program has reserved it.
+A name is free if no node of that name runs and no program has reserved it.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from palaestra_trainer.ros import Master
 
 
 class Reservation:
-    """The names that one simulator holds."""
+    """The names that one simulator has reserved."""
 
     def __init__(self) -> None:
         self._locks: list[FileLock] = []
 
     def take(self, names: Iterable[str]) -> bool:
-        """Reserve all of `names`; False: one of them is in use, and none is held.
+        """Reserve all of `names`; False: one is in use, and none is reserved.
 
         Raises:
             MasterLost: no ROS master answers.
@@ -35,7 +35,7 @@ class Reservation:
         return True
 
     def release(self) -> None:
-        """Let others have the names."""
+        """Release the names."""
         while self._locks:
             self._locks.pop().release()
 

@@ -1,4 +1,4 @@
-"""A simulator behind its sidecar: what the control port can do, as a launcher of the Webots facade."""
+"""A client of a sidecar's control port; serves the Webots facade as its launcher."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _CONFLICT = 409
 
 
 class Sidecar:
-    """One simulator at the control port of its sidecar.
+    """One simulator behind the control port of its sidecar.
 
     Every method raises SimulatorDead when the sidecar is gone and SimulatorHung when it does not answer.
 
@@ -33,9 +33,9 @@ class Sidecar:
         address: e.g. http://127.0.0.1:7100
 
     Args:
-        address: kept as the attribute.
+        address: see Attributes.
         name: the simulator's name, for messages.
-        above: what stands before the paths of this simulator.
+        above: prefix of this simulator's paths.
     """
 
     def __init__(self, address: str, name: str, above: str = "") -> None:
@@ -46,18 +46,18 @@ class Sidecar:
         self._above = above
 
     def standby(self) -> Sidecar:
-        """Return the second simulator of the same sidecar, which has one if it was started with --standby."""
+        """Return the second simulator of the same sidecar; the sidecar must run with --standby."""
         return Sidecar(self.address, self._name, STANDBY)
 
     def state(self) -> SimulatorState:
-        """Return what the sidecar says of its simulator."""
+        """Return the state that the sidecar reports for its simulator."""
         return self._ask("GET", "/state")
 
     def first_state(self, deadline_s: float) -> SimulatorState:
-        """Return the state, waiting for a sidecar that does not listen yet.
+        """Return the state; wait if the sidecar does not listen yet.
 
         Raises:
-            SimulatorDead, SimulatorHung: it has not answered within `deadline_s` seconds.
+            SimulatorDead, SimulatorHung: it did not answer within `deadline_s` seconds.
         """
         give_up = time.monotonic() + deadline_s
         while True:
@@ -66,26 +66,26 @@ class Sidecar:
             except SimulatorDead:
                 if time.monotonic() > give_up:
                     raise
-            time.sleep(_POLL_S)  # another process is on its way, and has no call that waits
+            time.sleep(_POLL_S)  # the sidecar is starting, and there is no call that would wait for it
 
     def start(self) -> None:
-        """Begin to start the simulator; one that is on its way already is left alone."""
+        """Start the simulator without waiting for it; one that already starts is left alone."""
         self._ask("POST", "/start", {})
 
     def confirm_ready(self) -> None:
-        """Tell that the simulator has answered a real round trip."""
+        """Report to the sidecar that the simulator has answered a real round trip."""
         self._ask("POST", "/ready", {})
 
     def ready(self) -> bool:
-        """Return whether the simulator runs, and was confirmed to be ready."""
+        """Return whether the simulator runs and was confirmed as ready."""
         return self.state().state is SidecarState.READY
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Announce that the simulator will end; it is killed after `deadline_s` seconds."""
+        """Announce that the simulator will end; the sidecar kills it after `deadline_s` seconds."""
         self._ask("POST", "/stop", StopRequest(deadline_s=deadline_s).to_json())
 
     def failure(self) -> str | None:
-        """Return why the simulator is not running, None while it runs or starts."""
+        """Return why the simulator is not running; None while it runs or starts."""
         state = self.state()
         if state.state in {SidecarState.STARTING, SidecarState.READY}:
             return None
@@ -95,13 +95,13 @@ class Sidecar:
         """Return when the simulator has ended.
 
         Raises:
-            SimulatorHung: it has not within `deadline_s` seconds.
+            SimulatorHung: it did not end within `deadline_s` seconds.
         """
         give_up = time.monotonic() + deadline_s
         while self.state().state not in {SidecarState.IDLE, SidecarState.FAILED}:
             if time.monotonic() > give_up:
                 raise SimulatorHung(self._name, f"did not end within {deadline_s:g} s")
-            time.sleep(_POLL_S)  # between two questions to another process, which has no call that waits
+            time.sleep(_POLL_S)  # between two requests; the control port has no call that would wait
 
     def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> SimulatorState:
         connection = http.client.HTTPConnection(self._host, self._port, timeout=_TIMEOUT_S)

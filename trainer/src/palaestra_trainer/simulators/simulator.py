@@ -28,13 +28,13 @@ class Simulator:
 
     Args:
         name: `<group>-<index>`, as in the configuration.
-        sidecar: where the simulator is started and stopped.
-        make_environment: makes the environment from robot and scene.
-        start_deadline_s: the longest time until the sidecar, and after a start the simulator, answers.
-        recycle: when it is due to be restarted between two episodes; by default never.
+        sidecar: starts and stops the simulator.
+        make_environment: creates the environment from robot and scene.
+        start_deadline_s: the longest time for the sidecar to answer, and for the simulator after a start.
+        recycle: limits at which it is restarted between two episodes; by default never.
 
     Raises:
-        SimulatorDead, SimulatorHung: the sidecar cannot be asked for the robots' names.
+        SimulatorDead, SimulatorHung: the sidecar does not report the robots' names.
         ConfigurationError: the world has no robot that is a supervisor.
     """
 
@@ -54,7 +54,7 @@ class Simulator:
         state = sidecar.first_state(start_deadline_s)
         supervisor = next((robot for robot in state.robots if robot.supervisor), None)
         if supervisor is None:
-            raise ConfigurationError(f"{name}: the world has no robot with supervisor TRUE; give it one")
+            raise ConfigurationError(f"{name}: the world has no robot with supervisor TRUE; set it on one")
         driven = next((robot for robot in state.robots if not robot.supervisor), supervisor)
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
@@ -70,18 +70,18 @@ class Simulator:
 
     @property
     def simulated_s(self) -> float:
-        """Seconds of simulated time since this object was made, over all restarts."""
+        """Seconds of simulated time since this object was created, over all restarts."""
         return self.robot.simulation.simulated_s
 
     def due(self) -> str | None:
-        """Return why it ought to be recycled before the next episode, in words; None: no reason."""
+        """Return the reason to recycle it before the next episode, as text; None: no reason."""
         return self.wear.due(self.resets)
 
     def start(self) -> None:
         """Start the simulator and connect to it, ready to step.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it does not come up in time.
+            SimulatorDead, SimulatorHung, WrongData: it does not start in time.
         """
         self.webots.start()  # connects the robot too
         self.run()
@@ -89,20 +89,20 @@ class Simulator:
         self.wear.begin()
 
     def restart(self) -> None:
-        """Stop the simulator, however it is, and start it, once its sidecar answers.
+        """Stop the simulator, in any state, and start it, once its sidecar answers.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it, or its sidecar, does not come up in time.
+            SimulatorDead, SimulatorHung, WrongData: it, or its sidecar, does not start in time.
         """
         self.await_sidecar()
         self.stop()
         self.start()
 
     def await_sidecar(self) -> None:
-        """Return when the sidecar answers: a kubelet takes its time to start a container again.
+        """Return when the sidecar answers; a kubelet needs some time to restart a container.
 
         Raises:
-            SimulatorDead, SimulatorHung: it has not within `start_deadline_s` seconds.
+            SimulatorDead, SimulatorHung: it did not answer within `start_deadline_s` seconds.
         """
         self._abandoned.clear()
         give_up = time.monotonic() + self.start_deadline_s
@@ -116,31 +116,31 @@ class Simulator:
                 return
 
     def stop(self) -> None:
-        """Stop the simulator, however it is."""
+        """Stop the simulator, in any state."""
         self.robot.close()
         self.webots.stop()
 
     def close(self) -> None:
-        """Drop all connections; the simulator goes on running."""
+        """Close all connections; the simulator keeps running."""
         self.robot.close()
         self.webots.close()
 
     def abandon(self) -> None:
-        """Let a start or restart that is under way in another thread fail soon, by killing the simulator."""
+        """Make a start or restart in another thread fail soon, by killing the simulator."""
         self._abandoned.set()
         with contextlib.suppress(SimulatorFault):
             self.sidecar.expect_stop(0.0)
 
     def pause(self) -> None:
-        """Let the simulator rest: it uses no processor until `run`."""
+        """Pause the simulator: it uses no processor time until `run`."""
         self.webots.supervisor.set_mode(Mode.PAUSE)
 
     def run(self) -> None:
-        """End the rest that `pause` began."""
+        """End the pause."""
         self.webots.supervisor.set_mode(Mode.FAST)
 
     def _memory(self) -> int | None:
-        # A sidecar that does not answer is no reason to restart what it started.
+        # A sidecar that does not answer is no reason to restart its simulator.
         with contextlib.suppress(SimulatorFault):
             return self.sidecar.state().rss_bytes
         return None

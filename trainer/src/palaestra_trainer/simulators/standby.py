@@ -1,13 +1,14 @@
-"""A member with a spare: while one simulator is played in, a second one stands by to take its place.
+"""A member with a spare: a second simulator that takes over when the active one must be restarted.
 
-Both belong to one sidecar and differ in their ROS names. A restart is a change of roles: the spare takes
-over at once if it is ready, and the other one, however it is, is restarted in a thread of its own to be
-the spare from then on. If it does not come up it is started again and again, within a budget like that of
-the one that is played in, and left down after that. A spare that broke meanwhile is found when it is wanted,
-and told as the fault it is; the restart after that waits for the other simulator, which is on its way by
-then. So whatever breaks, nothing waits for more than one start.
+Both simulators belong to one sidecar and differ in their ROS names. A restart swaps their roles: the spare
+takes over at once if it is ready. The other one is restarted in its own thread and becomes the spare. If it
+does not start, it is started again, within a budget like that of the active one, and stays down after that.
 
-The environment is that of whichever simulator is played in: nobody may keep it over a restart.
+If the spare breaks while it stands by, its fault is found and reported when it must take over. The restart
+after that waits for the other simulator, which is already being started. So no fault waits for more than one
+start.
+
+The environment belongs to the active simulator, so do not keep it over a restart.
 """
 
 from __future__ import annotations
@@ -39,9 +40,9 @@ class Standby:
     """Two simulators as one member.
 
     Args:
-        first: is played in first.
-        second: stands by.
-        care: how often, and within what time, a spare that does not come up is started again.
+        first: the active one at the beginning.
+        second: the standby.
+        care: restart limit of a spare that does not start.
     """
 
     def __init__(self, first: Simulator, second: Simulator, care: Care | None = None) -> None:
@@ -55,32 +56,32 @@ class Standby:
 
     @property
     def env(self) -> Environment:
-        """The environment of the simulator that is played in; another one after a restart."""
+        """The environment of the active simulator; another object after a restart."""
         return self._active.simulator.env
 
     @property
     def resets(self) -> int:
-        """Resets since the simulator that is played in was last started."""
+        """Resets since the active simulator was last started."""
         return self._active.simulator.resets
 
     @property
     def simulated_s(self) -> float:
-        """Seconds of simulated time of both since they were made, over all restarts."""
+        """Seconds of simulated time of both since they were created, over all restarts."""
         return sum(each.simulated_s for each in self._both)
 
     def spare(self) -> StandbyState | None:
-        """Return whether the spare could take over; None: it is neither ready nor on its way."""
+        """Return the state of the spare; None: it is neither ready nor being started."""
         return self._spare.state
 
     def due(self) -> str | None:
-        """Return why the simulator that is played in ought to be recycled, None: no reason."""
+        """Return the reason to recycle the active simulator; None: no reason."""
         return self._active.simulator.due()
 
     def start(self) -> None:
         """Start the first simulator; the spare follows in the background.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: the first one does not come up in time.
+            SimulatorDead, SimulatorHung, WrongData: the first one does not start in time.
         """
         for side in (self._active, self._spare):
             side.wanted = True
@@ -101,29 +102,29 @@ class Standby:
         )
 
     def stop(self) -> None:
-        """Stop both simulators, however they are; no thread works on them when this returns."""
+        """Stop both simulators, in any state; no thread works on them when this returns."""
         with contextlib.ExitStack() as stack:
             for side in (self._active, self._spare):
                 stack.callback(side.stop)
 
     def abandon(self) -> None:
-        """Let a start or restart that is under way in another thread fail soon."""
+        """Make a start or restart in another thread fail soon."""
         self._active.abandon()
 
     def pause(self) -> None:
-        """Let the simulator that is played in rest, as the spare does all the time."""
+        """Pause the active simulator; the spare is always paused."""
         self._active.simulator.pause()
 
     def run(self) -> None:
-        """End the rest that `pause` began."""
+        """End the pause."""
         self._active.simulator.run()
 
 
 class Side:
-    """One of the two simulators, and the thread that may be making it ready.
+    """One of the two simulators, and the thread that may be preparing it.
 
     Attributes:
-        simulator: while it is made ready, its thread's alone.
+        simulator: only the thread may use it while it prepares it.
         wanted: False: it is not started any more.
     """
 
@@ -136,8 +137,8 @@ class Side:
 
     @property
     def state(self) -> StandbyState | None:
-        """Whether it could take over; None: it is neither ready nor on its way."""
-        preparation = self._preparation  # which another thread may set
+        """Its state; None: it is neither ready nor being started."""
+        preparation = self._preparation  # another thread may set it
         if preparation is None:
             return None
         if not preparation.done():
@@ -145,16 +146,16 @@ class Side:
         return None if preparation.exception() else StandbyState.READY
 
     def prepare(self) -> Future[None]:
-        """Begin to restart it until it is up, however it is, unless that is under way already."""
+        """Begin to restart it until it is up, in any state, unless that is under way."""
         if self._preparation is None or self._preparation.done():
             self._preparation = in_background(self._restart, f"standby-{self.simulator.name}")
         return self._preparation
 
     def take_over(self) -> None:
-        """Return when it is up and runs, after no longer than a simulator may take to start.
+        """Return when it is up and runs; wait no longer than the start deadline of a simulator.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: it did not come up, or broke while it stood by.
+            SimulatorDead, SimulatorHung, WrongData: it did not start, or broke while it stood by.
         """
         simulator, deadline_s = self.simulator, self.simulator.start_deadline_s
         preparation = self._preparation or self.prepare()
@@ -162,22 +163,22 @@ class Side:
             raise SimulatorHung(simulator.name, f"its standby was not ready within {deadline_s:g} s")
         preparation.result()
         if not simulator.webots.available():
-            raise SimulatorDead(simulator.name, "its standby does not answer any more")
+            raise SimulatorDead(simulator.name, "its standby no longer answers")
         simulator.run()
         simulator.wear.begin()
 
     def abandon(self) -> None:
-        """Let a start that is under way fail soon, and begin no other."""
+        """Make a start that is under way fail soon, and begin no other."""
         self.wanted = False
         self.simulator.abandon()
 
     def stop(self) -> None:
-        """Stop it, however it is; no thread works on it when this returns."""
+        """Stop it, in any state; no thread works on it when this returns."""
         self.wanted = False
         preparation, self._preparation = self._preparation, None
         while preparation is not None and not preparation.done():
-            # Killed, it fails to come up, and its thread ends. That may take a second time:
-            # what is only about to be started cannot be killed yet.
+            # The kill makes its start fail and ends its thread. It may be needed twice: a process
+            # that is only about to be started cannot be killed yet.
             self.abandon()
             wait([preparation], _ASK_AGAIN_S)
         self.simulator.stop()
@@ -201,7 +202,7 @@ class Side:
         simulator.await_sidecar()
         simulator.stop()
         if not self.wanted:
-            raise SimulatorDead(simulator.name, "its standby is not wanted any more")
+            raise SimulatorDead(simulator.name, "its standby is no longer needed")
         simulator.start()
         simulator.pause()
 

@@ -1,10 +1,10 @@
-"""Many simulators as one Stable-Baselines3 VecEnv, in which faults are ordinary.
+"""Many simulators as one Stable-Baselines3 VecEnv that tolerates faults.
 
-All members step at the same time, in turns of the caller's thread: each asks
-its simulator for the step before the first answer is awaited. A member that
-breaks is mended in the background, and its rows are invalid until it is up
-again, see `palaestra_trainer.simulators.collector`: the others go on. Only when
-none is left that could step is one of them waited for.
+All members step at the same time, in turns of the caller's thread: each sends
+its simulator the step before the first answer is awaited. A broken member is
+restarted in the background. Its rows are invalid until it is up again, see
+`palaestra_trainer.simulators.collector`, and the other members continue. Only
+if no member can step does the thread wait for one.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class SimulatorsVecEnv(VecEnv):
 
     Args:
         keepers: one for each member; rows are in their order.
-        run_seed: the replica's seed; each episode's own follows from it.
-        check: called every tenth of a second while members are waited for; raises to wait no longer.
+        run_seed: the replica's seed; each episode's seed is derived from it.
+        check: called every tenth of a second during waits for members; raises to stop the wait.
     """
 
     def __init__(self, keepers: Sequence[Keeper], run_seed: int, *, check: Check = go_on) -> None:
@@ -49,17 +49,17 @@ class SimulatorsVecEnv(VecEnv):
         self._actions = np.empty(0)
 
     def pause(self) -> None:
-        """Let all members rest until `run`."""
+        """Pause all members until `run`."""
         for keeper in self._keepers:
             keeper.pause()
 
     def run(self) -> None:
-        """End the rest of all members."""
+        """End the pause of all members."""
         for keeper in self._keepers:
             keeper.run()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Make `seed` the run's seed, if one is given; return the seeds of the next episodes."""
+        """Set the run's seed, if one is given; return the seeds of the next episodes."""
         for collector in self._collectors:
             collector.run_seed = collector.run_seed if seed is None else seed
         return [collector.next_seed() for collector in self._collectors]
@@ -76,13 +76,13 @@ class SimulatorsVecEnv(VecEnv):
         return self._stack(observations)
 
     def snapshot(self) -> list[EpisodeState]:
-        """Return how far each member is; cheap, and not changed by later steps."""
+        """Return the position of each member in its episodes; cheap, and not changed by later steps."""
         return [collector.state for collector in self._collectors]
 
     def resume(self, states: Sequence[EpisodeState]) -> VecEnvObs:
-        """Return the observations after bringing each member to its state, all of them at once.
+        """Bring all members back to their states, at once; return their observations.
 
-        The steps that it takes are not counted; returns and lengths of the episodes go on as they were.
+        The steps for it are not counted; returns and lengths of the episodes continue as they were.
         """
         observations = take_turns(
             partial(collector.resume, state)
@@ -121,7 +121,7 @@ class SimulatorsVecEnv(VecEnv):
         )
 
     def close(self) -> None:
-        """End what goes on in the background and close the environments; the simulators are their owner's."""
+        """End background work and close the environments; the caller stops the simulators."""
         settle(self._keepers)
         for keeper in self._keepers:
             if not keeper.busy:
@@ -151,14 +151,14 @@ class SimulatorsVecEnv(VecEnv):
         return [is_wrapped(env, wrapper_class) for env in self._targets(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return a picture of each environment, None where it draws none."""
+        """Return an image of each environment, None if it draws none."""
         return [cast("np.ndarray | None", env.render()) for env in self._targets(None)]
 
     def _targets(self, indices: VecEnvIndices) -> list[Environment]:
         return [self._collectors[index].env for index in self._get_indices(indices)]
 
     def _await_somebody(self) -> None:
-        """Return when a member can step or has become ready; rows that are all invalid help nobody."""
+        """Return when a member can step or has become ready; a vector of only invalid rows is useless."""
         if all(keeper.busy or keeper.lost for keeper in self._keepers):
             with self._watcher.spending(Cause.RECOVERING):
                 await_one(self._keepers, self._check)
