@@ -100,7 +100,7 @@ def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
     with ProcessPoolExecutor(1, multiprocessing.get_context(method)) as worker:
         theirs = worker.submit(_claim_and_name, configuration, scratch).result(LONG_S)
         assert (mine, theirs) == ("s-0", "s-1")
-        with pytest.raises(ConfigurationError, match="each of them has an environment"):
+        with pytest.raises(ConfigurationError, match="each has an environment"):
             take(configuration)
 
 

@@ -131,7 +131,7 @@ def test_all_options_that_do_not_fit_are_reported_at_once(made):
     assert lines == [
         "environment.options.widht: Hall-v0 has no such argument; did you mean width?",
         "environment.options.length: Hall-v0 has no such argument; use one of robot, scene, width",
-        "environment.options.width: Hall-v0 needs this argument; add it, or give it a default",
+        "environment.options.width: Hall-v0 needs this argument; set it, or give it a default",
     ]
 
 
@@ -142,13 +142,13 @@ def test_an_environment_that_refuses_its_arguments_is_a_mistake_of_the_configura
         def __init__(self, robot, scene):
             raise ValueError("the hall is too small")
 
-    assert "Hall-v0 cannot be made (the hall is too small)" in refused(made, Strict)
+    assert "Hall-v0 cannot be created (the hall is too small)" in refused(made, Strict)
 
 
 @pytest.mark.parametrize("name", ["Nowhere-v0", "no_such_module:Hall-v0"])
 def test_an_unknown_environment_is_refused(name):
     """Whether its name or its module is wrong."""
-    with pytest.raises(ConfigurationError, match=f"environment.id: {name} cannot be made"):
+    with pytest.raises(ConfigurationError, match=f"environment.id: {name} cannot be created"):
         make_environment(Environment(id=name), *fake_arena())
 
 

@@ -62,7 +62,7 @@ def _mistakes_of_policy(types: Mapping[str, Any], given: Mapping[str, Any]) -> I
             yield f"{field}: the policy has no such argument; {nearest(name, known)}"
         elif name in CLASSES:
             if _class(name, value) is None:
-                yield f"{field}: {value!r} is unknown; {nearest(str(value), dict(CLASSES[name]))}"
+                yield f"{field}: {value!r} is not known; {nearest(str(value), dict(CLASSES[name]))}"
         elif fact := _refused(value, types[name]):
             yield f"{field}: {fact}"
 

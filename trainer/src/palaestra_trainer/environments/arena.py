@@ -78,7 +78,7 @@ def chosen_task(random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
             cylinder, or a start at which the robot would touch one.
     """
     if unknown := sorted(set(chosen) - {"start", "target"}):
-        raise ConfigurationError(f"reset option {unknown[0]!r} is unknown; use start or target")
+        raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
     start, target = chosen.get("start"), chosen.get("target")
     if start is not None:
         if not isinstance(start, Pose):

@@ -67,7 +67,7 @@ def parse(given: Mapping[str, Any]) -> Options:
 def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
     known = Movement.__members__
     if unknown := [str(it) for it in given if it not in known and it not in known.values()]:
-        raise ConfigurationError(f"movements: {', '.join(unknown)} unknown; use {', '.join(known)}")
+        raise ConfigurationError(f"movements: {', '.join(unknown)} not known; use {', '.join(known)}")
     return tuple(known[it] if isinstance(it, str) else Movement(it) for it in given)
 
 
@@ -76,7 +76,7 @@ def _mistakes(options: Options) -> Iterator[str]:
         yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
     yield from _mistakes_of_parts(options.observe)
     if options.actions not in ACTIONS:
-        yield f"actions: {options.actions!r} is unknown; use {' or '.join(ACTIONS)}"
+        yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
     if not options.movements:
         yield f"movements: is empty; choose from {', '.join(Movement.__members__)}"
     if len(set(options.movements)) < len(options.movements):
@@ -84,7 +84,7 @@ def _mistakes(options: Options) -> Iterator[str]:
     if options.max_steps < 1:
         yield f"max_steps: {options.max_steps} leaves no time; use at least 1"
     if options.time_up not in (None, *TIME_UP):
-        yield f"time_up: {options.time_up!r} is unknown; use {' or '.join(TIME_UP)}"
+        yield f"time_up: {options.time_up!r} is not known; use {' or '.join(TIME_UP)}"
 
 
 def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:

@@ -1,9 +1,10 @@
-"""Layer 1: the only place that speaks ROS.
+"""Layer 1: the only package that speaks ROS.
 
-rospy is the node: its name, its registration, what notebooks expect. What is hot goes past it, because a
-thread a topic and a proxy without deadline cost more than the simulation: `RosService` and `RosSubscriber`
-hold one persistent connection each, wait with a deadline, are rebuilt after a failure, and tell dead, hung
-and wrong data apart. One thread uses the services and subscribers of one simulator.
+rospy provides the node: its name, its registration, and the interface that notebooks expect. Calls that are
+made at each step do not use rospy, because its thread per topic and its proxies without a deadline cost more
+than the simulation. Instead `RosService` and `RosSubscriber` hold one persistent connection each. They wait
+with a deadline, are rebuilt after a failure, and distinguish dead, hung and wrong data. One thread uses the
+services and subscribers of one simulator.
 """
 
 from palaestra_trainer.ros.master import Master

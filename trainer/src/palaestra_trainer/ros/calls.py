@@ -1,7 +1,7 @@
 """One XML-RPC call of the ROS master or of a node, with a deadline and a checked answer.
 
-rosgraph's own client would wait for ever. What comes back is whatever the peer wrote: Python's reader raises
-errors of many kinds for bytes that are no answer, and all of them become `UnreadableAnswer` here.
+rosgraph's own client would wait forever. The peer may send any bytes. For bytes that are no answer, Python's
+reader raises errors of many kinds, and all of them become `UnreadableAnswer` here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ OK = 1
 
 
 class Answer(NamedTuple):
-    """What every call of ROS answers: 1 for success, words for people, a value."""
+    """The answer of every ROS call: 1 for success, a text for people, a value."""
 
     code: int
     text: str
@@ -24,7 +24,7 @@ class Answer(NamedTuple):
 
 
 class _Deadline(xmlrpc.client.Transport):
-    """HTTP for one call whose reads and writes end after `timeout_s` seconds."""
+    """An HTTP transport for one call whose reads and writes end after `timeout_s` seconds."""
 
     def __init__(self, timeout_s: float) -> None:
         super().__init__()
@@ -42,15 +42,15 @@ def call(uri: str, timeout_s: float, method: str, *arguments: Any) -> Answer:
 
     Raises:
         OSError: it cannot be reached; TimeoutError: it does not answer in time.
-        UnreadableAnswer: it answered, with something that is no answer of ROS.
+        UnreadableAnswer: it sent an invalid ROS response.
     """
     try:
         with xmlrpc.client.ServerProxy(uri, transport=_Deadline(timeout_s)) as proxy:
             answer: Any = getattr(proxy, method)(*arguments)
     except OSError:
         raise
-    except Exception as error:  # the reader's own choice: ExpatError, ValueError, TypeError, IndexError, ...
-        raise UnreadableAnswer(f"{uri} answered {method} with no XML-RPC: {error!r}") from error
+    except Exception as error:  # of many types: ExpatError, ValueError, TypeError, IndexError, ...
+        raise UnreadableAnswer(f"{uri} answered {method} with invalid XML-RPC: {error!r}") from error
     match answer:
         case [int(code), str(text), value]:
             return Answer(code, text, value)

@@ -1,4 +1,4 @@
-"""The ROS master, asked with a deadline."""
+"""A client of the ROS master, with a deadline for every call."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NODE_TIMEOUT_S = 1.0
 
 
 class Master:
-    """The master at ROS_MASTER_URI, asked in the name of `caller`.
+    """The master at ROS_MASTER_URI, called in the name of `caller`.
 
     Every method but `ping` raises MasterLost if no master answers or it refuses, and UnreadableAnswer if its
     answer cannot be read.
@@ -30,7 +30,7 @@ class Master:
         """Return if the master answers.
 
         Raises:
-            MasterLost: it does not, or what answers there is no master.
+            MasterLost: it does not, or another program answers.
         """
         try:
             self._call("getPid")
@@ -38,7 +38,7 @@ class Master:
             raise MasterLost(f"no ROS master at {self.uri}: {error}; is another program there?") from error
 
     def service_address(self, service: str) -> tuple[str, int] | None:
-        """Return host and port of the node that serves `service`; None when no node does."""
+        """Return host and port of the node that serves `service`; None if no node does."""
         answer = self._answer("lookupService", service)
         if answer.code != OK:
             return None
@@ -56,7 +56,7 @@ class Master:
         raise self._unreadable(f"the publishers of {topic}", answer)
 
     def unregister_subscriber(self, topic: str, node_uri: str) -> None:
-        """Take a registration back."""
+        """Unregister this node as a subscriber."""
         self._call("unregisterSubscriber", topic, node_uri)
 
     def node_names(self) -> set[str]:
@@ -68,7 +68,7 @@ class Master:
             raise self._unreadable("names of nodes", answer) from error
 
     def runs(self, node: str) -> bool:
-        """Return whether a node of that full name is running; a killed one leaves its name behind."""
+        """Return whether a node of that full name is running; the name of a killed node stays registered."""
         answer = self._answer("lookupNode", node)
         if answer.code != OK:
             return False

@@ -14,18 +14,18 @@ _lock = threading.Lock()
 
 
 def ensure_node(name: str = "palaestra_trainer") -> str:
-    """Return the full name of this process's node, made now unless the program made one already.
+    """Return the full name of this process's node; create the node unless the program has one already.
 
     Args:
         name: the node's name; a number is added so that several programs may share a master.
 
     Raises:
-        MasterLost: no master answers; rospy alone would wait for ever.
+        MasterLost: no master answers; rospy alone would wait forever.
     """
     with _lock:
         if not rospy.core.is_initialized():
             Master(f"/{name}").ping()
-            # Signals, clock and log topic stay the program's: rospy only lends the name and the registration.
+            # The program keeps its own signals, clock and log; rospy provides only name and registration.
             rospy.init_node(
                 f"{name}_{os.getpid()}", disable_signals=True, disable_rostime=True, disable_rosout=True
             )
@@ -33,5 +33,5 @@ def ensure_node(name: str = "palaestra_trainer") -> str:
 
 
 def node_uri() -> str:
-    """Return the address under which this process's node answers other nodes."""
+    """Return the URI at which this process's node answers other nodes."""
     return str(rospy.core.get_node_uri())

@@ -17,7 +17,7 @@ _OK_BYTE = 1
 
 
 class RosService:
-    """One service over one persistent connection, made at the first call and again after a failure.
+    """One service over one persistent connection, opened at the first call and again after a failure.
 
     Args:
         name: the full name, e.g. /robotino/robot/time_step
@@ -38,7 +38,7 @@ class RosService:
         """Return the response, an object with the fields of the type.
 
         Raises:
-            SimulatorDead: nobody serves it, or the connection broke.
+            SimulatorDead: no node serves it, or the connection broke.
             SimulatorHung: no answer within the deadline.
             WrongData: the service failed, or its answer cannot be read.
         """
@@ -72,7 +72,7 @@ class RosService:
             raise
 
     def fileno(self) -> int:
-        """Return the descriptor that can be read once the response to `begin` comes, or the connection broke.
+        """Return the descriptor that is readable once the response arrives or the connection breaks.
 
         Raises:
             SimulatorDead: there was no `begin`.
@@ -80,7 +80,7 @@ class RosService:
         return self._asked().fileno()
 
     def close(self) -> None:
-        """Drop the connection; the next call makes a new one."""
+        """Close the connection; the next call opens a new one."""
         if self._wire is not None:
             self._wire.close()
             self._wire = None
@@ -127,11 +127,11 @@ def call_together(
 
     Args:
         calls: services and the fields of their requests.
-        meanwhile: what can be done before the answers are awaited; is told whose will be the last.
+        meanwhile: called before the answers are awaited, with the service that answers last.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the others' connections are
-            dropped, since their answers would come out of step.
+        SimulatorDead, SimulatorHung, WrongData: from the first call that fails; the connections of the
+            others are closed, because their answers would be taken for those of later requests.
     """
     sent: list[RosService] = []
     try:

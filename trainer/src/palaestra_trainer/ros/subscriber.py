@@ -1,4 +1,4 @@
-"""A ROS topic whose messages are read when they are wanted."""
+"""A ROS topic whose messages are read on demand."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _CONNECT_S = 5.0
 
 
 class RosSubscriber:
-    """One topic of one publisher over one connection, made by `connect` and dropped after a failure.
+    """One topic of one publisher over one connection, opened by `connect` and closed after a failure.
 
     Args:
         name: the full name, e.g. /robotino/ir1/value
@@ -61,9 +61,9 @@ class RosSubscriber:
         """Connect to the publisher; it sees this subscriber when `connect` returns.
 
         Raises:
-            SimulatorDead: nobody publishes the topic, or the publisher cannot be reached.
+            SimulatorDead: no node publishes the topic, or the publisher cannot be reached.
             SimulatorHung: the publisher does not answer in time.
-            WrongData: the master or the publisher answers with something else.
+            WrongData: the master or the publisher sends an invalid answer.
         """
         self._drop()
         node = ensure_node()
@@ -90,7 +90,7 @@ class RosSubscriber:
         """Return the value of the next message, waiting for it.
 
         Raises:
-            SimulatorHung: none came within the deadline; the connection stays.
+            SimulatorHung: no message arrived within the deadline; the connection stays open.
             SimulatorDead: the connection broke, or `connect` was never called.
             WrongData: the message cannot be read.
         """
@@ -107,7 +107,7 @@ class RosSubscriber:
             raise WrongData(self.simulator, f"{self.name} sent {error}") from error
 
     def newest(self, default: Any) -> Any:
-        """Return the value of the last message that has arrived, `default` if there is none.
+        """Return the value of the last message that has arrived; `default` if there is none.
 
         Raises:
             SimulatorDead, WrongData: as `next`.
@@ -118,11 +118,11 @@ class RosSubscriber:
         return value
 
     def close(self) -> None:
-        """Drop the connection and take the registration back."""
+        """Close the connection and unregister the subscriber."""
         self._drop()
         if self._registered:
             self._registered = False
-            # A master that is gone has forgotten us; one that answers garbage takes no request.
+            # A lost master has no registration any more; one that sends garbage takes no request.
             with contextlib.suppress(MasterLost, UnreadableAnswer):
                 Master(ensure_node()).unregister_subscriber(self.name, node_uri())
 
@@ -147,4 +147,4 @@ class RosSubscriber:
         match answer.value:
             case [str(), str(host), int(port)]:
                 return host, port
-        raise WrongData(self.simulator, f"{self.name} is published at {answer.value!r}, which is no address")
+        raise WrongData(self.simulator, f"{self.name} is published at {answer.value!r}, not an address")

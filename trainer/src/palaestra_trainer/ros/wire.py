@@ -1,7 +1,7 @@
 """One persistent TCPROS connection of a client, with a deadline on every wait.
 
-Deadlines are the kernel's (SO_RCVTIMEO): one system call a read, where a selector or Python's own timeout
-would make two.
+The kernel enforces the deadlines (SO_RCVTIMEO). That needs one system call per read; a selector or Python's
+own timeout would need two.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from palaestra_trainer.waits import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192
-_MOST_KEPT_BYTES = 4 << 20  # pictures come at each step, and a buffer is not made anew for each
+_MOST_KEPT_BYTES = 4 << 20  # large enough for images, which arrive at each step, to reuse the buffer
 
-# Being woken costs a virtual machine 30 us, more than a stub needs for its answer. So where the last wait was
-# short, the next one first looks a few times, and lets others run in between.
+# A wake-up costs a virtual machine 30 us, more than a stub needs for its answer. So if the last wait was
+# short, the next one first polls a few times and yields the processor in between.
 _QUICK_S = 200e-6
 _LOOKS = 30
 
@@ -34,12 +34,12 @@ class Wire:
     Args:
         address: host and port of the peer.
         header: the connection header to send, e.g. service, md5sum and callerid.
-        simulator: the name that faults carry.
+        simulator: the simulator's name in faults.
         deadline_s: the longest wait for anything from the peer.
 
     Raises:
-        SimulatorDead: refused or closed.
-        SimulatorHung: no handshake in time.
+        SimulatorDead: the connection was refused or closed.
+        SimulatorHung: the handshake did not end in time.
         WrongData: the peer serves something else under that name.
     """
 
@@ -83,15 +83,15 @@ class Wire:
             raise self._fault("does not take requests", error) from error
 
     def receive(self, ahead: int = 0) -> bytes | memoryview:
-        """Return the next frame, with `ahead` bytes that stand before its length; valid until the next call.
+        """Return the next frame, with the `ahead` bytes before its length; valid until the next call.
 
         Raises:
             SimulatorDead, SimulatorHung: see the class.
-            WrongData: a length that cannot be.
+            WrongData: the announced length is impossible.
         """
         if self._quick and not self._filled:
-            # Nearly always the whole frame is here, and nothing else. Its bytes lie where those of the last
-            # one did, whosever they were: a buffer of one's own has left the processor's caches by now.
+            # Nearly always exactly one whole frame has arrived. `recv` reuses a small block that is still
+            # in the processor's cache; a buffer per connection would not be.
             try:
                 data = self._socket.recv(sockets.FIRST_BYTES, socket.MSG_DONTWAIT)
             except OSError:
@@ -116,14 +116,14 @@ class Wire:
             give_up = give_up or time.monotonic() + self._deadline_s
 
     def acknowledge_late(self) -> None:
-        """Let two messages be acknowledged by one packet; a packet for each costs half of reading it.
+        """Let the kernel acknowledge two messages with one packet; a packet for each costs half of its read.
 
-        For a peer with TCP_NODELAY only: any other holds a message back until the last one is acknowledged.
+        Use it only for a peer with TCP_NODELAY: others wait for each acknowledgment before the next message.
         """
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 0)
 
     def waiting_bytes(self) -> bool:
-        """Return whether something has arrived that nobody has read; a closed connection counts."""
+        """Return whether unread bytes have arrived; a closed connection counts."""
         if self._filled:
             return True
         try:
@@ -143,7 +143,7 @@ class Wire:
         self._socket.close()
 
     def _frame_end(self, ahead: int) -> int:
-        """Return where the frame at the start of the buffer ends, 0 while its length is unknown."""
+        """Return the end of the frame at the start of the buffer; 0 while its length is unknown."""
         if self._filled < ahead + LENGTH.size:
             return 0
         (length,) = LENGTH.unpack_from(self._buffer, ahead)
@@ -165,7 +165,7 @@ class Wire:
         return frame if ahead else frame[LENGTH.size :]
 
     def _make_room(self, end: int) -> None:
-        """Make room for as many bytes as have come: the length of a frame is a claim until then."""
+        """Make room for as many bytes as have arrived; the announced length may be wrong until then."""
         if self._filled == len(self._buffer):
             larger = bytearray(min(2 * self._filled, end + _BUFFER_BYTES))
             larger[: self._filled] = self._view
@@ -187,7 +187,7 @@ class Wire:
         self._filled += count
 
     def _spin(self, room: memoryview) -> int | None:
-        """Return how many bytes arrived while looking again and again; None: it takes longer."""
+        """Return how many bytes arrived during polling; None: it takes longer."""
         for _ in range(_LOOKS):
             try:
                 return self._socket.recv_into(room, 0, socket.MSG_DONTWAIT)
@@ -196,7 +196,7 @@ class Wire:
         return None
 
     def _sleep(self, room: memoryview) -> int:
-        """Return how many bytes arrived, from the kernel's wait."""
+        """Return how many bytes arrived during a wait in the kernel."""
         began = time.perf_counter()
         count = self._socket.recv_into(room, 0, socket.MSG_DONTWAIT if patience.is_over() else 0)
         self._quick = time.perf_counter() - began < _QUICK_S

@@ -1,6 +1,6 @@
-"""A Robotino that needs no simulator, and the checks that every Robotino has to pass.
+"""A Robotino that needs no simulator, and the checks that every Robotino must pass.
 
-Shipped, not hidden among the tests: whoever writes an environment or a robot needs both.
+They are shipped, not kept among the tests, because authors of environments and robots need both.
 """
 
 from palaestra_trainer.testing.conformance import NotConforming, check_robot, check_scene

@@ -1,9 +1,9 @@
-"""What "a Robotino" means, as checks that any implementation can be put through.
+"""The definition of "a Robotino", as checks for any implementation.
 
-The fake, the simulated and the real robot pass the same ones, which is why an
-environment may be moved from one to the other. Each rule is a constant: the
-sentence that a failing robot is told. Each check drives, so give the robot half a
-metre of free floor on every side.
+The fake, the simulated and the real robot pass the same checks, so an environment
+can be moved from one to the other. Each rule is a constant: the sentence in the
+error of a robot that fails it. Each check drives, so give the robot half a meter of
+free floor on every side.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ IMAGES_ARE_TYPED = "color_image() and depth_image() return an array or raise NoS
 RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh readings"
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
-PERIODS = 3  # of each movement: enough for it to outweigh speeding up
-STILL_M = 0.002  # what a standing robot may seem to move: odometry has steps
+PERIODS = 3  # of each movement: enough for the constant speed to outweigh the acceleration
+STILL_M = 0.002  # apparent motion of a standing robot: odometry has steps
 RESET_M = 0.01  # a simulator may let the robot settle on its wheels
 
 
@@ -49,10 +49,10 @@ class NotConforming(TrainerError, AssertionError):
 
 
 def check_robot(robot: RobotinoAbc) -> None:
-    """Put a robot, standing on free floor, through every rule that needs no scene.
+    """Check a robot, standing on free floor, against every rule that needs no scene.
 
     Raises:
-        NotConforming: the rule that it broke, and what was seen.
+        NotConforming: with the broken rule and the observed value.
     """
     _check_readings(robot)
     _check_standing_still(robot)
@@ -62,16 +62,16 @@ def check_robot(robot: RobotinoAbc) -> None:
 
 
 def check_scene(robot: RobotinoAbc, scene: Scene, start: Pose, target: tuple[float, float]) -> None:
-    """Put a simulated robot and its scene through the rules about resets.
+    """Check a simulated robot and its scene against the rules about resets.
 
     Args:
         robot: the robot in the scene.
-        scene: what is checked.
-        start: a pose with half a metre of free floor on every side.
-        target: x, y in metres of another free place.
+        scene: the scene to check.
+        start: a pose with half a meter of free floor on every side.
+        target: x, y in meters of another free place.
 
     Raises:
-        NotConforming: the rule that was broken, and what was seen.
+        NotConforming: with the broken rule and the observed value.
     """
     first = _drive_after_reset(robot, scene, start, target)
     second = _drive_after_reset(robot, scene, start, target)
@@ -123,7 +123,7 @@ def _check_movement(robot: RobotinoAbc, movement: Movement) -> None:
 
 
 def _check_twist(movement: Movement, seen: Twist, elapsed_s: float) -> None:
-    """Compare what was driven (m, m, rad) with what was asked for."""
+    """Compare the driven distance (m, m, rad) with the commanded one."""
     for asked, driven in zip(movement.twist, seen, strict=True):
         ideal = asked * elapsed_s
         slack = 0.5 * abs(ideal) if asked else 0.05
@@ -157,7 +157,7 @@ def _drive_after_reset(
 
 
 def moved(before: Pose, after: Pose) -> Twist:
-    """Return how far a robot came: metres forward and left of where it was, radians turned."""
+    """Return how far a robot moved: meters forward and left of its first pose, radians turned."""
     dx, dy = after.x_m - before.x_m, after.y_m - before.y_m
     c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)
     turned_rad = math.remainder(after.heading_rad - before.heading_rad, 2.0 * math.pi)

@@ -1,10 +1,10 @@
 """The arena and a Robotino in it, computed in this process.
 
-`fake_arena()` gives a robot and a scene for `MoveToTargetEnv` at some twenty
-thousand steps a second: for notebooks, tests and trying out rewards. Its physics
-are those that matter to the task: speeding up takes time, walls and cylinders stop
-the robot and let it slide, infrared reaches 40 cm. It can be told to die at a given
-step, as simulators do.
+`fake_arena()` returns a robot and a scene for `MoveToTargetEnv` that run at some
+twenty thousand steps a second, for notebooks, tests and experiments with rewards. Its
+physics are those that matter to the task: acceleration takes time, walls and cylinders
+stop the robot and let it slide, infrared has a range of 40 cm. It can die at given
+steps, as simulators do.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class FakeRobotino(RobotinoAbc):
     Args:
         deaths: numbers of the `advance` calls, counted from 1 over its whole life, at
             which it dies; every call raises `SimulatorDead` from then until `restart`.
-        name: what its faults are called by.
+        name: its name in faults.
     """
 
     def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
@@ -62,7 +62,7 @@ class FakeRobotino(RobotinoAbc):
         return BASIC_STEP_S * BASIC_STEPS
 
     def distances(self) -> NDArray[np.float32]:
-        """Return the nine readings of the last step."""
+        """Return the nine distances after the last step."""
         self._live()
         return self._distances.copy()
 
@@ -82,7 +82,7 @@ class FakeRobotino(RobotinoAbc):
         self._wanted = (vx, vy, omega)
 
     def advance(self) -> int:
-        """Compute one control period; there are never extra ones."""
+        """Simulate one control period; there are never extra ones."""
         self._live()
         self._steps += 1
         self._dead = self._steps in self._deaths
@@ -96,7 +96,7 @@ class FakeRobotino(RobotinoAbc):
         return 0
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put it down at rest, with fresh readings; noise follows from `seed`."""
+        """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
         self._live()
         self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
         self._wanted = self._velocity = (0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ class FakeRobotino(RobotinoAbc):
         self._sense()
 
     def restart(self) -> None:
-        """Bring it back to life."""
+        """Bring the robot back to life."""
         self._dead = False
 
     def _live(self) -> None:
@@ -127,7 +127,7 @@ class FakeRobotino(RobotinoAbc):
         self._heading_rad = wrapped(self._heading_rad + omega * BASIC_STEP_S)
 
     def _slide(self) -> None:
-        """Push the robot out of what it ran into; what is left of its motion is sliding."""
+        """Push the robot out of the obstacle that it hit; the rest of its motion is sliding."""
         for x, y in CYLINDERS:
             reach = CYLINDER_RADIUS_M + RADIUS_M
             distance = math.hypot(self._x_m - x, self._y_m - y)
@@ -147,7 +147,7 @@ class FakeRobotino(RobotinoAbc):
         self._distances = np.clip(seen * noise, *SENSOR_RANGE_M).astype(np.float32)
 
     def _ray(self, bearing_rad: float) -> float:
-        """Return metres from the robot's body to what stands in this direction of the world."""
+        """Return meters from the robot's body to the nearest obstacle in this direction of the world."""
         ux, uy = math.cos(bearing_rad), math.sin(bearing_rad)
         nearest = min(_to_wall(self._x_m, ux), _to_wall(self._y_m, uy))
         for x, y in CYLINDERS:

@@ -1,7 +1,7 @@
 """Layer 2: Webots as Python objects, over the services and topics of its stock `ros` controller.
 
-What is peculiar to that controller is handled here and nowhere else: the wake-up that it can lose, the step
-that blocks for ever while paused, what a reset restores and what not.
+All peculiarities of that controller are handled here and nowhere else: the wake-up that it can lose, the
+step that blocks forever while paused, and the state that a reset does not restore.
 """
 
 from palaestra_trainer.webots.attached import Attached

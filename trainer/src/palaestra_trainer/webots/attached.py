@@ -1,4 +1,4 @@
-"""A simulator that another program started and will end."""
+"""A simulator that another program starts and ends."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from palaestra_trainer.errors import ConfigurationError
 
 
 class Attached:
-    """A launcher that launches nothing: the facade uses the simulator that runs under its name.
+    """A launcher that starts nothing: the facade uses the simulator that already runs under its name.
 
     The facade may step, reset, pause and change it, like the program that started it. It cannot stop it.
     """
 
     def start(self) -> None:
-        """Start nothing: it runs, or `failure` says that it does not."""
+        """Start nothing: it runs already, or `failure` reports that it does not."""
 
     def confirm_ready(self) -> None:
-        """Note nothing."""
+        """Do nothing."""
 
     def ready(self) -> bool:
-        """Return False: what hangs is not stopped from here."""
+        """Return False: this facade does not stop a simulator that hangs."""
         return False
 
     def expect_stop(self, deadline_s: float) -> None:
@@ -28,12 +28,12 @@ class Attached:
             ConfigurationError: always.
         """
         del deadline_s
-        raise ConfigurationError("this simulator is only attached to; stop it where it was started")
+        raise ConfigurationError("only attached to this simulator; stop it where it was started")
 
     def failure(self) -> str | None:
-        """Return why it cannot be used; asked only while it does not answer."""
-        return "no simulator answers under this name; start it, or leave out launcher=Attached()"
+        """Return why it cannot be used; called only while it does not answer."""
+        return "no simulator answers under this name; start it, or remove launcher=Attached()"
 
     def wait_stopped(self, deadline_s: float) -> None:
-        """Wait for nothing."""
+        """Do nothing."""
         del deadline_s

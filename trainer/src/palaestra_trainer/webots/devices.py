@@ -1,4 +1,4 @@
-"""The devices of a robot: sensors that publish, motors that obey."""
+"""The devices of a robot: sensors that publish, and motors."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from palaestra_trainer.turns import let_others
 from palaestra_trainer.webots.readings import BOOL, FLOAT64, RANGE, Reading
 from palaestra_trainer.webots.services import Services
 
-# Webots replaces these in names of devices, and nothing else.
+# Webots replaces these characters in names of devices, and no others.
 _REPLACED = str.maketrans("-. ()", "_____")
 
 
 def topic_name(device: str) -> str:
-    """Return the device's name as it stands in paths, e.g. touch_sensor for "touch sensor"."""
+    """Return the device's name as used in paths, e.g. touch_sensor for "touch sensor"."""
     return device.translate(_REPLACED)
 
 
@@ -33,7 +33,7 @@ class Sensor:
     Attributes:
         robot: see above.
         device: see above.
-        late: whether what arrives until the next step may belong to the one before.
+        late: whether a message that arrives before the next step may belong to the previous one.
     """
 
     __slots__ = ("_enable", "_value", "_values", "device", "late", "robot")
@@ -59,7 +59,7 @@ class Sensor:
         return self._value
 
     def enable(self, period_ms: int) -> None:
-        """Let the sensor publish every `period_ms` of simulated time, and subscribe.
+        """Make the sensor publish every `period_ms` of simulated time, and subscribe to it.
 
         Raises:
             WrongData: the period is not a multiple of the step.
@@ -74,7 +74,7 @@ class Sensor:
         self.late = False
 
     def read(self) -> bool:
-        """Take the next message; False when it did not come in time, the value stays then.
+        """Take the next message; if it does not arrive in time, keep the value and return False.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -87,7 +87,7 @@ class Sensor:
         return True
 
     def read_arrived(self) -> bool:
-        """Take the last message that has arrived already; False when there is none.
+        """Take the last message that has already arrived; False if there is none.
 
         Raises:
             SimulatorDead, WrongData: as `RosSubscriber`.
@@ -99,22 +99,22 @@ class Sensor:
         return not self.late
 
     def disable(self) -> None:
-        """Stop the sensor and unsubscribe.
+        """Disable the sensor and unsubscribe.
 
         Raises:
-            SimulatorDead, SimulatorHung, WrongData: as `RosService`; it stays subscribed then.
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`; the subscription then stays.
         """
         self._enable(value=0)
         self.close()
 
     def close(self) -> None:
-        """Drop the connections."""
+        """Close the connections."""
         self._enable.close()
         self._values.close()
 
 
 class DistanceSensor(Sensor):
-    """A distance sensor; `value` is what its lookup table gives, volts for a Robotino."""
+    """A distance sensor; `value` is the output of its lookup table, volts for a Robotino."""
 
     __slots__ = ()
 
@@ -150,7 +150,7 @@ class Motor:
     Attributes:
         robot: see above.
         device: see above.
-        velocity: rad/s, as the simulator has confirmed it; None while it is not known what it made of it.
+        velocity: rad/s, as last confirmed; None until the simulator confirms a command.
         velocity_service: sets it.
     """
 
@@ -182,11 +182,11 @@ class Motor:
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
         """
-        self.velocity = None  # a backward one, set before, was confirmed and yet refused
+        self.velocity = None  # a backward velocity under position control was confirmed, but ignored
         self._position(value=position)
 
     def release(self) -> None:
-        """Stand still under velocity control, as needed at the start and after every reset.
+        """Stop under velocity control, as needed at the start and after every reset.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `RosService`.
@@ -195,19 +195,19 @@ class Motor:
         self.set_velocity(0.0)
 
     def close(self) -> None:
-        """Drop the connections."""
+        """Close the connections."""
         self.velocity = None
         self._services.close()
 
 
 def set_velocities(wanted: Iterable[tuple[Motor, float]]) -> None:
-    """Let motors turn at velocities in rad/s from the next step on, with all requests sent at once.
+    """Set velocities of motors in rad/s from the next step on, with all requests sent at once.
 
-    A motor goes on as it was told, so that what it has confirmed is not sent again; whoever resets the
-    simulation must `release` its motors.
+    A velocity that a motor has confirmed is not sent again. So after a reset of the simulation, call
+    `release` of its motors.
 
     Raises:
-        SimulatorDead, SimulatorHung, WrongData: as `RosService`; whatever was sent will be sent again.
+        SimulatorDead, SimulatorHung, WrongData: as `RosService`; the velocities will be sent again.
     """
     changes = [(motor, velocity) for motor, velocity in wanted if velocity != motor.velocity]
     if not changes:

@@ -1,7 +1,7 @@
-"""Webots, started on demand: the paper's facade.
+"""Webots, started on demand: the facade of the paper.
 
-Time passes inside of `with webots:` and of `webots.run(...)`, and stands everywhere else, whichever program
-simulates: between steps a simulator that is not paused takes a whole core for nothing.
+Simulated time passes only inside `with webots:` and `webots.run(...)`. Otherwise every simulator is paused,
+because between steps a simulator that is not paused uses a whole core for nothing.
 """
 
 from __future__ import annotations
@@ -22,59 +22,59 @@ Result = TypeVar("Result")
 
 _PROBE_S = 1.0
 _POLL_S = 0.02
-_STOP_DEADLINE_S = 5.0  # the longest time it may take to quit by itself
+_STOP_DEADLINE_S = 5.0  # the longest time that it may take to quit
 
 
 class Launcher(Protocol):
-    """What starts the simulator's process, and knows whether it runs."""
+    """Starts the process of a simulator and reports whether it runs."""
 
     def start(self) -> None:
-        """Begin to start it; return before it is ready."""
+        """Start it without waiting until it is ready."""
         ...
 
     def confirm_ready(self) -> None:
-        """Tell that it has answered a real round trip."""
+        """Report that it has answered a real round trip."""
         ...
 
     def ready(self) -> bool:
-        """Return whether it runs, and was confirmed to be ready."""
+        """Return whether it runs and was confirmed as ready."""
         ...
 
     def expect_stop(self, deadline_s: float) -> None:
-        """Announce that it will end; it is killed once `deadline_s` seconds have passed."""
+        """Announce that it will end; it is killed after `deadline_s` seconds."""
         ...
 
     def failure(self) -> str | None:
-        """Return why it is not running any more, None while it runs or starts."""
+        """Return why it is no longer running; None while it runs or starts."""
         ...
 
     def wait_stopped(self, deadline_s: float) -> None:
         """Return when its process has ended.
 
         Raises:
-            SimulatorHung: it has not within `deadline_s` seconds.
+            SimulatorHung: it did not end within `deadline_s` seconds.
         """
         ...
 
 
 class Owned(Launcher, Protocol):
-    """A launcher that lives for one facade."""
+    """A launcher that belongs to one facade."""
 
     def close(self) -> None:
-        """End what it started."""
+        """End the process that it started."""
         ...
 
 
 class Webots:
-    """One simulator, started, stopped and switched between fast and pause.
+    """One simulator that can be started, stopped, run fast and paused.
 
-    By default it is a simulator of its own: where the ROS names of the world are in use on the master, `_2`,
-    `_3`, ... stands behind them. One that runs already is used with `launcher=Attached()` only.
+    By default it is a new simulator. If the ROS names of the world are in use on the master, `_2`, `_3`, ...
+    is appended to them. To use a simulator that already runs, pass `launcher=Attached()`.
 
     Args:
-        supervisor_node_name: the ROS name that the world gives its supervisor.
+        supervisor_node_name: the ROS name of the supervisor in the world.
         world_path: the world to load; or the name of a world that ships, e.g. "arena".
-        launcher: what starts the process; by default a process on this machine.
+        launcher: starts the process; by default on this machine.
         driver: of that process: "stub", the simulator that ships, or "webots".
         options: command-line options of that process, e.g. ["--step-sleep-ms=5"].
         start_deadline_s: the longest time until it answers.
@@ -96,7 +96,7 @@ class Webots:
         self._own: Owned | None = None
         self._suffix = ""
         if launcher is None:
-            # The launcher talks to a sidecar, which this layer knows nothing of.
+            # The launcher talks to a sidecar, which this layer does not depend on.
             from palaestra_trainer.simulators.process import ProcessLauncher  # noqa: PLC0415
 
             own = ProcessLauncher.beside_others(world_path, driver, options)
@@ -108,7 +108,7 @@ class Webots:
         self.observer = Observer(supervisor_node_name)
         self.supervisor = Supervisor(supervisor_node_name, self.observer)
         self._launcher = launcher
-        # Its own connection, with a shorter patience: a simulator that hangs is not available.
+        # A connection of its own with a shorter deadline: a simulator that hangs is not available.
         self._probe = RosService(f"/{supervisor_node_name}/robot/get_time", "webots_ros/get_float", _PROBE_S)
         self._start_deadline_s = start_deadline_s
         self._at_start: dict[str, Callable[[], None]] = {}
@@ -117,30 +117,30 @@ class Webots:
 
     @property
     def robot_name(self) -> str:
-        """The ROS name of the supervisor as it runs: the one that was given, perhaps with `_2` behind it."""
+        """The ROS name under which the supervisor runs: the given name, possibly with `_2` appended."""
         return self.supervisor_node_name
 
     def name_of(self, robot: str) -> str:
-        """Return the ROS name, as it runs, of the robot that the world gives the ROS name `robot`."""
+        """Return the ROS name under which the robot runs that has the ROS name `robot` in the world."""
         return f"{robot}{self._suffix}"
 
     def at_start(self, name: str, connect: Callable[[], None]) -> None:
-        """Have `connect` called after each start from now on, in place of what `name` had called before."""
+        """Call `connect` after each start from now on; it replaces the previous function of that `name`."""
         self._at_start[name] = connect
 
     def start(self) -> None:
         """Start the simulator and return when it answers and its robots are connected.
 
-        One that runs is connected to anew, one that hangs is restarted. Time stands then, except inside of
-        `with webots:`.
+        If it runs, its connections are opened again; if it hangs, it is restarted. Outside `with webots:` it
+        is paused afterwards.
 
         Raises:
             SimulatorDead: its process ended.
             SimulatorHung: it did not answer in time.
-            WrongData: it refuses to be paused, or a robot what it wants of its devices.
+            WrongData: it refuses to pause, or refuses a robot's devices.
         """
         if self._launcher.ready() and not self.available():
-            self.stop()  # it hangs, and as long as it is there no other can be started
+            self.stop()  # it hangs, and no other can be started while it exists
         self._disconnect()
         self._launcher.start()
         self.wait_available()
@@ -166,13 +166,13 @@ class Webots:
                 raise SimulatorHung(
                     self.supervisor_node_name, f"did not start within {self._start_deadline_s:g} s"
                 )
-            time.sleep(_POLL_S)  # between two real round trips; the master has no call that waits
+            time.sleep(_POLL_S)  # between two real round trips; the master has no call that would wait
 
     def stop(self) -> None:
-        """Let the simulator quit through its supervisor; it is killed only when it does not.
+        """End the simulator through its supervisor; it is killed only if it does not quit.
 
         Raises:
-            SimulatorHung: even killing it had no effect in time.
+            SimulatorHung: the kill had no effect in time either.
         """
         self._stopped = True
         try:
@@ -182,7 +182,7 @@ class Webots:
         self._launcher.wait_stopped(_STOP_DEADLINE_S + _PROBE_S)
 
     def __call__(self) -> None:
-        """Restart the simulator, however it is; afterwards all is as after `start`.
+        """Restart the simulator, in any state; the result is the same as after `start`.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: as `stop` and `start`.
@@ -202,12 +202,12 @@ class Webots:
         """Return what `callback` returns, called while the simulation runs as fast as possible.
 
         Args:
-            callback: what needs the simulation.
-            restart: whether the simulator is started anew before.
+            callback: the function that needs the simulation.
+            restart: whether the simulator is restarted first.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: it cannot be started, run or paused.
-            Any error of `callback`, which hides that it cannot be paused.
+            Any error of `callback`; it replaces an error of the pause that follows.
         """
         if restart:
             self()
@@ -230,19 +230,19 @@ class Webots:
     ) -> None:
         self._entered -= 1
         if self._entered or self._stopped:
-            return  # the block around this one goes on, or there is nothing left to be paused
+            return  # an enclosing block continues, or nothing is left to pause
         try:
             self.supervisor.set_mode(Mode.PAUSE)
         except TrainerError:
-            # What went wrong inside is the news, not that the simulator is gone now.
+            # An error from inside the block matters more than a simulator that cannot be paused.
             if exc is None:
                 raise
 
     def close(self) -> None:
-        """Drop all connections, and end the process if it was started for this facade alone.
+        """Close all connections, and end the process if it was started for this facade alone.
 
         Raises:
-            subprocess.TimeoutExpired: that process does not end; no other error, whatever the simulator does.
+            subprocess.TimeoutExpired: that process does not end; errors of the simulator are suppressed.
         """
         self._disconnect()
         if self._own is not None:
@@ -253,7 +253,7 @@ class Webots:
             self._launcher.expect_stop(0.0)
             return
         self._launcher.expect_stop(_STOP_DEADLINE_S)
-        # It may break before it quits; the announced deadline ends it then.
+        # It may break before it quits; then the announced deadline ends it.
         with contextlib.suppress(SimulatorFault):
             self.supervisor.quit()
 

@@ -1,6 +1,6 @@
-"""Values of fields as Python has them, and how each travels over its service.
+"""Convert values of fields between Python and their services.
 
-A rotation is axis and angle here, as in a world file; its service wants a quaternion.
+In Python a rotation is axis and angle, as in a world file; its service takes a quaternion.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from palaestra_trainer.errors import ConfigurationError
 
 Value = bool | int | float | str | tuple[float, ...]
 
-_MULTIPLE: Final = 0x10  # added to the type of a field that may have several values
-# An exact identity quaternion has no axis: Webots would keep the old rotation and still report success.
+_MULTIPLE: Final = 0x10  # added to the type number of a field that may have several values
+# An exact identity quaternion has no axis: Webots would keep the old rotation and report success.
 _SMALLEST_TURN: Final = 1e-6
 
 
 class Kind(NamedTuple):
-    """What a field holds: its name in services, its values in words, and their way to and from the wire."""
+    """The type of a field: its name in services, its values in words, and its encoder and decoder."""
 
     name: str
     wanted: str
@@ -28,7 +28,7 @@ class Kind(NamedTuple):
 
 
 def kind_of(type_number: int, field: str) -> Kind:
-    """Return what a field of that type number holds; `field` is what errors call it.
+    """Return the type of a field from its type number; `field` is its name in errors.
 
     Raises:
         ConfigurationError: it holds nodes, which have no value.
@@ -40,7 +40,7 @@ def kind_of(type_number: int, field: str) -> Kind:
 
 
 def encoded(kind: Kind, field: str, value: Value) -> Any:
-    """Return `value` as the service of its kind wants it.
+    """Return `value` in the form that its service takes.
 
     Raises:
         ConfigurationError: the field cannot hold it.
@@ -52,12 +52,12 @@ def encoded(kind: Kind, field: str, value: Value) -> Any:
 
 
 def turn_about_z(heading_rad: float) -> dict[str, float]:
-    """Return the quaternion of a heading that Webots takes, also for 0."""
+    """Return the quaternion of a heading in a form that Webots accepts, also for 0."""
     return _quaternion((0.0, 0.0, 1.0, heading_rad))
 
 
 def _exactly(*types: type) -> Callable[[Any], Any]:
-    """Return what lets values of these very types pass: a bool is no number here."""
+    """Return a check that passes only values of these exact types: a bool is not a number here."""
 
     def check(value: Any) -> Any:
         if type(value) not in types:

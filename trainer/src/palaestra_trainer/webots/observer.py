@@ -1,4 +1,4 @@
-"""What can be asked of a simulation without changing it."""
+"""Queries that do not change the simulation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from palaestra_trainer.webots.services import Services
 
 
 class Mode(enum.IntEnum):
-    """How time passes. Numbers of Webots R2021a and later."""
+    """How time passes. The numbers are those of Webots R2021a and later."""
 
     PAUSE = 0
     REAL_TIME = 1
@@ -20,7 +20,7 @@ class Mode(enum.IntEnum):
 
 
 class Observer:
-    """Probes of the supervisor's controller; none of them affects the simulation.
+    """Queries of the supervisor's controller; none of them affects the simulation.
 
     Every method raises SimulatorDead, SimulatorHung or WrongData.
 
@@ -48,7 +48,7 @@ class Observer:
         return Mode(self._services.ask("supervisor/simulation_get_mode", "get_int"))
 
     def world_path(self) -> str:
-        """Return the path of the world that is loaded."""
+        """Return the path of the loaded world."""
         return str(self._services.ask("robot/get_world_path", "get_string"))
 
     def devices(self) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class Observer:
         return tuple(self._services.get("robot/get_device_list", "robot_get_device_list")(ask=1).list)
 
     def number_of_devices(self) -> int:
-        """Return how many devices the robot has."""
+        """Return the number of the robot's devices."""
         return int(self._services.ask("robot/get_number_of_devices", "get_int"))
 
     def exists(self, name: str) -> bool:
@@ -69,9 +69,9 @@ class Observer:
         return self.finish_pose(name)
 
     def begin_pose(self, name: str) -> RosService:
-        """Ask for a pose; `finish_pose` must follow, and may after other things were done.
+        """Request a pose; `finish_pose` must follow, and other work may be done in between.
 
-        Return the service whose answer will be the last.
+        Return the service that answers last.
         """
         node = self.node(name)
         position, orientation = self._pose_services()
@@ -80,7 +80,7 @@ class Observer:
         return orientation
 
     def finish_pose(self, name: str) -> tuple[float, float, float]:
-        """Return the pose that `begin_pose` asked for."""
+        """Return the pose that `begin_pose` requested."""
         position, orientation = (service.finish() for service in self._pose_services())
         turn = orientation.orientation
         heading = 2.0 * math.atan2(turn.z, turn.w)
@@ -96,7 +96,7 @@ class Observer:
         return (value.x, value.y, value.z)
 
     def node(self, name: str) -> int:
-        """Return the handle of the node with DEF `name`; it holds until the world is loaded anew.
+        """Return the handle of the node with DEF `name`; it is valid until the world is reloaded.
 
         Raises:
             WrongData: the world has no such node.
@@ -119,14 +119,14 @@ class Observer:
         return self._fields[name, field]
 
     def field_type(self, name: str, field: str) -> int:
-        """Return the number of the type of a field of the node with DEF `name`."""
+        """Return the type number of a field of the node with DEF `name`."""
         if (name, field) not in self._types:
             service = self._services.get("supervisor/field/get_type", "field_get_type")
             self._types[name, field] = int(service(field=self.field(name, field)).type)
         return self._types[name, field]
 
     def forget_handles(self) -> None:
-        """Drop all handles, which dangle after the world or the simulator was loaded anew."""
+        """Drop all handles, which become invalid when the world is reloaded or the simulator restarts."""
         self._nodes.clear()
         self._fields.clear()
         self._types.clear()

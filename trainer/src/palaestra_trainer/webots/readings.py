@@ -1,7 +1,7 @@
-"""The number that a sensor's message is read for, without the rest of the message.
+"""Read the one number that matters from a sensor's message, without decoding the rest.
 
-Every topic of a sensor begins with a std_msgs/Header, whose only part of varying length is `frame_id`; one
-device sends the same there each time.
+Every topic of a sensor begins with a std_msgs/Header. Only its `frame_id` varies in length, and one device
+always sends the same `frame_id`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import struct
 from functools import cache
 from typing import Any
 
-# What follows the header, in the codes of `struct`; the reading comes last.
+# The numbers after the header, in the codes of `struct`; the reading comes last.
 RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
 BOOL = "?"
 FLOAT64 = "d"
@@ -24,8 +24,8 @@ class Reading:
     """Reads the last number of one device's messages.
 
     Args:
-        device: whom errors name.
-        codes: of the numbers behind the header.
+        device: the device's name in errors.
+        codes: `struct` codes of the numbers after the header.
     """
 
     __slots__ = ("_codes", "_device", "_frame_id_bytes", "_layout")
@@ -40,7 +40,7 @@ class Reading:
         """Return the reading.
 
         Raises:
-            ValueError: it is not finite, or the message has a wrong length: text would become a reading.
+            ValueError: it is not finite, or the message has a wrong length, so that text would be read.
             struct.error: the message ends within its header.
         """
         if len(message) != self._layout.size:
@@ -53,7 +53,7 @@ class Reading:
         return numbers[-1]
 
     def _fit(self, message: bytes | memoryview) -> None:
-        """Take the layout of a message of a new length."""
+        """Set the layout for messages of a new length."""
         (frame_id_bytes,) = _FRAME_ID_LENGTH.unpack_from(message, _FRAME_ID_AT)
         length = self._layout.size - self._frame_id_bytes + frame_id_bytes
         if len(message) != length:
@@ -64,5 +64,5 @@ class Reading:
 
 @cache
 def _layout(frame_id_bytes: int, codes: str) -> struct.Struct:
-    """Return the layout of a message, which gives the length of its frame_id, then its numbers."""
+    """Return the layout of a message: the length of its frame_id, then its numbers."""
     return struct.Struct(f"<{_FRAME_ID_AT}xI{frame_id_bytes}x{codes}")

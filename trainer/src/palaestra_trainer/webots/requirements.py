@@ -1,7 +1,7 @@
-"""What a program needs of a world, asked for before the first step.
+"""Check that a world has what a program needs, before the first step.
 
-A world that lacks it would otherwise look like a broken simulator: a service that no node offers. Only a
-complete list and a definite answer count, so a simulator that is only starting is never misjudged.
+Without the check a missing device would look like a broken simulator: a service that no node offers. Only a
+complete list or a definite answer counts, so a simulator that is still starting is not blamed.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def require_devices(robot: str, wanted: Iterable[str]) -> None:
 
     Raises:
         WorldMisfit: its list of devices is complete and lacks some.
-        SimulatorDead, SimulatorHung, WrongData: it cannot be asked.
+        SimulatorDead, SimulatorHung, WrongData: it does not answer.
     """
     observer = Observer(robot)
     try:
@@ -41,9 +41,9 @@ def require_node(observer: Observer, name: str) -> None:
 
     Raises:
         WorldMisfit: it has none.
-        SimulatorDead, SimulatorHung, WrongData: it cannot be asked.
+        SimulatorDead, SimulatorHung, WrongData: it does not answer.
     """
     if not observer.exists(name):
         raise WorldMisfit(
-            observer.node_name, f"the world has no node DEF {name}; name the node so in the world"
+            observer.node_name, f"the world has no node DEF {name}; give a node that DEF name in the world"
         )

@@ -1,4 +1,4 @@
-"""The services of one controller, by path, each made when first used."""
+"""The services of one controller, by path, each created at first use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from palaestra_trainer.ros import RosService
 
 
 class Services:
-    """What one robot's controller serves.
+    """The services of one robot's controller.
 
     Args:
         node_name: the ROS name of the controller, e.g. robotino

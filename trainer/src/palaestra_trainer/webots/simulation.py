@@ -1,11 +1,11 @@
 """The steps of a simulation: the only caller of `time_step`.
 
 One step lasts one period, for all robots of the world at once, and brings one message of every sensor. The
-controller can miss its own wake-up and then sends nothing for that step; so a missing message is awaited for
-a bounded time, and then the simulation steps once more, which is no fault but is counted.
+controller can miss its own wake-up and then sends nothing for that step. So a missing message is awaited for
+a limited time. Then the simulation steps once more; this is not a fault, but it is counted.
 
-A step that is asked for while time stands is not sent: the controller would wait for time to pass, and hear
-nobody who wants to let it pass.
+While the simulation is paused, no step is sent: the controller would wait for time to pass, and would not
+receive the request that lets it pass.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.requirements import require_devices, require_node
 from palaestra_trainer.webots.supervisor import Supervisor
 
-# Two extra steps deliver whatever a lost wake-up withheld; a sensor that is silent after them is broken.
+# Two extra steps deliver the messages of a lost wake-up; a sensor without a message after them is broken.
 _MOST_EXTRA_STEPS = 2
 
 
@@ -28,13 +28,13 @@ class Simulation:
     """Steps and resets.
 
     Args:
-        robots: the ROS names of all robots of the world; a step lasts until each has asked for it.
-        supervisor: resets, and places what is moved.
-        observer: tells the poses that are tracked.
-        period_ms: simulated milliseconds a step, a multiple of the world's basicTimeStep.
+        robots: the ROS names of all robots of the world; a step lasts until each has requested it.
+        supervisor: resets the simulation and places nodes.
+        observer: reads the tracked poses.
+        period_ms: simulated milliseconds per step, a multiple of the world's basicTimeStep.
 
     Attributes:
-        simulated_s: seconds of simulated time since this object was made.
+        simulated_s: seconds of simulated time since this object was created.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Simulation:
         self._tracked: dict[str, tuple[float, float, float] | None] = {}
 
     def add(self, sensors: Sequence[Sensor], motors: Sequence[Motor]) -> None:
-        """Let a robot's devices take part: its sensors are read each step, its motors released at resets."""
+        """Add a robot's devices: its sensors are read at each step, its motors released at resets."""
         self._sensors += sensors
         self._motors += motors
 
@@ -63,7 +63,7 @@ class Simulation:
 
         Raises:
             KeyError: the node is not tracked.
-            SimulatorDead, SimulatorHung, WrongData: before the first step, when the simulator is asked.
+            SimulatorDead, SimulatorHung, WrongData: before the first step, which reads it from the simulator.
         """
         return self._tracked[name] or self._observer.pose(name)
 
@@ -71,7 +71,7 @@ class Simulation:
         """Enable every sensor and release every motor, after the simulator has started.
 
         Raises:
-            WorldMisfit: the world lacks a device, or a node that is tracked.
+            WorldMisfit: the world lacks a device or a tracked node.
             SimulatorDead, SimulatorHung, WrongData
         """
         self._require_all()
@@ -81,12 +81,12 @@ class Simulation:
         self._release_motors()
 
     def step(self) -> int:
-        """Simulate one period and read every sensor; return the extra steps it took, normally 0.
+        """Simulate one period and read every sensor; return the number of extra steps, normally 0.
 
         Raises:
-            Paused: time stands; nothing was sent.
-            SimulatorDead, SimulatorHung: also when a sensor stays silent.
-            WrongData: the simulator refused the period, or a reading cannot be right.
+            Paused: the simulation is paused; nothing was sent.
+            SimulatorDead, SimulatorHung: also when a sensor sends no message.
+            WrongData: the simulator refused the period, or a reading is invalid.
         """
         if self._supervisor.paused:
             raise self._paused()
@@ -94,16 +94,16 @@ class Simulation:
         extra_steps = 0
         while silent is not None:
             if extra_steps == _MOST_EXTRA_STEPS:
-                raise SimulatorHung(self._supervisor.node_name, f"{silent.device} stays silent")
+                raise SimulatorHung(self._supervisor.node_name, f"{silent.device} sends no message")
             extra_steps += 1
             silent = self._advance_and_read()
         return extra_steps
 
     def reset(self, seed: int) -> None:
-        """Bring the simulation back to its start, with that seed; what the scene moves is placed afterwards.
+        """Reset the simulation with that seed; the scene places its nodes afterwards.
 
         Raises:
-            Paused: time stands; nothing was sent.
+            Paused: the simulation is paused; nothing was sent.
             SimulatorDead, SimulatorHung, WrongData
         """
         if self._supervisor.paused:
@@ -114,7 +114,7 @@ class Simulation:
         self._release_motors()
 
     def close(self) -> None:
-        """Drop all connections of steps, sensors and motors."""
+        """Close all connections of steps, sensors and motors."""
         parts: tuple[RosService | Sensor | Motor, ...] = (*self._steps, *self._sensors, *self._motors)
         for part in parts:
             part.close()
@@ -135,8 +135,8 @@ class Simulation:
                 sensor.read_arrived()
         try:
             self._advance()
-            # Asked before the sensors are read, so that answers and messages come in others' turns;
-            # a controller answers when it has sent what its sensors saw.
+            # Requested before the sensors are read, so that answers and messages arrive in others' turns;
+            # a controller answers after it has sent its sensors' messages.
             asked = None
             for name in self._tracked:
                 asked = self._observer.begin_pose(name)
@@ -151,10 +151,10 @@ class Simulation:
         return silent
 
     def _read_sensors(self) -> Sensor | None:
-        """Read every sensor once; return the first that stays silent, None when all have spoken."""
+        """Read every sensor once; return the first without a message, None if all had one."""
         silent = None
         for sensor in self._sensors:
-            # What is lost is lost for all, so only one is waited for.
+            # A lost wake-up affects all sensors, so only one of them is waited for.
             spoke = sensor.read() if silent is None else sensor.read_arrived()
             if not spoke:
                 silent = silent or sensor

@@ -1,4 +1,4 @@
-"""What changes a simulation."""
+"""Commands that change a simulation."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ Vector = tuple[float, float, float]
 
 
 class Supervisor:
-    """Changes, through the supervisor's controller.
+    """Changes the simulation through the supervisor's controller.
 
     Every method raises SimulatorDead, SimulatorHung or WrongData. Field changes take effect with the next
     step.
 
     Args:
         node_name: the ROS name of the supervisor.
-        observer: where node and field handles are looked up.
+        observer: provides node and field handles.
 
     Attributes:
-        paused: whether time stands, as the simulator has confirmed it; False while that is not known.
+        paused: whether the simulator has confirmed that it is paused; False while that is unknown.
     """
 
     def __init__(self, node_name: str, observer: Observer) -> None:
@@ -34,10 +34,10 @@ class Supervisor:
         self._services = Services(node_name)
 
     def set_mode(self, mode: Mode) -> None:
-        """Let time pass as `mode` says.
+        """Set how time passes.
 
         Raises:
-            WrongData: also when the simulator refuses the mode.
+            WrongData: also if the simulator refuses the mode.
         """
         self.paused = False
         if not self._services.get("supervisor/simulation_set_mode", "set_int")(value=int(mode)).success:
@@ -45,12 +45,12 @@ class Supervisor:
         self.paused = mode == Mode.PAUSE
 
     def reset(self) -> None:
-        """Bring the simulation back to its start within the next step; enabled sensors stay enabled."""
+        """Reset the simulation within the next step; enabled sensors stay enabled."""
         self._services.ask("supervisor/simulation_reset", "get_bool")
 
     def reload(self) -> None:
-        """Load the world anew; controllers restart, and everything must be connected again."""
-        # The answer may be lost with the controller that gave it.
+        """Reload the world; controllers restart, and all connections must be opened again."""
+        # The answer may be lost, because its controller restarts too.
         with contextlib.suppress(SimulatorDead):
             self._services.ask("supervisor/world_reload", "get_bool")
         self._observer.close()
@@ -64,7 +64,7 @@ class Supervisor:
             self._services.close()
 
     def set_seed(self, seed: int) -> None:
-        """Give the simulation the seed that it takes at the next reset, by way of the robot's customData."""
+        """Set the seed for the next reset, through the robot's customData."""
         self._services.get("robot/set_custom_data", "set_string")(value=f'{{"seed": {seed}}}')
 
     def place(self, name: str, x_m: float, y_m: float, heading_rad: float | None = None) -> None:
@@ -92,19 +92,19 @@ class Supervisor:
         call_together(setters)
 
     def stop_inertia(self, name: str) -> None:
-        """Take all speed from the node with DEF `name` and what hangs on it."""
+        """Stop all motion of the node with DEF `name` and of its parts."""
         service = self._services.get("supervisor/node/reset_physics", "node_reset_functions")
         service(node=self._observer.node(name))
 
     def get_field(self, name: str, field: str, index: int = 0) -> Value:
-        """Return the value of a field of the node with DEF `name`, as the type that the field has.
+        """Return the value of a field of the node with DEF `name`, in the type of the field.
 
-        A bool, int, float or str; x, y (, z) or red, green, blue; a rotation as x, y, z of its axis and the
-        angle in radians. `index` chooses one of a field of several values.
+        It is a bool, int, float or str; x, y (, z) or red, green, blue; or a rotation as x, y, z of its axis
+        and the angle in radians. `index` selects one value of a field that has several.
 
         Raises:
             ConfigurationError: the field holds nodes.
-            WrongData: also when there is no such node, field or index.
+            WrongData: also if there is no such node, field or index.
         """
         where = f"{name}.{field}"
         kind = kind_of(self._observer.field_type(name, field), where)
@@ -116,7 +116,7 @@ class Supervisor:
 
         Raises:
             ConfigurationError: the field holds nodes, or values of another type.
-            WrongData: also when there is no such node or field, or the simulator refuses the write.
+            WrongData: also if there is no such node or field, or the simulator refuses the write.
         """
         where = f"{name}.{field}"
         kind = kind_of(self._observer.field_type(name, field), where)
@@ -132,7 +132,7 @@ class Supervisor:
         return (linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z)
 
     def set_velocity(self, name: str, linear: Vector, angular: Vector = (0.0, 0.0, 0.0)) -> None:
-        """Give the node with DEF `name` a linear (m/s) and an angular (rad/s) velocity, in world axes."""
+        """Set the linear (m/s) and angular (rad/s) velocity of the node with DEF `name`, in world axes."""
         service = self._services.get("supervisor/node/set_velocity", "node_set_velocity")
         wanted = {
             "linear": dict(zip("xyz", linear, strict=True)),
@@ -141,6 +141,6 @@ class Supervisor:
         service(node=self._observer.node(name), velocity=wanted)
 
     def close(self) -> None:
-        """Drop the connections, and what was confirmed over them."""
+        """Close the connections and forget the confirmed state."""
         self.paused = False
         self._services.close()
