@@ -1,1 +1,1 @@
-"""What runs in a simulator's container: worlds, the sidecar, the stub simulator."""
+"""The programs of a simulator's container: worlds, the sidecar, the stub simulator."""

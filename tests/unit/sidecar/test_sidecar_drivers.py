@@ -67,13 +67,13 @@ def test_a_program_of_ones_own_gets_the_world_where_it_asks_for_it(path) -> None
 
 def test_a_missing_program_is_named(tmp_path) -> None:
     """That is known before anything is started, and trying again cannot help."""
-    with pytest.raises(SidecarError, match=r"^--driver webots: there is no program webots; install it"):
+    with pytest.raises(SidecarError, match=r"^--driver webots: program webots not found; install it"):
         command(Driver.WEBOTS, Launch(world=WORLD), {"PATH": str(tmp_path)})
 
 
 def test_a_driver_without_a_program_says_where_to_put_one() -> None:
     """The two dashes are easily forgotten."""
-    with pytest.raises(SidecarError, match=r"^--driver command: has no program; give it behind --"):
+    with pytest.raises(SidecarError, match=r"^--driver command: has no program; add it after --"):
         command(Driver.COMMAND, Launch(world=WORLD), {})
 
 

@@ -1,4 +1,4 @@
-"""The command line of the sidecar: check everything, listen, say where, then own the simulators."""
+"""The command line of the sidecar: check everything, listen, log the addresses, then run the simulators."""
 
 import argparse
 import ipaddress
@@ -48,13 +48,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def shut_down(simulators: Sequence[Simulator]) -> None:
-    """End all simulators at once and let `run` return; from any thread."""
+    """End all simulators at once and make `run` return; from any thread."""
     for simulator in simulators:
         simulator.shut_down()
 
 
 def run(simulators: Sequence[Simulator]) -> None:
-    """Look after all simulators, each in a thread of its own, until a shutdown has left nothing running."""
+    """Run all simulators, each in its own thread, until a shutdown has ended them."""
     first, *others = simulators
     threads = [threading.Thread(target=each.run, name="simulator", daemon=True) for each in others]
     for thread in threads:
@@ -71,12 +71,12 @@ def prepare(given: argparse.Namespace) -> tuple[Simulator, ...]:
         SimError: an option, the world or the program is wrong.
     """
     if not ipaddress.ip_address(given.control.host).is_loopback:
-        raise SidecarError(f"--control: {given.control} is not on loopback, and anyone could use it")
+        raise SidecarError(f"--control: {given.control} is not a loopback address; use 127.0.0.1 or [::1]")
     driver = Driver(given.driver)
     if given.program and driver is not Driver.COMMAND:
         raise SidecarError(f"--driver {driver}: takes no program; use --driver command")
     if given.standby and given.job is None:
-        raise SidecarError("--standby: two simulators need names of their own; give --job and --work")
+        raise SidecarError("--standby: two simulators need different ROS names; give --job and --work")
     slots = preparation.SLOTS if given.standby else preparation.SLOTS[:1]
     return tuple(_simulator(given, driver, slot) for slot in slots)
 
@@ -94,19 +94,19 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Simulato
 
 
 def end_with_stdin() -> None:
-    """End, as by SIGTERM, when standard input does: whoever held its other end is gone."""
+    """End, as by SIGTERM, when standard input closes, because its owner is gone."""
     while os.read(sys.stdin.fileno(), 4096):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def log_to_stdout() -> None:
-    """Send the log where the simulator's output goes."""
+    """Send the log to standard output, like the simulator's output."""
     logging.basicConfig(level=logging.INFO, handlers=[LineHandler()])
 
 
 def _world(given: argparse.Namespace, slot: str) -> Path:
-    """Return the world to run: the given one, or with --job or --suffix its copy with other ROS names."""
+    """Return the world to run: the given one, or, with --job or --suffix, its copy with other ROS names."""
     if given.job is None and not given.suffix:
         return Path(given.world).absolute()
     if given.work is None:

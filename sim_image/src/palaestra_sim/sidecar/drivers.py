@@ -14,13 +14,13 @@ from palaestra_sim.sidecar.process import Command
 WORLD = "{world}"  # in a command: the path of the world
 _NOT_ROOT = "palaestra"
 
-# Source: Webots' guide, "Command Line Arguments". --batch: no dialog waits for a click;
-# --minimize alone would start in fast mode.
+# Source: Webots' guide, "Command Line Arguments". --batch: no dialog waits for a click.
+# --minimize without --mode would start in fast mode.
 _WEBOTS = ("--batch", "--mode=pause", "--stdout", "--stderr", "--minimize", "--no-rendering")
 
 
 class Driver(StrEnum):
-    """Which program simulates."""
+    """The program that simulates."""
 
     STUB = "stub"
     WEBOTS = "webots"
@@ -29,7 +29,7 @@ class Driver(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Launch:
-    """What is to be started: a world, options of the simulator, and its program for `command`."""
+    """The parts of a start: a world, options of the simulator, and its program for `command`."""
 
     world: Path
     options: Sequence[str] = ()
@@ -37,7 +37,7 @@ class Launch:
 
 
 def command(driver: Driver, launch: Launch, environment: Mapping[str, str]) -> Command:
-    """Return how the simulator is started, with the full path of its program.
+    """Return the command line that starts the simulator, with the full path of its program.
 
     Raises:
         SidecarError: there is no such program, or none is given where one is needed.
@@ -57,19 +57,19 @@ def _webots(launch: Launch) -> list[str]:
 
 def _command(launch: Launch) -> list[str]:
     if not launch.program:
-        raise SidecarError("--driver command: has no program; give it behind --, as -- sim {world}")
+        raise SidecarError("--driver command: has no program; add it after --, as in -- sim {world}")
     given = (argument.replace(WORLD, str(launch.world)) for argument in launch.program)
     return [*given, *launch.options]
 
 
 def _nothing(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return no variable: the program gets the container's."""
+    """Return no variables: the program inherits those of the container."""
     del environment
     return {}
 
 
 def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return what Webots needs: a user, whom a container often lacks, and no file beside the world."""
+    """Return Webots' variables: a user, which a container often lacks, and no files beside the world."""
     return {
         "USER": environment.get("USER", _NOT_ROOT),
         "WEBOTS_DISABLE_SAVE_SCREEN_PERSPECTIVE_ON_CLOSE": "true",
@@ -77,12 +77,12 @@ def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def _found(driver: Driver, program: str, environment: Mapping[str, str]) -> str:
-    """Return the full path of a program: on the PATH, or beside the Python that runs us."""
+    """Return the full path of a program: on the PATH, or beside the running Python."""
     beside = os.fspath(Path(sys.executable).parent)
     for path in (environment.get("PATH", os.defpath), beside):
         if (found := shutil.which(program, path=path)) is not None:
             return str(Path(found).absolute())
-    raise SidecarError(f"--driver {driver}: there is no program {program}; install it, or set PATH")
+    raise SidecarError(f"--driver {driver}: program {program} not found; install it, or set PATH")
 
 
 _ARGUMENTS: Mapping[Driver, Callable[[Launch], list[str]]] = {

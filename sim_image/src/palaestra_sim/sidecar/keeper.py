@@ -1,18 +1,18 @@
 """Stand between the sidecar and its simulator, so that nothing the simulator starts can outlive them.
 
-Run as a program of its own, one for each life of the simulator: `python -I -S keeper.py PROGRAM ...`
+It is a program of its own, one for each start of the simulator: `python -I -S keeper.py PROGRAM ...`
 with a pipe from the sidecar as standard input, and a pipe to it as descriptor 3:
 
     in   T             send SIGTERM to the simulator's process group
-         K, or the end kill everything; the end also comes when the sidecar was killed with SIGKILL
+         K, or EOF     kill everything; EOF also arrives when the sidecar was killed with SIGKILL
     out  started PID   the simulator's first process
          error ERRNO   its program could not be run
          exit STATUS   it ended, with this wait status, and so did everything that it had started
 
-It is a subreaper: whatever loses its parent below becomes its child, also after `setsid`, a double
-fork or a change of environment, where a process group, a parent-death signal or a mark would lose it.
-So its children are killed until there are none, and each killed parent hands over its own children
-before its end is seen (Linux: exit_notify). That needs no clock: SIGCHLD tells when to look again.
+It is a subreaper: a descendant that loses its parent becomes its child, even after `setsid`, a double
+fork or a change of environment. A process group, a parent-death signal or a mark would lose such a
+process. So it kills its children until there are none. Each killed parent hands over its own children
+before its end is visible (Linux: exit_notify). That needs no timer: SIGCHLD triggers the next search.
 
 Linux and the standard library only, and no import from this package: it is started as a file.
 """
@@ -31,7 +31,7 @@ KILL = b"K"
 
 _PR_SET_CHILD_SUBREAPER = 36  # Source: linux/prctl.h
 _GIVE_UP_S = 20.0  # a process that outlives SIGKILL for this long hangs in the kernel
-_NOT_RUN = 127  # as a shell says it
+_NOT_RUN = 127  # as in a shell
 _PARENT = 1  # among the fields behind the name in /proc/PID/stat: state, parent, ...
 
 
@@ -47,9 +47,9 @@ def adopt_orphans() -> None:
 
 
 def children(parents: set[int]) -> set[int]:
-    """Return the processes whose parent is one of `parents`, by one look at /proc."""
+    """Return the processes whose parent is one of `parents`, from one pass over /proc."""
     found = set()
-    for name in os.listdir("/proc"):  # noqa: PTH208 - nor is it imported for this
+    for name in os.listdir("/proc"):  # noqa: PTH208 - pathlib is slow to import
         if name.isdigit():
             with contextlib.suppress(OSError):  # it ended meanwhile
                 with open(f"/proc/{name}/stat", "rb") as file:  # noqa: PTH123 - pathlib is slow to import
@@ -62,17 +62,17 @@ def children(parents: set[int]) -> set[int]:
 def kill_children(spared: frozenset[int] = frozenset()) -> set[int]:
     """Send SIGKILL to every child of this process that is not `spared`, and return them.
 
-    None can be mistaken for another process: a number is free again only when we have reaped it.
+    The kill cannot hit another process: the number stays in use until this process reaps it.
     """
     found = children({os.getpid()}) - spared
     for pid in found:
-        with contextlib.suppress(OSError):  # it became another user's; its own end is up to that user
+        with contextlib.suppress(OSError):  # it runs as another user now, which must end it
             os.kill(pid, signal.SIGKILL)
     return found
 
 
 def main() -> None:
-    """Start the program in `argv`, obey the commands, and return when nothing of it is left."""
+    """Start the program in `argv`, obey the commands, and return when none of its processes is left."""
     for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     adopt_orphans()
@@ -111,7 +111,7 @@ def _keep(pid: int, woken: int) -> int:
 
 
 def _obey(pid: int) -> bool:
-    """Do what the sidecar says about `pid`, which is not reaped yet; return whether to kill."""
+    """Carry out the sidecar's commands for `pid`, which is not reaped yet; return whether to kill."""
     command = os.read(COMMANDS, 1)
     if command == TERMINATE:
         with contextlib.suppress(ProcessLookupError):  # it has no group yet
@@ -120,7 +120,7 @@ def _obey(pid: int) -> bool:
 
 
 def _reap() -> dict[int | None, int]:
-    """Return the wait status of every child that has ended; with a key None if there is none left."""
+    """Return the wait status of every child that has ended; the key None means that no child is left."""
     ended: dict[int | None, int] = {}
     try:
         while (result := os.waitpid(-1, os.WNOHANG))[0]:
@@ -131,7 +131,7 @@ def _reap() -> dict[int | None, int]:
 
 
 def _spawn(arguments: list[str]) -> int:
-    """Start the program, leading a session and group of its own; return its process."""
+    """Start the program as leader of a new session and group; return its process id."""
     pid = os.fork()
     if pid:
         return pid
@@ -139,7 +139,7 @@ def _spawn(arguments: list[str]) -> int:
         os.setsid()
         os.dup2(os.open(os.devnull, os.O_RDONLY), COMMANDS)
         for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGPIPE, signal.SIGXFSZ):
-            signal.signal(number, signal.SIG_DFL)  # an ignored signal would stay so in the program
+            signal.signal(number, signal.SIG_DFL)  # the program would inherit an ignored signal
         _yield_to_the_trainer()
         os.execv(arguments[0], arguments)  # noqa: S606 - the sidecar's own command line
     except OSError as error:
@@ -148,16 +148,16 @@ def _spawn(arguments: list[str]) -> int:
 
 
 def _yield_to_the_trainer() -> None:
-    """Let the program not interrupt a trainer with which it shares a processor.
+    """Set a scheduling policy with which the program does not preempt a trainer on the same processor.
 
-    A trainer that wakes one simulator by a request has others to wake, and was interrupted at nearly each.
+    A trainer that wakes one simulator by a request has others to wake, and was preempted at nearly each.
     """
-    with contextlib.suppress(OSError):  # a wish: sandboxes may refuse it
+    with contextlib.suppress(OSError):  # optional: sandboxes may refuse it
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _report(line: str) -> None:
-    """Tell the sidecar, if it is still there."""
+    """Report to the sidecar, if it is still there."""
     with contextlib.suppress(BrokenPipeError):
         os.write(REPORTS, f"{line}\n".encode())
 

@@ -19,15 +19,15 @@
 Rules:
 
 1. A simulator is started only when none runs: in `idle` and `failed`.
-2. Whether it is ready is not seen from here; the trainer says so, after a real round trip.
-3. An exit is wanted from the moment that a stop was announced, whatever its code. Before that it is
-   a fault, even with code 0: a simulator has no reason of its own to end.
-4. A stop waits for the trainer's supervisor to end the simulator; its deadline kills. A second stop
-   can only bring the deadline forward.
-5. A shutdown of the sidecar is a stop that nobody else will see to: it asks by signal, then kills.
-6. What the table does not have is refused, and changes nothing.
+2. The sidecar cannot see whether the simulator is ready; the trainer reports it, after a real round trip.
+3. After an announced stop, an exit is expected, with any code. Before that it is a fault, even with
+   code 0, because a simulator does not end by itself.
+4. A stop waits for the trainer's supervisor to end the simulator; at its deadline the sidecar kills it.
+   A second stop can only bring the deadline forward.
+5. A shutdown of the sidecar is a stop without a trainer: it sends SIGTERM, then kills.
+6. An event that is not in the table is refused and changes nothing.
 
-Everything that decides about states is in this file; what an action does is in `simulator`.
+All decisions about states are in this file; the actions are carried out in `simulator`.
 """
 
 from enum import StrEnum
@@ -37,7 +37,7 @@ from palaestra_sim.protocol.control import SidecarState
 
 
 class Event(StrEnum):
-    """What can happen: the trainer's requests, the process, the clock, the container's end."""
+    """An event: a request of the trainer, of the process, of the clock, or of the container's end."""
 
     START = "start"
     READY = "ready"
@@ -48,11 +48,11 @@ class Event(StrEnum):
 
 
 class Action(StrEnum):
-    """What is to be done on the way from one state to the next.
+    """The action of a transition from one state to the next.
 
     spawn: start the process. wait: let it end by itself, until the deadline of the request.
-    terminate: send SIGTERM to its process group, with a deadline. kill: end every process of it.
-    blame: count a fault. accept: note an exit that was wanted.
+    terminate: send SIGTERM to its process group, with a deadline. kill: kill all of its processes.
+    blame: count a fault. accept: record an expected exit.
     """
 
     NOTHING = "nothing"
@@ -91,5 +91,5 @@ TABLE: MappingProxyType[tuple[SidecarState, Event], Step] = MappingProxyType(
 
 
 def step(state: SidecarState, event: Event) -> Step | None:
-    """Return the next state and what to do on the way; None when `state` does not allow `event`."""
+    """Return the next state and the action; None if `state` does not allow `event`."""
     return TABLE.get((state, event))

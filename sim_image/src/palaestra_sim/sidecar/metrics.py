@@ -1,4 +1,4 @@
-"""What /metrics says, read off the simulators at the moment of the question."""
+"""The content of /metrics, read from the simulators at each request."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
@@ -23,7 +23,7 @@ def registry(simulators: Sequence[Simulator]) -> CollectorRegistry:
 
 
 class _Simulators(Collector):
-    """Makes the metrics from the simulators, each with all of its labels, so that none appears late."""
+    """Creates the metrics of the simulators, each with all of its labels, so that none appears later."""
 
     def __init__(self, simulators: Sequence[Simulator]) -> None:
         self._simulators = dict(zip(SLOTS, simulators, strict=False))
@@ -36,7 +36,7 @@ class _Simulators(Collector):
     def _values(self) -> Mapping[Family, Values]:
         them = self._simulators.items()
         used = {slot: simulator.usage() for slot, simulator in them}
-        states = {slot: simulator.state for slot, simulator in them}  # each once: it may change meanwhile
+        states = {slot: simulator.state for slot, simulator in them}  # read once: it may change meanwhile
         return {
             families.UP: {(slot,): it.pid is not None for slot, it in states.items()},
             families.STATES: {

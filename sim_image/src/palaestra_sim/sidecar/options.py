@@ -1,4 +1,4 @@
-"""What a person may write behind `palaestra-sidecar`."""
+"""The command-line options of `palaestra-sidecar`."""
 
 import argparse
 from collections.abc import Sequence
@@ -13,34 +13,34 @@ from palaestra_sim.typed import whole
 EXIT_WRONG = 2
 
 EPILOG = """
-The simulator is not started by this program's start but by POST /start on the control port; see
-palaestra_sim.protocol.control. It gets this program's environment, so ROS_MASTER_URI and ROS_HOSTNAME.
+This program does not start the simulator by itself; POST /start on the control port does, see
+palaestra_sim.protocol.control. The simulator inherits the environment: ROS_MASTER_URI and ROS_HOSTNAME.
 
 reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
 serves  control: /start /ready /stop /state; health: /healthz /state /metrics
 
-With --standby there is a second simulator, slot b, with a world, ROS names and a process of its own
+With --standby there is a second simulator, slot b, with its own world, ROS names and process
 (GROUP-INDEXb.wbt; /standby/start and so on), so that one can start while the other works. Lines then begin
 with "a: " or "b: ". A simulator finds its slot in PALAESTRA_SIMULATOR_SLOT.
 
-exit codes: 0 after SIGTERM or SIGINT, with nothing left running; 1 the same, but something hung;
+exit codes: 0 after SIGTERM or SIGINT, everything ended; 1 the same, but a process hung and was left;
             2 wrong options or world, a port in use, a missing program: nothing was started
 """
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Prints a usage error in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(EXIT_WRONG, f"{self.prog}: {message}; see --help\n")
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
-    """Return the options; ends the program with code 2 when they are wrong."""
+    """Return the options; if they are wrong, end the program with code 2."""
     parser = _Parser(
         prog="palaestra-sidecar",
-        description="Start, watch and stop one simulator, as its trainer commands.",
+        description="Start, watch and stop one simulator at its trainer's command.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -55,39 +55,39 @@ def _add_simulator(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("the simulator")
     group.add_argument("--driver", choices=[driver.value for driver in Driver], required=True)
     group.add_argument(
-        "--world", type=located, required=True, metavar="WORLD", help="a file, or one that ships"
+        "--world", type=located, required=True, metavar="WORLD", help="a file, or the name of a shipped world"
     )
     group.add_argument(
-        "--option", action="append", default=[], metavar="X", help="for the simulator; repeatable"
+        "--option", action="append", default=[], metavar="X", help="option for the simulator; repeatable"
     )
     group.add_argument(
-        "program", nargs="*", help="for driver command, behind --; {world} stands for the world's path"
+        "program", nargs="*", help="for driver command, after --; {world} stands for the world's path"
     )
 
 
 def _add_listeners(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("listeners (port 0: any that is free)")
+    group = parser.add_argument_group("listeners (port 0: any free port)")
     group.add_argument("--control", type=_address, default="127.0.0.1:7100", metavar="HOST:PORT")
     group.add_argument("--health", type=_address, default="0.0.0.0:7200", metavar="HOST:PORT")
-    group.add_argument("--until-stdin-closes", action="store_true", help="end too when standard input does")
+    group.add_argument("--until-stdin-closes", action="store_true", help="end too when standard input closes")
 
 
 def _add_identity(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("ROS names (without --job the world runs as it is)")
+    group = parser.add_argument_group("ROS names (without --job the world runs unchanged)")
     group.add_argument("--job", metavar="NAME")
     group.add_argument("--namespace", default="default", metavar="NAME")
     group.add_argument("--uid", default="", metavar="UID")
     group.add_argument("--replica", type=whole(), default=0, metavar="N")
     group.add_argument("--group", default="collect", metavar="NAME")
     group.add_argument("--index", type=whole(), default=0, metavar="N")
-    group.add_argument("--work", type=Path, metavar="DIR", help="where the named world is written")
+    group.add_argument("--work", type=Path, metavar="DIR", help="folder for the generated world")
     group.add_argument(
         "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"
     )
     group.add_argument(
-        "--suffix", default="", metavar="TEXT", help="without --job: goes behind the names in the world"
+        "--suffix", default="", metavar="TEXT", help="without --job: appended to the names in the world"
     )
-    group.add_argument("--standby", action="store_true", help="have a second simulator, which may stand by")
+    group.add_argument("--standby", action="store_true", help="have a second simulator as a standby")
 
 
 def _address(text: str) -> Address:

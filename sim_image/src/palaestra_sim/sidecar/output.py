@@ -1,8 +1,8 @@
-"""Whole lines to standard output, the simulator's and the sidecar's own.
+"""Write whole lines to standard output, the simulator's and the sidecar's own.
 
-A line is written at once and is never longer than a pipe takes in one piece, so lines of several
-writers do not mix, and nobody has to hold a lock while a full pipe makes him wait. A simulator that
-prints faster than the container's log takes it has to wait too: nothing is kept here but one line.
+A line is written at once and is never longer than a pipe takes in one piece. So lines of several writers
+do not mix, and no writer holds a lock while it waits for a full pipe. A simulator that prints faster than
+the container's log reads has to wait too: only one line is kept here.
 """
 
 import logging
@@ -10,12 +10,12 @@ import os
 import select
 
 STDOUT = 1
-MOST_LINE = select.PIPE_BUF  # 4096: what POSIX writes into a pipe in one piece
+MOST_LINE = select.PIPE_BUF  # 4096: the most that POSIX writes into a pipe in one piece
 _CHUNK = 65536
 
 
 def write_line(line: bytes) -> None:
-    """Write a line that ends in a newline; a reader that has gone is not told."""
+    """Write a line that ends in a newline; ignore a closed pipe."""
     try:
         while line:
             line = line[os.write(STDOUT, line) :]
@@ -24,7 +24,7 @@ def write_line(line: bytes) -> None:
 
 
 class LineHandler(logging.Handler):
-    """Writes log records as whole lines, behind the program's name."""
+    """Writes log records as whole lines, after the program's name."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one record."""
@@ -33,14 +33,14 @@ class LineHandler(logging.Handler):
 
 
 class Passage:
-    """Passes on what comes out of a pipe, line by line, until its end.
+    """Forwards the output from a pipe, line by line, until its end.
 
     Args:
         source: the pipe.
-        mark: what to write before each line.
+        mark: text before each line.
 
     Attributes:
-        last_line: the last line that was not empty, as text.
+        last_line: the last non-empty line, as text.
     """
 
     def __init__(self, source: int, mark: str = "") -> None:
@@ -50,7 +50,7 @@ class Passage:
         self._most = MOST_LINE - 1 - len(self._mark)
 
     def run(self) -> None:
-        """Pass on everything; returns when nobody can write any more. Closes the pipe."""
+        """Forward everything; return when all writers have closed the pipe. Closes the pipe."""
         rest = b""
         while chunk := os.read(self._source, _CHUNK):
             *lines, rest = (rest + chunk).split(b"\n")
@@ -64,7 +64,7 @@ class Passage:
         os.close(self._source)
 
     def _pass_on(self, line: bytes) -> None:
-        """Write one line, in pieces if it is longer than a line may be."""
+        """Write one line, in pieces if it is too long."""
         if line.strip():
             self.last_line = line[:MOST_LINE].decode("utf-8", "replace").strip()
         for start in range(0, max(1, len(line)), self._most):

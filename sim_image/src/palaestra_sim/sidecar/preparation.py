@@ -1,8 +1,8 @@
 """Put the world that the simulator will run where it can run it.
 
-The sidecar alone writes names into a world: it is given a source world, of the image or of the
-replica's ConfigMap. ConfigMaps of older releases hold a world for each simulator with its names in it;
-the generator makes the same world of what it has made before.
+Only the sidecar writes names into a world. It gets a source world, from the image or from the replica's
+ConfigMap. ConfigMaps of older releases hold a generated world for each simulator; the generator makes the
+same world again from a generated one.
 """
 
 import os
@@ -15,12 +15,12 @@ from palaestra_sim.protocol.control import RobotName
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots
 
-SLOTS = ("a", "b")  # of the simulators of one sidecar: the first, and one that may stand by for it
+SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby
 _PROJECT = "project"
 
 
 def located(world: str) -> Path:
-    """Return the path of a world: a file, or else the one that ships under that name."""
+    """Return the path of a world: a file, or else the shipped world of that name."""
     path = Path(world)
     shipped = builtin_path(world) if path.name == world and not path.exists() else None
     return shipped or path
@@ -30,7 +30,7 @@ def read(world: Path) -> bytes:
     """Return the bytes of a world.
 
     Raises:
-        SidecarError: there is no such file, or it may not be read.
+        SidecarError: the file does not exist, or may not be read.
     """
     try:
         return world.read_bytes()
@@ -39,20 +39,20 @@ def read(world: Path) -> bytes:
 
 
 def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool) -> Path:
-    """Write this simulator's own world of `world` into the folder `work`; return where it is.
+    """Write this simulator's world, made from `world`, into the folder `work`; return its path.
 
-    A world that names files beside it gets them, as links, at the same places around its new one.
+    If the world refers to files beside it, links to them are created at the same relative places.
 
     Raises:
         WorldError: the world is wrong.
-        SidecarError: it cannot be read or written; nothing is half-written.
+        SidecarError: it cannot be read or written; no partial file is left.
     """
     make = partial(generate, read(world), identity, clock=clock, name=str(world))
     return _written(world, work, file_name(identity), make)
 
 
 def renamed(world: Path, work: Path, suffix: str) -> Path:
-    """Write a copy of `world` with `suffix` behind its ROS names into the folder `work`; return where it is.
+    """Write a copy of `world` with `suffix` appended to its ROS names into `work`; return its path.
 
     Raises:
         WorldError, SidecarError: as `named` does.
@@ -62,7 +62,7 @@ def renamed(world: Path, work: Path, suffix: str) -> Path:
 
 
 def _written(world: Path, work: Path, name: str, make: Callable[..., bytes]) -> Path:
-    """Write what `make` makes of `world`, with the files around it if it names some."""
+    """Write the result of `make` for `world`, with links to the files around it if it refers to some."""
     try:
         generated, folder = make(), None
     except WorldError:
@@ -83,7 +83,7 @@ def file_name(identity: RunIdentity) -> str:
 
 
 def described(source: bytes, name: str) -> tuple[RobotName, ...]:
-    """Return the robots of a world that a client can find: those with a ROS name in it.
+    """Return the robots of a world that a client can find: those with a ROS name.
 
     Raises:
         WorldError: the world is wrong.
@@ -96,9 +96,9 @@ def described(source: bytes, name: str) -> tuple[RobotName, ...]:
 
 
 def _link_neighbours(world: Path, folder: Path) -> None:
-    """Make what lies beside `world`, and beside its folder, lie around `folder` in the same way.
+    """Link everything beside `world`, and beside its folder, to the same relative places around `folder`.
 
-    That is how far a Webots project's addresses go: `textures/a.png`, `../protos/Robot.proto`.
+    Addresses of a Webots project reach no further: `textures/a.png`, `../protos/Robot.proto`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for neighbour in world.parent.parent.iterdir():
@@ -110,12 +110,12 @@ def _link_neighbours(world: Path, folder: Path) -> None:
 
 def _link(link: Path, target: Path) -> None:
     if link.is_symlink():
-        link.unlink()  # of an earlier life of this container
+        link.unlink()  # from an earlier start of this container
     link.symlink_to(target)
 
 
 def _write_whole(path: Path, content: bytes) -> Path:
-    """Write a file so that it is there as a whole or not at all."""
+    """Write a file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}")
     try:

@@ -1,8 +1,8 @@
-"""The one module that starts processes: a simulator, under a keeper that ends whatever it started.
+"""The one module that starts processes: a simulator, under a keeper that ends everything it started.
 
-The sidecar talks to the keeper through two pipes and hears its end through threads, so nothing here
-waits. Reaping is a matter of the whole sidecar, as it may be process 1 of its container: `reap` takes
-every child that ended, the keepers and the orphans that only process 1 gets.
+The sidecar talks to the keeper through two pipes and learns of its end through threads, so nothing here
+blocks. The whole sidecar reaps children, because it may be process 1 of its container: `reap` takes every
+child that ended, both keepers and the orphans that only process 1 gets.
 """
 
 import contextlib
@@ -19,17 +19,17 @@ from palaestra_sim.sidecar import keeper
 from palaestra_sim.sidecar.output import Passage
 
 _KEEPER = Path(keeper.__file__)
-# In /proc/PID/stat behind the name: time of the process, and of its children that have ended, in ticks.
+# In /proc/PID/stat after the name: time of the process, and of its children that have ended, in ticks.
 _OWN_TIME, _ENDED_TIME = slice(11, 13), slice(13, 15)  # Source: proc_pid_stat(5)
-_LAST_OUTPUT_S = 0.2  # for the lines that are still in the pipe when the simulator has ended
+_LAST_OUTPUT_S = 0.2  # for lines that are still in the pipe after the simulator has ended
 
-_keepers: set[int] = set()  # those that have not ended: the only children that are no orphans
-_keepers_lock = threading.Lock()  # a keeper between its start and its place in the set is none
+_keepers: set[int] = set()  # running keepers: the only children that are not orphans
+_keepers_lock = threading.Lock()  # a keeper is not in the set until its start returns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Command:
-    """A program with its arguments, its environment, and what marks each line that it prints."""
+    """A program with its arguments, its environment, and the prefix of each line that it prints."""
 
     arguments: tuple[str, ...]
     environment: Mapping[str, str]
@@ -45,10 +45,10 @@ class Started:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """The simulator ended, and everything that it had started.
+    """The simulator and everything that it had started have ended.
 
-    `code` or `signal` (as "SIGBUS") say how; with neither, `problem` says why that is not known.
-    `last_line` is the last that it printed.
+    `code` or `signal` (as "SIGBUS") is set; if both are unknown, `problem` is the reason.
+    `last_line` is the last line that it printed.
     """
 
     code: int | None = None
@@ -59,7 +59,7 @@ class Ended:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Usage:
-    """What all processes of a simulator use: memory, and processor time since its start."""
+    """The memory of all processes of a simulator, and their processor time since its start."""
 
     rss_bytes: int = 0
     cpu_s: float = 0.0
@@ -72,7 +72,7 @@ class Process:
     """A simulator's process and all of its descendants.
 
     Attributes:
-        keeper: the process that holds them; they are all below it.
+        keeper: the keeper's process id; all processes of the simulator are its descendants.
     """
 
     def __init__(self, keeper_pid: int, commands: int) -> None:
@@ -82,10 +82,10 @@ class Process:
 
     @classmethod
     def start(cls, command: Command, report: Report) -> Self:
-        """Start a simulator; `report` is called from a thread: Started, and Ended once, at last.
+        """Start a simulator; `report` is called from a thread: with Started, and at the end once with Ended.
 
         Raises:
-            OSError: the system has no room for another process.
+            OSError: the system cannot start another process.
         """
         (commands, our_commands), (our_reports, reports) = os.pipe(), os.pipe()
         our_output, output = os.pipe()
@@ -110,26 +110,26 @@ class Process:
         self._say(keeper.TERMINATE)
 
     def kill(self) -> None:
-        """Kill the simulator and everything below it."""
+        """Kill the simulator and all of its descendants."""
         self._say(keeper.KILL)
 
     def close(self) -> None:
-        """Let go of the keeper, which kills what is left."""
+        """Close the pipe to the keeper, which then kills all that is left."""
         _close(self._commands)
 
     def usage(self) -> Usage:
-        """Return what all processes of the simulator use; shared pages count twice. From any thread."""
+        """Return the usage of all processes of the simulator; shared pages count twice. From any thread."""
         below = found = keeper.children({self.keeper})
         while found := keeper.children(found):
             below |= found
         ticks = sum(_ticks(pid, _OWN_TIME) + _ticks(pid, _ENDED_TIME) for pid in below)
         cpu_s = (ticks + _ticks(self.keeper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
-        self._cpu_s = max(self._cpu_s, cpu_s)  # one that ends meanwhile may be missing in both
+        self._cpu_s = max(self._cpu_s, cpu_s)  # a process that ends meanwhile may be missing in both
         pages = sum(_resident_pages(pid) for pid in below)
         return Usage(rss_bytes=pages * os.sysconf("SC_PAGE_SIZE"), cpu_s=self._cpu_s)
 
     def _say(self, command: bytes) -> None:
-        with contextlib.suppress(BrokenPipeError):  # it has ended, and Ended is on its way
+        with contextlib.suppress(BrokenPipeError):  # it has ended, and Ended will be reported
             os.write(self._commands, command)
 
 
@@ -141,20 +141,20 @@ def reap() -> None:
 
 
 def _resident_pages(pid: int) -> int:
-    with contextlib.suppress(OSError, IndexError):  # it ended meanwhile
+    with contextlib.suppress(OSError, IndexError):  # the process ended meanwhile
         return int(Path(f"/proc/{pid}/statm").read_bytes().split()[1])
     return 0
 
 
 def _ticks(pid: int, fields: slice) -> int:
-    with contextlib.suppress(OSError, ValueError):  # it ended meanwhile
+    with contextlib.suppress(OSError, ValueError):  # the process ended meanwhile
         behind_name = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2]
         return sum(int(field) for field in behind_name.split()[fields])
     return 0
 
 
 def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
-    """Start the keeper with these of our descriptors as its own, out of reach of the terminal."""
+    """Start the keeper with these descriptors as its own, detached from the terminal."""
     with _keepers_lock:
         pid = os.posix_spawn(
             sys.executable,
@@ -169,7 +169,7 @@ def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
 
 
 def _watch(keeper_pid: int, reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
-    """Report what the keeper says until it has ended."""
+    """Report the keeper's messages until it has ended."""
     said: dict[str, int] = {}
     with os.fdopen(reports) as lines:
         for line in lines:
@@ -186,7 +186,7 @@ def _watch(keeper_pid: int, reports: int, reader: threading.Thread, passage: Pas
 
 
 def _end_orphans() -> None:
-    """Kill what a keeper left behind that was killed itself: it has become ours."""
+    """Kill the descendants of a keeper that was killed itself; they are now children of this process."""
     while orphans := _kill_orphans():
         for pid in orphans:
             with contextlib.suppress(ChildProcessError):  # reaped by the signals' thread
@@ -214,7 +214,7 @@ def _signal_name(number: int) -> str:
     try:
         return signal.Signals(number).name
     except ValueError:
-        return f"SIG{number}"  # a real-time signal between the two that have names
+        return f"SIG{number}"  # a real-time signal without a name
 
 
 def _close(*descriptors: int) -> None:

@@ -1,8 +1,8 @@
-"""The signals of the sidecar, taken by one thread that waits for nothing else.
+"""The signals of the sidecar, received by one thread that waits for nothing else.
 
-They are blocked everywhere and fetched with sigtimedwait. A handler would not do: Python runs handlers
-in the main thread, and a signal that comes just before that thread begins to wait for something else
-wakes nobody. Process 1 gets blocked signals too, though it has no handler for them.
+They are blocked everywhere and received with sigtimedwait. A handler would not be enough: Python runs
+handlers in the main thread, so a signal that arrives just before that thread blocks on something else
+wakes no thread. Process 1 receives blocked signals too, although it has no handler for them.
 """
 
 import os
@@ -14,7 +14,7 @@ from collections.abc import Callable
 from palaestra_sim.sidecar.keeper import adopt_orphans
 from palaestra_sim.sidecar.process import reap
 
-SHUTDOWN_S = 1.8  # this long after the first signal the sidecar ends, whatever hangs
+SHUTDOWN_S = 1.8  # the sidecar ends this long after the first signal, even if something hangs
 EXIT_HUNG = 1
 
 _ENDS = frozenset({signal.SIGTERM, signal.SIGINT})
@@ -22,15 +22,15 @@ _TAKEN = _ENDS | {signal.SIGCHLD}
 
 
 def hold_back() -> None:
-    """Keep signals until `take` takes them; to be called before there is a second thread."""
+    """Block the signals until `take` receives them; call it before a second thread starts."""
     signal.pthread_sigmask(signal.SIG_BLOCK, _TAKEN)
 
 
 def take(shut_down: Callable[[], None]) -> None:
     """Reap children and obey SIGTERM and SIGINT from now on, in a thread of its own.
 
-    `shut_down` is called at the first signal that asks for the end. Orphans of what this process
-    started become its children, as if it were process 1.
+    `shut_down` is called at the first SIGTERM or SIGINT. Orphaned descendants of this process become its
+    children, as if it were process 1.
     """
     adopt_orphans()
     threading.Thread(target=_take, args=(shut_down,), name="signals", daemon=True).start()
@@ -44,4 +44,4 @@ def _take(shut_down: Callable[[], None]) -> None:
     while (left_s := give_up - time.monotonic()) > 0:
         signal.sigtimedwait(_TAKEN, left_s)
         reap()
-    os._exit(EXIT_HUNG)  # the keeper sees the end of its pipe, and ends the rest
+    os._exit(EXIT_HUNG)  # the keeper reads the end of its pipe and ends the rest

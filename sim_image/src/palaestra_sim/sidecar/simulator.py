@@ -1,8 +1,8 @@
 """The simulator of this sidecar: the one owner of its state.
 
-Requests, reports of the process, the deadline of a stop and the end of the container all become
-messages in one queue, and one thread takes them in order: so no two of them can act on the same
-state, and there is no lock. Other threads see `state`, an immutable value that is replaced as a whole.
+Requests, reports of the process, the deadline of a stop and the end of the container all become messages
+in one queue, and one thread takes them in order. So no two of them can act on the same state, and no lock
+is needed. Other threads read `state`, an immutable value that is replaced as a whole.
 """
 
 import logging
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 
 class NoAnswer(TimeoutError):
-    """The owner of the state did not come round to a request in time."""
+    """The owner of the state did not answer a request in time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,13 +48,13 @@ class Simulator:
     """One simulator, from the first start to the end of the container.
 
     Attributes:
-        state: what it is now; may be read from any thread.
-        faults: by kind; may be read from any thread.
+        state: the current state; may be read from any thread.
+        faults: number of faults by kind; may be read from any thread.
 
     Args:
-        command: how it is started.
-        state: what it is before the first start.
-        clock: seconds, from anywhere.
+        command: starts the simulator.
+        state: the state before the first start.
+        clock: returns seconds, from any origin.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Simulator:
         }
 
     def ask(self, event: Event, deadline_s: float = 0.0) -> Answer:
-        """Return what became of a request; from any thread but the owner's.
+        """Return the answer to a request; from any thread but the owner's.
 
         Raises:
             NoAnswer: the owner is stuck, or has ended.
@@ -95,22 +95,22 @@ class Simulator:
             raise NoAnswer(f"no answer to {event} within {_ANSWER_S:g} s") from None
 
     def shut_down(self) -> None:
-        """End the simulator and let `run` return; from any thread."""
+        """End the simulator and make `run` return; from any thread."""
         self._inbox.put(_Message(event=Event.SHUTDOWN))
 
     def told(self) -> SimulatorState:
-        """Return the state with the memory in use, for which a simulator that is not ready is not asked."""
+        """Return the state, with the memory in use if the simulator is ready."""
         state = self.state
         ready = state.state is SidecarState.READY
         return replace(state, rss_bytes=self.usage().rss_bytes) if ready else state
 
     def usage(self) -> Usage:
-        """Return what its processes use; nothing if none runs. From any thread."""
+        """Return the usage of its processes; zero if none runs. From any thread."""
         process = self._process
         return Usage() if process is None else process.usage()
 
     def run(self) -> None:
-        """Take one message after the other, until a shutdown has left nothing running."""
+        """Process messages in order, until a shutdown has ended the simulator."""
         while not (self._closing and self._process is None):
             message = self._next()
             if isinstance(message, Started):
@@ -126,7 +126,7 @@ class Simulator:
             return _Message(event=Event.DEADLINE)
 
     def _take(self, message: _Message) -> None:
-        """Do what the table says about one message, and answer it."""
+        """Carry out the table's action for one message, and answer it."""
         self._closing |= message.event is Event.SHUTDOWN
         step = lifecycle.step(self.state.state, message.event)
         if step is not None:
@@ -150,7 +150,7 @@ class Simulator:
         return replace(state, starts=start)
 
     def _numbered(self, start: int) -> Command:
-        """Return the command, told which start this is: a stub that fails by chance draws anew each time."""
+        """Return the command with the number of this start, so that random faults differ each time."""
         environment = {**self._command.environment, "PALAESTRA_SIMULATOR_START": str(start)}
         return replace(self._command, environment=environment)
 
@@ -178,7 +178,7 @@ class Simulator:
         return self._after(message.ended or Ended(), state, expected=True)
 
     def _after(self, ended: Ended, state: SimulatorState, *, expected: bool) -> SimulatorState:
-        """Let go of a process that ended; return the state with its exit noted."""
+        """Close the process that ended; return the state with its exit."""
         if self._process is not None:
             self._process.close()
         self._process = None
@@ -187,13 +187,13 @@ class Simulator:
         return replace(state, pid=None, last_exit=last)
 
     def _to_end_within(self, deadline_s: float, state: SimulatorState) -> SimulatorState:
-        """Kill it when the deadline has passed; an earlier one stays. Return the state that says so."""
+        """Set the deadline of the kill, if it is earlier than the current one. Return the state with it."""
         kill_at = self._clock() + deadline_s
         self._kill_at = kill_at if self._kill_at is None else min(self._kill_at, kill_at)
         return replace(state, detail=f"to be killed in {self._kill_at - self._clock():.1f} s")
 
     def _report(self, report: Started | Ended) -> None:
-        """Take a report from the process's thread."""
+        """Receive a report from the process's thread."""
         if isinstance(report, Ended):
             self._inbox.put(_Message(event=Event.EXITED, ended=report))
         else:
@@ -201,7 +201,7 @@ class Simulator:
 
 
 def _described(ended: Ended) -> tuple[str, str]:
-    """Return the kind of an end that was a fault, and a sentence about it."""
+    """Return the kind of a faulty end, and a sentence about it."""
     said = f"; it said last: {ended.last_line}" if ended.last_line else ""
     if ended.code is not None:
         return "code", f"the simulator ended with code {ended.code}{said}"
