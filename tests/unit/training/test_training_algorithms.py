@@ -173,6 +173,34 @@ def test_wrong_values_and_spaces_are_configuration_errors(make_env, name, hyperp
         model_of(name, make_env(), **hyperparameters)
 
 
+@pytest.mark.parametrize("name", ["A2C", "PPO"])
+def test_an_update_of_one_row_whose_advantage_is_to_be_normalized_is_refused(make_env, name):
+    """One number has no deviation: every update would be skipped, and nothing learned, without a word."""
+    with pytest.raises(ConfigurationError) as refusal:
+        model_of(name, make_env(), n_steps=1, normalize_advantage=True)
+
+    line = "algorithm.hyperparameters.n_steps: 1 step of 1 collecting simulator is 1 row"
+    assert str(refusal.value).startswith(line)
+    assert str(refusal.value).endswith("raise n_steps, add a simulator, or set normalize_advantage: false")
+
+
+@pytest.mark.parametrize(
+    ("members", "hyperparameters"),
+    [
+        (1, {"n_steps": 1, "normalize_advantage": False}),
+        (1, {"n_steps": 2, "normalize_advantage": True}),
+        (2, {"n_steps": 1, "normalize_advantage": True}),
+    ],
+)
+def test_an_update_of_one_row_is_accepted_without_normalization_and_of_two_with_it(
+    make_env, members, hyperparameters
+):
+    """Each of the remedies that the refusal names."""
+    model = model_of("A2C", make_env(members), **hyperparameters)
+
+    assert model.n_steps * model.n_envs >= 1 + model.normalize_advantage
+
+
 def test_an_observation_that_is_no_box_is_refused(make_env):
     """The buffers hold arrays."""
     env = make_env()

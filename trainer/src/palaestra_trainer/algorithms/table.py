@@ -189,6 +189,11 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         if not algorithm.normalize.observations:
             env = with_channels_first(env)
         env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
+    if chosen.get("normalize_advantage") and (chosen.get("n_steps"), env.num_envs) == (1, 1):
+        raise ConfigurationError(
+            f"{values.FIELD}.n_steps: 1 step of 1 collecting simulator is 1 row, and normalize_advantage "
+            "needs 2; raise n_steps, add a simulator, or set normalize_advantage: false"
+        )
     try:
         return entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
     except (AssertionError, TypeError, ValueError) as error:
