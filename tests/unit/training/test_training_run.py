@@ -178,7 +178,8 @@ def test_a_run_that_diverges_ends_with_81_and_saves_nothing_of_it(play, job, dir
 
     assert code == 81
     assert last_word().reason == (
-        "Diverged: episode 0, step 1: collect-0: the reward is nan (term walk); fix the environment's reward"
+        "Diverged: episode 0, step 1: collect-0: environment Corridor: the reward is nan (term walk); "
+        "fix the environment's reward"
     )
     assert checkpoint.newest(directory.checkpoints) is None
 

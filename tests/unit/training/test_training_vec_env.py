@@ -334,8 +334,11 @@ def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make
     env = make_env(member)
     env.reset()
 
-    with pytest.raises(Diverged, match=r"episode 0, step 1: collect-0: the reward is inf \(term walk\)"):
+    with pytest.raises(Diverged) as refusal:
         walk(env, 1)
+
+    fact = "episode 0, step 1: collect-0: environment Corridor: the reward is inf (term walk)"
+    assert str(refusal.value) == f"{fact}; fix the environment's reward"
 
 
 def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_member):

@@ -157,7 +157,7 @@ class Keeper:
         if self._pace.slow(seconds):
             self.watcher.slow(self.name, seconds)
         check_observation(self.name, self.member.env, step[0])
-        check_reward(self.name, step[1], step[4])
+        check_reward(self.name, self.member.env, step[1], step[4])
         return step
 
     def pause(self) -> None:

@@ -27,18 +27,19 @@ def check_observation(simulator: str, env: Environment, observation: Any) -> Non
             raise Diverged(f"{simulator}: {_name(env)}: {where}{fact}; fix the environment")
 
 
-def check_reward(simulator: str, reward: Any, info: Mapping[str, Any]) -> None:
+def check_reward(simulator: str, env: Environment, reward: Any, info: Mapping[str, Any]) -> None:
     """Return if a reward is finite.
 
     Raises:
-        Diverged: it is not finite; the message names the wrong terms, if the environment reports terms.
+        Diverged: it is not finite; the message names the environment and the wrong terms of `info`.
     """
     if math.isfinite(reward):
         return
     terms = info.get("reward_terms", {})
     wrong = ", ".join(name for name, value in terms.items() if not math.isfinite(value))
     where = f" (term {wrong})" if wrong else ""
-    raise Diverged(f"{simulator}: the reward is {float(reward)}{where}; fix the environment's reward")
+    fact = f"the reward is {float(reward)}{where}"
+    raise Diverged(f"{simulator}: {_name(env)}: {fact}; fix the environment's reward")
 
 
 def _not_finite(part: Any) -> str:
