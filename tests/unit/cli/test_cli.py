@@ -98,6 +98,28 @@ def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
     assert line.startswith(f"{path}:2:")
 
 
+def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
+    """Nothing in it would change, and no trainer could drive it."""
+    path = tmp_path / "silent.wbt"
+    path.write_bytes(builtin("arena").replace(b'controller "ros"', b'controller "void"'))
+
+    [line] = fails("world", path, "--job", "j", "--group", "g")
+
+    assert line.startswith(f"{path}:")
+    assert 'no robot has the controller "ros": there are "robotino" (controller "void"); set' in line
+
+
+def test_world_s_help_names_all_that_changes(capsys):
+    """A world builder compares the two files, and must find no other difference."""
+    with pytest.raises(SystemExit) as ended:
+        main(["world", "--help"])
+
+    words = " ".join(capsys.readouterr().out.split())
+    assert ended.value.code == 0
+    assert 'Only the controllerArgs of robots whose controller is "ros" change' in words
+    assert "--name= is set, --synchronize is added, and --clock is removed" in words
+
+
 def test_crd_prints_a_custom_resource_definition(capsys):
     """Of the version that is installed."""
     assert main(["crd"]) == 0
