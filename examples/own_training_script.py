@@ -20,10 +20,10 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from palaestra_trainer import environments, report
+from palaestra_trainer import report
 from palaestra_trainer.configuration import load
-
-gymnasium.register_envs(environments)  # MoveToTargetEnv-v0
+from palaestra_trainer.environments.configured import simulator_for
+from palaestra_trainer.environments.making import make_environment
 
 job = load()  # what PALAESTRA_CONFIG names: the TrainingJob, resolved for this replica
 run = Path(os.environ["PALAESTRA_RUN"])  # what is written here outlives the pod
@@ -34,8 +34,8 @@ signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
 
 def make(role: str = "Collect") -> gymnasium.Env:
     """Make an environment in a simulator with this role that no other environment has."""
-    task = job.environment
-    return Monitor(gymnasium.make(task.id, role=role, reward=task.reward, **task.options))
+    taken = simulator_for(role)
+    return Monitor(make_environment(job.environment, taken.robot, taken.scene))
 
 
 def save(model: PPO) -> None:

@@ -7,7 +7,10 @@ import runpy
 import signal
 from pathlib import Path
 
+import gymnasium
+import numpy as np
 import pytest
+from gymnasium import spaces
 from stable_baselines3 import PPO
 
 from palaestra_trainer.simulators import connect
@@ -15,17 +18,48 @@ from palaestra_trainer.simulators import connect
 SCRIPT = Path(__file__).parents[3] / "examples" / "own_training_script.py"
 
 
+class Hall(gymnasium.Env):
+    """An environment with the two arguments that it needs: neither role nor reward."""
+
+    observation_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    action_space = spaces.Discrete(2)
+
+    def __init__(self, robot, scene):
+        self._world = robot, scene
+        self._steps = 0
+
+    def reset(self, *, seed=None, options=None):
+        """Return the only observation."""
+        del options
+        super().reset(seed=seed)
+        self._steps = 0
+        return np.zeros(2, np.float32), {}
+
+    def step(self, action):
+        """End after five steps."""
+        del action
+        self._steps += 1
+        return np.zeros(2, np.float32), 1.0, self._steps == 5, False, {}
+
+
+@pytest.fixture
+def hall():
+    """Return the id under which it is registered."""
+    gymnasium.register(id="Hall-v0", entry_point=Hall)
+    yield "Hall-v0"
+    gymnasium.registry.pop("Hall-v0")
+
+
 @pytest.fixture
 def script(write_job, fakes, tmp_path, monkeypatch):
     """Run the script in two simulators and one to evaluate in; return the names of those that it started."""
     before = signal.getsignal(signal.SIGTERM)
-    job = write_job(collectors=2, steps=100)
     (tmp_path / "run").mkdir()
-    monkeypatch.setenv("PALAESTRA_CONFIG", str(job))
     monkeypatch.setenv("PALAESTRA_RUN", str(tmp_path / "run"))
 
-    def run(attempt, on_start=lambda: None):
+    def run(attempt, on_start=lambda: None, **changes):
         started = []
+        monkeypatch.setenv("PALAESTRA_CONFIG", str(write_job(collectors=2, steps=100, **changes)))
 
         def made(configuration):
             [member] = fakes.make_members(configuration)
@@ -50,6 +84,14 @@ def test_a_script_of_one_s_own_trains_in_the_configured_simulators(script, tmp_p
     assert PPO.load(tmp_path / "run" / "model.zip").num_timesteps == 1024
     assert "mean return" in capsys.readouterr().out
     assert started == ["collect-0", "collect-1", "evaluate-0"]
+
+
+@pytest.mark.filterwarnings("ignore:.*not wrapped.*")
+def test_a_script_of_one_s_own_trains_in_an_environment_without_reward_and_role(script, hall, capsys):
+    """What people copy must take any environment that the built-in loop takes."""
+    script("first", environment={"id": hall})
+
+    assert "mean return 5.00 over 4 episodes" in capsys.readouterr().out
 
 
 @pytest.mark.filterwarnings("ignore:.*not wrapped.*")
