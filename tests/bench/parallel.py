@@ -49,7 +49,7 @@ class Member:
     def start(self):
         """It runs already."""
 
-    def due(self):
+    def due(self, episodes=1):
         """It is not played in for long."""
 
     def abandon(self):

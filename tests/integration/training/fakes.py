@@ -54,7 +54,7 @@ class FakeSimulator:
         """Resets since the last restart."""
         return self.env.resets
 
-    def due(self) -> None:
+    def due(self, episodes: int = 1) -> None:
         """It does not wear out."""
 
     def start(self) -> None:

@@ -130,9 +130,9 @@ class FakeMember:
         self._faults = {"step": steps, "reset": resets, "start": starts}
         self._counts = dict.fromkeys(self._faults, 0)
 
-    def due(self) -> str | None:
+    def due(self, episodes: int = 1) -> str | None:
         """Return why it is to be recycled, if it is."""
-        worn = self._recycle_after is not None and self.resets >= self._recycle_after
+        worn = self._recycle_after is not None and self.resets + episodes > self._recycle_after
         return f"{self.resets} resets" if worn else None
 
     def start(self) -> None:

@@ -266,6 +266,62 @@ def test_a_member_that_is_mended_neither_rests_nor_runs(make_fleet):
     assert members[0].log == ["start", "restart", "stop"]
 
 
+def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_runs(make_member):
+    """The others collect meanwhile; a member that runs before it rests again would step while paused."""
+    member = make_member(recycle_after=1, held=True)
+    keeper = Keeper(member)
+    keeper.reset(seed=1)
+
+    keeper.recycle_resting(episodes=1)
+    busy = keeper.busy
+    keeper.run(check=member.release.set)
+
+    assert busy
+    assert member.log == ["restart", "pause", "run"]
+
+
+def test_a_resting_member_that_is_not_due_stays_as_it_is(make_member):
+    """Its next evaluation is over before it is worn."""
+    member = make_member(recycle_after=24)
+    keeper = Keeper(member)
+    keeper.reset(seed=1)
+
+    keeper.recycle_resting(episodes=20)
+
+    assert not keeper.busy
+    assert member.log == []
+
+
+def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make_member):
+    """In the background again: another simulator may play its episodes."""
+    member = make_member(recycle_after=1, starts=[1])
+    keeper = Keeper(member)
+    keeper.reset(seed=1)
+
+    keeper.recycle_resting(episodes=1)
+    keeper.run()
+    await_one([keeper])
+
+    assert keeper.up()
+    assert member.log.count("restart") == 2
+
+
+def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make_member):
+    """A signal may come while the simulators are healthy, and its end is no fault of theirs."""
+    member = make_member("collect-0", recycle_after=1, held=True)
+    fleet, _ = make_fleet(member)
+    fleet.start()
+    [keeper] = fleet.collecting
+    keeper.reset(seed=1)
+
+    keeper.recycle_resting(episodes=1)
+    with structlog.testing.capture_logs() as logs:
+        fleet.stop()
+
+    assert member.log == ["start", "restart", "stop"]
+    assert [line for line in logs if line["event"] == "simulator fault"] == []
+
+
 def test_fifty_faults_leave_nothing_behind(make_member):
     """Neither threads nor descriptors: a week of training has many more."""
     keeper = Keeper(make_member(), Care(restart_limit=50))

@@ -56,6 +56,25 @@ def test_due_by_resets(clock, resets, due):
     assert wear.due(resets) == due
 
 
+@pytest.mark.parametrize(
+    ("resets", "episodes", "due"),
+    [
+        (0, 20, None),
+        (4, 20, None),
+        (5, 20, "5 resets"),
+        (22, 50, None),
+        (23, 50, "23 resets"),
+        (0, 24, None),
+        (1, 24, "1 resets"),
+    ],
+)
+def test_due_before_several_episodes_where_that_saves_a_restart_amid_them(clock, resets, episodes, due):
+    """Fifty episodes have two restarts amid them, also in a simulator that was restarted before."""
+    wear = Wear(Recycle(after_resets=24), Memory(), clock)
+
+    assert wear.due(resets, episodes) == due
+
+
 def test_due_by_age_since_it_came_into_use(clock):
     """What stood by for an hour has not worked for an hour: it would be recycled as soon as it took over."""
     wear = Wear(Recycle(after_minutes=1.5), Memory(), clock)

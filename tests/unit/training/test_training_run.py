@@ -13,7 +13,7 @@ from palaestra_sim.protocol.status import Cause
 from palaestra_trainer import checkpoint, training
 from palaestra_trainer.errors import ConfigurationError, MasterLost
 from palaestra_trainer.measuring import measure
-from palaestra_trainer.run_directory import read_lines
+from palaestra_trainer.run_directory import RunDirectory, read_lines
 from palaestra_trainer.seeds import CONFIRM, EVALUATE, episode_seeds
 
 
@@ -104,6 +104,19 @@ def test_simulators_are_recycled_without_a_fault(play, job, directory):
     assert code == 0
     assert summary["recycled"] == sum(it.log.count("restart") for it in members.values()) > 2
     assert summary["faults"] == 0
+
+
+def test_evaluating_simulators_are_recycled_while_the_others_collect(play, job, directory, tmp_path):
+    """An evaluation does not wait for a restart that could have been over, and measures the same."""
+    recycled, undisturbed = directory, RunDirectory(tmp_path / "undisturbed")
+    evaluation = {"everySteps": 20, "episodes": 4, "confirmEpisodes": 0}
+
+    _, members = play(job(evaluation=evaluation), {"evaluate-0": {"recycle_after": 5}}, into=recycled)
+    play(job(evaluation=evaluation), into=undisturbed)
+
+    events = members["evaluate-0"].log
+    assert events == ["start", "pause", "run", "pause", *["restart", "pause", "run", "pause"] * 4, "stop"]
+    assert recycled.evaluations.read_text() == undisturbed.evaluations.read_text()
 
 
 def test_a_spent_budget_ends_the_run_with_80_and_a_checkpoint(play, job, directory, last_word):

@@ -124,6 +124,7 @@ class Conductor(BaseCallback):
             self._resting = False
         if _passed(self._evaluated, self._step, self._run.configuration.evaluation.every_steps):
             self._evaluate_if_wanted()
+            self._selection.recycle_resting()
         if _passed(self._saved, self._step, self._run.configuration.checkpoint.every_steps):
             self.save()
 

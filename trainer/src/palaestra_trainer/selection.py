@@ -13,6 +13,7 @@ import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from math import ceil
 from pathlib import Path
 from typing import Any, Self
 
@@ -108,6 +109,15 @@ class Selection:
         if reached:
             raise Enough(f"{_in_words(self._run.progress)} at step {step}")
 
+    def recycle_resting(self) -> None:
+        """Begin to recycle the evaluating simulators that are due before the next evaluation ends.
+
+        They come up while the others collect.
+        """
+        keepers = [keeper for keeper in self._run.fleet.evaluating if not keeper.lost]
+        for keeper in keepers:
+            keeper.recycle_resting(ceil(self._run.configuration.evaluation.episodes / len(keepers)))
+
     def finish(self, step: int) -> None:
         """Confirm the best policy at the end of training; without evaluations save the last policy.
 
@@ -151,7 +161,7 @@ class Selection:
         with (
             run.progress.spending(Cause.EVALUATING),
             resting(run.fleet.collecting),
-            running(run.fleet.evaluating),
+            running(run.fleet.evaluating, run.interruption.check),
         ):
             policy = algorithms.policy_of(self._model)
             evaluation = evaluate_on_all(policy, run.fleet.evaluating, seeds, run.interruption.check)

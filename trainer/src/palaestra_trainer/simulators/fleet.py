@@ -109,10 +109,10 @@ class Fleet:
 
 
 @contextmanager
-def running(keepers: Sequence[Keeper]) -> Iterator[None]:
-    """Run the members inside the context, pause them outside."""
+def running(keepers: Sequence[Keeper], check: Check = go_on) -> Iterator[None]:
+    """Run the members inside the context, once their recycling is over; pause them outside."""
     for keeper in keepers:
-        keeper.run()
+        keeper.run(check)
     try:
         yield
     finally:

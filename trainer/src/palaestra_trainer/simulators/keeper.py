@@ -73,6 +73,7 @@ class Keeper:
         self._pace = Pace()
         self._work: Future[None] | None = None
         self._abandoned = False
+        self._recycles_resting = False
 
     @property
     def name(self) -> str:
@@ -164,8 +165,25 @@ class Keeper:
         """Let the member rest; a broken one is found by the next step that needs it."""
         self._switch(self.member.pause)
 
-    def run(self) -> None:
-        """End the rest; a broken member is found by the next step that needs it."""
+    def recycle_resting(self, episodes: int) -> None:
+        """Begin to recycle the resting member if it is due before or amid the next `episodes`."""
+        if self.up() and (reason := self.member.due(episodes)):
+            self._log_recycling(reason)
+            self._recycles_resting = True
+            self._begin(self._recycle_resting)
+
+    def run(self, check: Check = go_on) -> None:
+        """End the rest; a broken member is found by the next step that needs it.
+
+        Waits for a recycling that began during the rest. If that fails, mending begins.
+        `check` is called every tenth of a second meanwhile; raises to wait no longer.
+        """
+        if self._recycles_resting:
+            self._recycles_resting = False
+            try:
+                self._await_recycling(check)
+            except SimulatorFault as fault:
+                self.begin_mending(fault)
         self._switch(self.member.run)
 
     def _begin(self, work: Callable[[], None]) -> None:
@@ -238,14 +256,17 @@ class Keeper:
         reason = self.member.due()
         if reason is None:
             return
-        self._tell_of_recycling(reason)
+        self._log_recycling(reason)
         self._begin(self._recycle)
+        self._await_recycling(check)
+
+    def _await_recycling(self, check: Check) -> None:
         while not self.up():
             let_others()
             with self.watcher.spending(Cause.RECYCLING):
                 await_one([self], check)
 
-    def _tell_of_recycling(self, reason: str) -> None:
+    def _log_recycling(self, reason: str) -> None:
         """Log the first time, then one line a minute at most, with the number of all times."""
         self._recycled += 1
         if self._clock() >= self._tell_next:
@@ -255,6 +276,10 @@ class Keeper:
     def _recycle(self) -> None:
         self.member.restart()
         self.watcher.restarted(self.name, recycled=True)
+
+    def _recycle_resting(self) -> None:
+        self._recycle()
+        self.member.pause()
 
 
 def await_one(keepers: Sequence[Keeper], check: Check = go_on) -> None:

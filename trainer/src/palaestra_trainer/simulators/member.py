@@ -30,8 +30,8 @@ class Member(Protocol):
         """The environment; its `step` and `reset` may raise `SimulatorFault`."""
         ...
 
-    def due(self) -> str | None:
-        """Return the reason to recycle it before the next episode, as text; None: no reason."""
+    def due(self, episodes: int = 1) -> str | None:
+        """Return the reason to recycle it before the next `episodes`, as text; None: no reason."""
         ...
 
     def start(self) -> None:

@@ -37,14 +37,17 @@ class Wear:
         """Count from now on; it was started, or has taken over."""
         self._since = self._clock()
 
-    def due(self, resets: int) -> str | None:
-        """Return which limit it has reached, in words, after so many `resets`; None: none."""
-        checks = (self._by_resets(resets), self._by_age(), self._by_memory())
+    def due(self, resets: int, episodes: int = 1) -> str | None:
+        """Return why to restart it after so many `resets`, before the next `episodes`; None: no reason.
+
+        Before several episodes, the limit of resets is a reason only if a restart now saves one amid them.
+        """
+        checks = (self._by_resets(resets, episodes), self._by_age(), self._by_memory())
         return next((reason for reason in checks if reason is not None), None)
 
-    def _by_resets(self, resets: int) -> str | None:
-        limit = self._limits.after_resets
-        return f"{resets} resets" if limit is not None and resets >= limit else None
+    def _by_resets(self, resets: int, episodes: int) -> str | None:
+        limit, last = self._limits.after_resets, episodes - 1
+        return f"{resets} resets" if limit and (resets + last) // limit > last // limit else None
 
     def _by_age(self) -> str | None:
         limit, minutes = self._limits.after_minutes, (self._clock() - self._since) / _MINUTE_S

@@ -73,9 +73,9 @@ class Simulator:
         """Seconds of simulated time since this object was created, over all restarts."""
         return self.robot.simulation.simulated_s
 
-    def due(self) -> str | None:
-        """Return the reason to recycle it before the next episode, as text; None: no reason."""
-        return self.wear.due(self.resets)
+    def due(self, episodes: int = 1) -> str | None:
+        """Return the reason to recycle it before the next `episodes`, as text; None: no reason."""
+        return self.wear.due(self.resets, episodes)
 
     def start(self) -> None:
         """Start the simulator and connect to it, ready to step.

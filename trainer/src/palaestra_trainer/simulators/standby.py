@@ -73,9 +73,9 @@ class Standby:
         """Return the state of the spare; None: it is neither ready nor being started."""
         return self._spare.state
 
-    def due(self) -> str | None:
-        """Return the reason to recycle the active simulator; None: no reason."""
-        return self._active.simulator.due()
+    def due(self, episodes: int = 1) -> str | None:
+        """Return the reason to recycle the active simulator before the next `episodes`; None: no reason."""
+        return self._active.simulator.due(episodes)
 
     def start(self) -> None:
         """Start the first simulator; the spare follows in the background.
