@@ -1,5 +1,6 @@
 """Simulators that a script starts: they may say what they like, and end with the script."""
 
+import os
 import subprocess
 import sys
 import time
@@ -11,6 +12,7 @@ from palaestra_trainer.errors import ConfigurationError, SimulatorDead, Simulato
 from palaestra_trainer.simulators.child import drain, end_child, first_line, start_child
 from palaestra_trainer.webots import Webots
 
+PATIENCE_S = 60.0
 CHATTERBOX = """
 import sys
 print("hello", flush=True)
@@ -62,6 +64,36 @@ def test_a_killed_script_leaves_no_simulator(master):
     while simulator.exists() and time.monotonic() < give_up:
         time.sleep(0.02)
     assert not simulator.exists()
+
+
+def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tmp_path):
+    """The second simulator of a world runs a copy of it; killed notebooks would fill the disk with copies."""
+    del master
+    code = (
+        "import sys\n"
+        "from palaestra_trainer.simulators.process import ProcessLauncher\n"
+        "launcher = ProcessLauncher('arena', suffix='_2')\n"
+        "print(launcher.state().world, flush=True)\n"
+        "sys.stdin.read()\n"
+    )
+    owner = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    world = Path(owner.stdout.readline().strip())
+    assert tmp_path in world.parents
+    assert world.exists()
+
+    owner.kill()
+    owner.communicate()
+
+    give_up = time.monotonic() + PATIENCE_S
+    while world.parent.exists() and time.monotonic() < give_up:
+        time.sleep(0.02)
+    assert not world.parent.exists()
 
 
 def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone(arena):

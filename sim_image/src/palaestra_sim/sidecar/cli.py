@@ -6,8 +6,10 @@ import logging
 import os
 import signal
 import sys
+import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +32,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signals.hold_back()
     log_to_stdout()
     given = parse(sys.argv[1:] if arguments is None else arguments)
+    with work_folder(given):
+        return look_after(given)
+
+
+@contextmanager
+def work_folder(given: argparse.Namespace) -> Iterator[None]:
+    """Let `given.work` be a temporary folder inside, where --suffix needs one and --work names none.
+
+    The folder is the sidecar's own, since its owner may be killed, and the sidecar then ends in order.
+    """
+    if not given.suffix or given.job is not None or given.work is not None:
+        yield
+        return
+    with tempfile.TemporaryDirectory(prefix="palaestra-world-") as folder:
+        given.work = Path(folder)
+        yield
+
+
+def look_after(given: argparse.Namespace) -> int:
+    """Run the simulators of these options until a signal asks for the end; return the exit code."""
     try:
         simulators = prepare(given)
         control = Listener("--control", given.control)
@@ -110,8 +132,7 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
     if given.job is None and not given.suffix:
         return Path(given.world).absolute()
     if given.work is None:
-        option = "--job" if given.job else "--suffix"
-        raise SidecarError(f"--work: is missing; with {option}, give the folder for the generated world")
+        raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
     if given.job is None:
         return preparation.renamed(given.world, given.work.absolute(), given.suffix)
     identity = RunIdentity(

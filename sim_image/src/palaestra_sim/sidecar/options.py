@@ -85,7 +85,10 @@ def _add_identity(parser: argparse.ArgumentParser) -> None:
         "--clock", action="store_true", help="this simulator may publish /clock; one per ROS master"
     )
     group.add_argument(
-        "--suffix", default="", metavar="TEXT", help="without --job: appended to the names in the world"
+        "--suffix",
+        default="",
+        metavar="TEXT",
+        help="without --job: appended to the names in the world; without --work its copy is temporary",
     )
     group.add_argument("--standby", action="store_true", help="have a second simulator as a standby")
 

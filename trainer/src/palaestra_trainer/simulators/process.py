@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -48,13 +47,11 @@ class ProcessLauncher(Sidecar):
         ensure_master()
         self.suffix = suffix
         self._reservation = Reservation()
-        self._folder = tempfile.TemporaryDirectory(prefix="palaestra-world-")
-        if suffix:
-            names = (*names, f"--suffix={suffix}", f"--work={self._folder.name}")
         command = [
             *_program("palaestra-sidecar"),
             f"--driver={driver}",
             f"--world={world}",
+            f"--suffix={suffix}",
             "--control=127.0.0.1:0",
             "--health=127.0.0.1:0",
             "--until-stdin-closes",
@@ -66,7 +63,6 @@ class ProcessLauncher(Sidecar):
         found = _ADDRESSES.search(line)
         if found is None:
             _, said = self._process.communicate(timeout=_END_S)
-            self._folder.cleanup()
             raise ConfigurationError(said.decode(errors="replace").strip() or f"the sidecar printed {line!r}")
         drain(self._process)
         super().__init__(f"http://{found[1]}", Path(world).stem)
@@ -103,7 +99,6 @@ class ProcessLauncher(Sidecar):
         """End the sidecar and its simulator."""
         end_child(self._process)
         self._reservation.release()
-        self._folder.cleanup()
 
 
 def _program(name: str) -> list[str]:
