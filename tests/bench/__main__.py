@@ -22,6 +22,7 @@ PARTS = {
     "newcomer": newcomer.measure,
     "plain": plain.measure,
     "learning": learning.measure,
+    "sparse": learning.measure_sparse,
 }
 
 

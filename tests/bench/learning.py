@@ -1,4 +1,4 @@
-"""What move-to-target learns: five training seeds, measured on episodes that nothing was chosen on."""
+"""What the examples learn, by training seed, measured on episodes that nothing was chosen on."""
 
 import json
 import subprocess
@@ -16,6 +16,7 @@ from tests.local_run import PALAESTRA
 from tests.soak.jobs import example
 
 SEEDS = (1, 2, 3, 4, 5)
+SPARSE_SEEDS = (1, 2, 3)
 EPISODES = 100
 STREAM = "bench"
 MOVEMENTS = example("move-to-target")["spec"]["trainer"]["environment"]["options"]["movements"]
@@ -23,8 +24,8 @@ EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 def measure():
-    """Return the success of each training seed on fresh episodes, and of two policies that learn nothing."""
-    trained = {str(seed): train_and_measure(seed) for seed in SEEDS}
+    """Return what move-to-target learns with each training seed, and two policies that learn nothing."""
+    trained = {str(seed): train_and_measure("move-to-target", seed) for seed in SEEDS}
     return {
         "success": trained,
         "seeds_at_95": sum(rate >= 0.95 for rate in trained.values()),
@@ -32,10 +33,16 @@ def measure():
     }
 
 
-def train_and_measure(seed):
-    """Return the success rate, on seeds that nothing was chosen on, of a policy trained with `seed`."""
+def measure_sparse():
+    """Return what sparse-reward learns with each training seed."""
+    trained = {str(seed): train_and_measure("sparse-reward", seed) for seed in SPARSE_SEEDS}
+    return {"success": trained, "seeds_at_50": sum(rate >= 0.5 for rate in trained.values())}
+
+
+def train_and_measure(name, seed):
+    """Return the success rate, on fresh episodes, of the policy that an example trains with `seed`."""
     with tempfile.TemporaryDirectory() as folder:
-        job = example("move-to-target")
+        job = example(name)
         job["spec"]["seed"] = seed
         file = Path(folder) / "job.yaml"
         file.write_text(yaml.safe_dump(job))
@@ -46,7 +53,7 @@ def train_and_measure(seed):
             stderr=subprocess.DEVNULL,
         )
         result = subprocess.run(
-            [EVAL, Path(folder) / "move-to-target/0", f"--episodes={EPISODES}", f"--seeds={STREAM}"],
+            [EVAL, Path(folder) / name / "0", f"--episodes={EPISODES}", f"--seeds={STREAM}"],
             check=True,
             capture_output=True,
             text=True,
