@@ -96,7 +96,7 @@ def of_markdown(text: str) -> Iterator[Paragraph]:
     """Yield paragraphs and list items without code, tables, headings, quotes and the addresses of links."""
     text = re.sub(r"^(```|~~~).*?^\1[^\n]*$", blank, text, flags=re.MULTILINE | re.DOTALL)
     text = re.sub(r"<!--.*?-->", blank, text, flags=re.DOTALL)
-    exempt = re.compile(r"\s*([#|>]|!\[|<|---)")
+    exempt = re.compile(r"\s*([#|>├└│]|!\[|<|---)")
     lines = [(number, "" if exempt.match(line) else line) for number, line in enumerate(text.split("\n"), 1)]
     yield from of_lines([(number, without_code(line)) for number, line in lines])
 
@@ -122,7 +122,7 @@ def of_python(text: str) -> Iterator[Paragraph]:
         match node:
             case ast.Expr(value=ast.Constant(value=str(docstring))):
                 yield from of_docstring(node.lineno, docstring)
-            case ast.JoinedStr(values=pieces):
+            case ast.JoinedStr(values=pieces) if is_message("".join(map(piece, pieces))):
                 yield node.lineno, without_code("".join(map(piece, pieces)))
             case ast.Constant(value=str(words)) if is_message(words):
                 yield node.lineno, without_code(words)

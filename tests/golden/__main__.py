@@ -1,12 +1,12 @@
 """Record the generated files anew: `python -m tests.golden`.
 
-    tests/golden/<example>.<layout>.yaml    the plan of each manifests/examples/*.yaml, worlds by checksum
-    manifests/crd.yaml, docs/trainingjob.md what the API is made of
-    docs/trainingjob.md                     the default hyperparameters of the algorithms
-    docs/metrics.md                         every metric that the programs declare
-    charts/palaestra/README.md              what its values.yaml says
-    charts/palaestra/dashboards/*.json      what tools/dashboards asks and shows
-    manifests/install.yaml                  the chart with its default values, where Helm is built
+- `tests/golden/<example>.<layout>.yaml`: the plan of each manifests/examples/*.yaml, worlds by checksum
+- `manifests/crd.yaml`, docs/trainingjob.md: made from the API's models
+- `docs/trainingjob.md`: the default hyperparameters of the algorithms
+- `docs/metrics.md`: every metric that the programs declare
+- `charts/palaestra/README.md`: made from its values.yaml
+- `charts/palaestra/dashboards/*.json`: made by tools/dashboards
+- `manifests/install.yaml`: the chart with its default values, where Helm is built
 
 A new example needs no new test: its plans are recorded here and compared by test_golden.py.
 """
@@ -54,7 +54,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text
     yield readme.PATH, readme.text()
-    with suppress(NoPrograms):  # whoever changes the chart has Helm; all others leave the file as it is
+    with suppress(NoPrograms):  # without Helm the file stays as it is; a change of the chart needs Helm
         yield installation.PATH, installation.text()
 
 
