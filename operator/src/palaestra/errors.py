@@ -1,12 +1,40 @@
-"""Everything that palaestra raises.
+"""Every error that palaestra raises.
 
     PalaestraError
-    ├── TrainingJobError         a TrainingJob cannot be used
-    │   ├── SpecErrors           the spec is wrong: never retried
-    │   └── PlanError            the job cannot be planned (palaestra.plan.errors)
-    ├── LocalError               the local runner cannot continue (palaestra.local.errors)
-    ├── ApiError                 an API server returned an error, or no answer (palaestra.cluster.errors)
-    └── NotConfigured            no API server is configured (palaestra.cluster.errors)
+    ├── TrainingJobError             a TrainingJob cannot be used as it stands
+    │   ├── SpecErrors               its spec is wrong: never retried
+    │   └── PlanError                no plan can be made of it (plan.errors)
+    ├── LocalError                   the local runner cannot go on (local.errors)
+    │   ├── Refused                  the run cannot be started as asked
+    │   ├── StartFailed              a container that others wait for did not start
+    │   └── StorageFailed            a file of the run could not be written
+    ├── ApiError                     a call of the API server failed (cluster.errors)
+    │   ├── AlreadyExists            the name is taken
+    │   ├── Conflict                 the object has changed since it was read
+    │   ├── Forbidden                RBAC, a quota, Pod Security or a webhook refused
+    │   │   └── NamespaceTerminating the namespace is being deleted
+    │   ├── Gone                     the resource version or page has expired: list again
+    │   ├── Invalid                  the object is wrong
+    │   ├── NotFound                 no such object
+    │   │   └── NoSuchKind           no such kind: its definition is not installed
+    │   ├── ServerError              the API server or its store failed (5xx)
+    │   ├── TooManyRequests          the API server is busy
+    │   └── Unreachable              no readable answer in time
+    │       └── ConnectionBroke      it ended before the answer did; repeat a read (cluster.transport)
+    ├── NotConfigured                no API server is named (cluster.errors)
+    ├── CommandFailed                a command in a container failed (cluster.errors)
+    ├── ClientError                  a command about a cluster's jobs cannot be carried out (client.errors)
+    │   ├── EndedOtherwise           the job ended in another way than awaited
+    │   ├── NoPod                    a replica has no pod or container to read
+    │   ├── NoSuchJob                no such TrainingJob
+    │   ├── NoSuchNamespace          no such namespace
+    │   ├── NotFetched               a run could not be copied
+    │   ├── NotInstalled             the cluster has no TrainingJobs
+    │   ├── QueueDecides             Kueue alone suspends and resumes this job
+    │   └── TookTooLong              a deadline passed
+    ├── NotLeading                   this operator may have lost its lease (operator.writing)
+    ├── Outdated                     the cluster has changed since the decision (operator.confirming)
+    └── TrialFailed                  the trial's job did not succeed in time (trial)
 
 A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.
 """

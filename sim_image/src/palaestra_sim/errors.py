@@ -1,10 +1,16 @@
-"""What can go wrong in a simulator's container, as one tree.
+"""The errors of a simulator's container, as one tree.
 
     SimError
-    ├── WorldError (ValueError)          the .wbt file is wrong: retrying cannot help
-    │   └── WorldRefusedError            several things in it are wrong; it has all of them
-    ├── UnknownWorldError (LookupError)  no shipped world has that name: retrying cannot help
-    └── ForeignPackageError (FileExistsError)  the folder has another webots_ros: retrying cannot help
+    ├── WorldError              the .wbt file is wrong: retrying cannot help
+    │   └── WorldRefusedError   it has several mistakes; the message lists them all
+    ├── UnknownWorldError       no shipped world has that name: retrying cannot help
+    ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
+    ├── ProtocolError           a message is not as agreed (protocol.fields)
+    ├── SidecarError            the sidecar cannot run as asked (sidecar.errors)
+    ├── FaultError              the description of a fault is wrong (stub.faults.language)
+    ├── NoSuchHandleError       this load of the world has no such node (stub.nodes)
+    ├── NoValueError            a field has no such value (stub.fields)
+    └── UnsimulatedError        Webots does it, the stub does not (stub.effects)
 
 A message names the place, the fact and the remedy.
 """

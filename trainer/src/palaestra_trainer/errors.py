@@ -4,10 +4,13 @@ TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
+├── Interrupted          a signal asked the run to end (interruption)         exit 75
+├── Enough               the wanted success rate is reached (selection)       exit 0
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
 ├── NoSuchSensor         this robot does not have it
 ├── NoReading            a sensor was read before its first message arrived
+├── NotConforming        a robot breaks a rule of the interface (testing.conformance)
 ├── Paused               a step was requested while the simulation is paused
 └── SimulatorFault       one simulator failed; restart it and continue
     ├── SimulatorDead    its connections are refused or were closed

@@ -1,0 +1,90 @@
+"""What is drawn and listed is what there is: error trees, modules, folders."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = {
+    "palaestra": ROOT / "operator/src/palaestra",
+    "palaestra_sim": ROOT / "sim_image/src/palaestra_sim",
+    "palaestra_trainer": ROOT / "trainer/src/palaestra_trainer",
+}
+BRANCH = re.compile(r"^(?P<indent>[│ ]*)[├└]── (?P<name>\w+)")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_drawn_error_tree_is_that_of_the_classes(package):
+    """A caller chooses what to catch by the drawing."""
+    folder = PACKAGES[package]
+    drawing = ast.get_docstring(ast.parse((folder / "errors.py").read_text()))
+
+    root, drawn = tree(drawing)
+
+    assert drawn == descendants(root, bases_of_classes(folder))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_package_is_in_the_table_of_modules(package):
+    """A stranger looks there for where a change belongs."""
+    listed = set(re.findall(rf"^\| `{package}\.([a-z_.]+)` \|", page("docs/architecture.md"), re.MULTILINE))
+    rooms = {it.parent.name for it in PACKAGES[package].glob("*/__init__.py")}
+
+    assert rooms - {"testing", "cli"} <= listed
+    assert all(exists(PACKAGES[package], name) for name in listed)
+
+
+def test_the_table_of_folders_names_every_folder_with_something_to_read():
+    """`tests/` and `tools/` are for those who change the project."""
+    listed = re.findall(r"^\| `([a-z_]+)/[^`]*`", page("README.md"), re.MULTILINE)
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    folders = {name.partition("/")[0] for name in tracked.split() if "/" in name and not name.startswith(".")}
+
+    assert set(listed) | {"images"} == folders - {"tests", "tools"}
+
+
+def tree(drawing):
+    """Return the root of a drawing, and parent by child."""
+    lines = drawing.splitlines()
+    first = next(number for number, line in enumerate(lines) if BRANCH.match(line.lstrip() or " "))
+    root = lines[first - 1].split()[0]
+    margin = len(lines[first]) - len(lines[first].lstrip())
+    parents, drawn = [root], {}
+    for line in lines[first:]:
+        if match := BRANCH.match(line[margin:]):
+            depth = len(match["indent"]) // 4
+            drawn[match["name"]] = parents[depth]
+            parents[depth + 1 :] = [match["name"]]
+    return root, drawn
+
+
+def bases_of_classes(folder):
+    """Return the names of the bases of each class in a folder's modules."""
+    modules = [ast.parse(path.read_text()) for path in folder.rglob("*.py")]
+    classes = [node for module in modules for node in ast.walk(module) if isinstance(node, ast.ClassDef)]
+    return {node.name: [ast.unparse(base).rpartition(".")[2] for base in node.bases] for node in classes}
+
+
+def descendants(root, bases):
+    """Return the parent of every class that comes from `root`."""
+    found, parents = {}, {root}
+    while parents:
+        found |= (new := {name: base for name, given in bases.items() for base in given if base in parents})
+        parents = set(new)
+    return found
+
+
+def exists(package, name):
+    """Return whether a dotted name is a module or package in `package`."""
+    path = package.joinpath(*name.split("."))
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def page(name):
+    """Return the text of a page."""
+    return (ROOT / name).read_text()
