@@ -301,7 +301,7 @@ def test_an_algorithm_with_a_rollout_buffer_of_its_own_is_refused(make_env):
     class RecurrentRows(OnPolicyRows, MakesItsOwn):
         pass
 
-    with pytest.raises(TypeError, match="RecurrentRows: makes a RolloutBuffer, which learns from rows"):
+    with pytest.raises(TypeError, match="RecurrentRows: creates a RolloutBuffer, which learns from rows"):
         RecurrentRows("MlpPolicy", make_env(), n_steps=8, batch_size=8)
 
 
