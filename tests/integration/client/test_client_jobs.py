@@ -233,5 +233,5 @@ def test_reading_a_log_that_went_with_its_pod_is_an_error(client, tell):
     pod = {"name": "a-0-x7k2p", "uid": "u", "created": "2026-01-31T12:00:00Z"}
     tell("a", "Running", replicas=[{"index": 0, "phase": "Running", "pod": pod}])
 
-    with pytest.raises(NoPod, match=r"pod a-0-x7k2p: is gone, .*last lines"):
+    with pytest.raises(NoPod, match=r"pod a-0-x7k2p: does not exist any more, .*last lines"):
         list(client.logs("a", deadline_s=SOON_S))
