@@ -175,7 +175,7 @@ def piece(node: ast.expr) -> str:
 
 def without_code(text: str) -> str:
     """Return text with code as one word, quotes left out, and links as their text."""
-    text = re.sub(r"`[^`]*`", "x", text)
+    text = re.sub(r"`[^`]*`", "X", text)  # a capital, since it may begin a sentence
     text = re.sub(r"[\"“][^\"”]*[\"”]", "x", text)
     return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
 
