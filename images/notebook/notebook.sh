@@ -2,6 +2,6 @@
 # Serve the working folder by JupyterLab on port 8888, with a notebook to begin with; one of that name is left as it is.
 # The token is what $JUPYTER_TOKEN_FILE holds; without one, the server prints the token that it made.
 set -eu
-# A folder that cannot be written to is told of, and can still be looked at.
+# A read-only folder is reported, and can still be read.
 cp --update=none /usr/local/share/palaestra/first-steps.ipynb . || true
 exec jupyter lab --ip=0.0.0.0 --port=8888 --no-browser --ServerApp.root_dir="$PWD" --LabApp.extension_manager=readonly

@@ -1,4 +1,4 @@
-"""What is drawn and listed is what there is: error trees, modules, folders."""
+"""Drawings and lists equal the code: error trees, modules, folders."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class Buildah:
         self._tree = tree
         self._logs = folder / "logs"
         self._base = Base(name=f"localhost/{tree.stem}", digest=tree.stem)
-        # What is mounted is remembered where a restart of the machine forgets it, as the mounts are.
+        # A restart of the machine clears this folder, as it clears the mounts.
         mounted = Path("/run") / f"palaestra-{hashlib.sha256(os.fsencode(folder)).hexdigest()[:12]}"
         self._store = (f"--root={folder / 'store'}", f"--runroot={mounted}", "--storage-driver=overlay")
 
