@@ -245,13 +245,13 @@ class TextReward(Hall):
 @pytest.mark.parametrize(
     ("creator", "facts"),
     [
-        (NoSeed, ["expected reset(self, *, seed=None, options=None)", "came reset()"]),
-        (NoInfo, ["returns (observation, info)", "came a ndarray"]),
-        (OldStep, ["(observation, reward, terminated, truncated, info)", "came a tuple of 4"]),
+        (NoSeed, ["expected reset(self, *, seed=None, options=None)", "got reset()"]),
+        (NoInfo, ["returns (observation, info)", "got a ndarray"]),
+        (OldStep, ["(observation, reward, terminated, truncated, info)", "got a tuple of 4"]),
         (NumberAsEnd, ["`terminated` signal to be a boolean", "float"]),
         (NoSpace, ["expected an observation_space of gymnasium.spaces", "NoneType"]),
         (Wide, ["shape (3,), not (2,)"]),
-        (Listed, ["from reset an observation of Box", "came a list"]),
+        (Listed, ["from reset an observation of Box", "got a list"]),
         (Double, ["dtype float64, not float32"]),
         (Outside, ["1.5 at [1], not within -1.0 and 1.0"]),
         (TextReward, ["reward", "str"]),
