@@ -109,7 +109,7 @@ def test_a_program_that_reaches_its_steps_has_said_its_last_word(program, tmp_pa
     ("arguments", "mistake"),
     [
         ({"step": -1}, "step: -1 is negative"),
-        ({"step": 1, "success_rate": 95}, "95 is no share"),
+        ({"step": 1, "success_rate": 95}, "95 is not a share"),
     ],
 )
 def test_a_report_of_what_cannot_be_is_refused(arguments, mistake):
