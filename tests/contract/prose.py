@@ -61,7 +61,7 @@ def is_long(text: str) -> bool:
 RULES: dict[str, Callable[[str], bool]] = {
     "indefinite pronoun; name the program or person": contains(r"\bwho(so)?(m?ever|sever)\b"),
     "passive of tell; use report, log, return or show": contains(r"\b(is|are|was|were) told\b"),
-    "tell of; use report, log, return or show": contains(r"\btells (of|that|how)\b"),
+    "the verb tell; use report, log, return or show": contains(r"\btells (of|that|how)\b"),
     "begins with What is, Who or That which; begin with the thing": contains(
         r"^(what (is|are|was|were)|who|that which)\b"
     ),

@@ -114,11 +114,11 @@ def test_a_run_that_prolongs_another_goes_on_from_its_own_checkpoint_once_it_has
 
 def test_a_run_that_is_to_prolong_nothing_is_refused(play, job, directory, tmp_path, last_word):
     """It would begin anew, which would be found out late; nothing was started."""
-    code, members = play(job(resume_from=str(tmp_path / "nobody")))
+    code, members = play(job(resume_from=str(tmp_path / "empty")))
 
     assert code == 2
     assert "resumeFrom: " in last_word().reason
-    assert "nobody has no checkpoint; give the run of another job" in last_word().reason
+    assert "empty has no checkpoint; give the run of another job" in last_word().reason
     assert members == {}
     assert not directory.attempts.exists()
 
