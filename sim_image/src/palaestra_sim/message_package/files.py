@@ -41,12 +41,11 @@ def package_files() -> Iterator[tuple[str, str]]:
 
 
 def _of_one_kind(kind: str, types: Iterable[str], module: Callable[[str], str]) -> Iterator[tuple[str, str]]:
-    modules = f"src/{NAME}/{kind}"
-    own = [name for name in types if name.startswith(f"{NAME}/")]
-    bases = [name.removeprefix(f"{NAME}/") for name in own]
-    for name, base in zip(own, bases, strict=True):
-        yield f"{kind}/{base}.{kind}", definitions.text(name)
-        yield f"{modules}/_{base}.py", module(name)
+    modules, prefix = f"src/{NAME}/{kind}", f"{NAME}/"
+    bases = [name.removeprefix(prefix) for name in types if name.startswith(prefix)]
+    for base in bases:
+        yield f"{kind}/{base}.{kind}", definitions.text(prefix + base)
+        yield f"{modules}/_{base}.py", module(prefix + base)
     yield f"{modules}/__init__.py", "".join(f"from ._{base} import *\n" for base in bases)
 
 
