@@ -22,8 +22,8 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 from palaestra_trainer import report
 from palaestra_trainer.configuration import load
-from palaestra_trainer.environments.configured import simulator_for
 from palaestra_trainer.environments.making import make_environment
+from palaestra_trainer.simulators.configured import simulator_for
 
 job = load()  # what PALAESTRA_CONFIG names: the TrainingJob, resolved for this replica
 run = Path(os.environ["PALAESTRA_RUN"])  # what is written here outlives the pod

@@ -2,8 +2,8 @@
 
 from contextlib import contextmanager
 
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
-from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.webots import Mode, Webots
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import yaml
 
 from palaestra_trainer.environments import baselines
-from palaestra_trainer.environments.move_to_target import make
-from palaestra_trainer.seeds import episode_seeds
+from palaestra_trainer.episodes.seeds import episode_seeds
+from palaestra_trainer.simulators.entry_point import make
 from tests.bench.arena import running
 from tests.local_run import PALAESTRA
 from tests.soak.jobs import example

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from tests.bench.arena import running
 from tests.bench.stepping import rate
 

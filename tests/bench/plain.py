@@ -16,7 +16,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from palaestra_trainer.algorithms.values import arguments
-from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import fake_arena
 from tests.local_run import PALAESTRA
 from tests.soak.jobs import example

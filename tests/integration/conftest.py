@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from palaestra.cluster import Api
-from palaestra_trainer.simulators.master import ensure_master
+from palaestra_trainer.launching.master import ensure_master
 from tests.control_plane.installing import install
 from tests.control_plane.plane import ControlPlane, running
 from tests.integration.operator.cluster import Place

@@ -39,7 +39,7 @@ while True:
 """
 START = """\
 import os, pathlib, yaml
-from palaestra_trainer.simulators.sidecar import Sidecar
+from palaestra_trainer.launching.sidecar import Sidecar
 config = yaml.safe_load(pathlib.Path(os.environ["PALAESTRA_CONFIG"]).read_text())
 for simulator in config["simulators"]:
     sidecar = Sidecar(simulator["control"], simulator["name"])

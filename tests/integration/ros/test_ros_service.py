@@ -11,10 +11,10 @@ import sys
 
 import pytest
 
-from palaestra_trainer import patience
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung, WrongData
 from palaestra_trainer.ros import Master, RosService, call_together, ensure_node
-from palaestra_trainer.waits import waited_s
+from palaestra_trainer.waiting import patience
+from palaestra_trainer.waiting.waits import waited_s
 
 DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.ros import Master, RosService
-from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.webots import Mode, Webots
 
 DEADLINE_S = 60.0  # of whatever ought to take moments, on a busy machine

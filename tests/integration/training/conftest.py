@@ -14,10 +14,10 @@ import pytest
 import structlog
 import yaml
 
-from palaestra_trainer import training
 from palaestra_trainer.configuration import load
-from palaestra_trainer.logs import configure_logs
+from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.telemetry.logs import configure_logs
 
 PROGRAM = Path(__file__).with_name("fakes.py")
 

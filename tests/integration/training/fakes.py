@@ -18,12 +18,12 @@ from typing import Any
 import gymnasium
 
 import palaestra_trainer.environments  # noqa: F401 - registers MoveToTargetEnv-v0
-from palaestra_trainer import training
 from palaestra_trainer.configuration import Configuration, load
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.logs import configure_logs
+from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.telemetry.logs import configure_logs
 from palaestra_trainer.testing import fake_arena
 
 

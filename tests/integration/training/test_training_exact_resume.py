@@ -15,12 +15,14 @@ import torch
 from stable_baselines3.common.save_util import load_from_zip_file
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
-from palaestra_trainer import checkpoint, patience, training
+from palaestra_trainer import checkpoint
 from palaestra_trainer.configuration import load
-from palaestra_trainer.display import Lines
 from palaestra_trainer.errors import MasterLost
-from palaestra_trainer.progress import Progress
+from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.telemetry.display import Lines
+from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.waiting import patience
 
 SMALL = {"policy_kwargs": {"net_arch": [16]}}
 OFF_POLICY = SMALL | {"learning_starts": 50, "batch_size": 16, "buffer_size": 300}

@@ -5,7 +5,7 @@ import sys
 
 ASKED_DURING_IMPORTS = """
 import os, signal
-from palaestra_trainer.interruption import leaving_when_asked
+from palaestra_trainer.waiting.interruption import leaving_when_asked
 with leaving_when_asked():
     os.kill(os.getpid(), signal.SIGTERM)
 """

@@ -9,10 +9,10 @@ from palaestra_trainer.algorithms import make_model, policy_of
 from palaestra_trainer.algorithms.kept import begun_with
 from palaestra_trainer.checkpoint import load_tensors
 from palaestra_trainer.configuration import load
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from palaestra_trainer.testing import fake_arena
 
 PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}

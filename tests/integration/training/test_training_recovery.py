@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from palaestra.local.ports import LOOPBACK, HeldPorts
-from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
 from palaestra_trainer.simulators.member import Nobody
-from palaestra_trainer.simulators.process import ProcessLauncher
-from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from tests.waiting import eventually
 
 STAND = np.zeros(1, dtype=np.int64)

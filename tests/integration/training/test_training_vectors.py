@@ -12,7 +12,7 @@ import yaml
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
-from palaestra_trainer.simulators.process import ProcessLauncher
+from palaestra_trainer.launching.process import ProcessLauncher
 
 TASK = "palaestra_trainer.environments:MoveToTargetEnv-v0"
 ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate"}

@@ -2,8 +2,8 @@
 
 from gymnasium.utils.env_checker import check_env
 
-from palaestra_trainer.environments.move_to_target import make
 from palaestra_trainer.robots import Pose
+from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import check_robot, check_scene
 
 

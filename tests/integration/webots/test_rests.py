@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.simulators.keeper import Keeper, await_one
-from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.simulator import Simulator
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from palaestra_trainer.webots import Mode
 from tests.waiting import eventually
 

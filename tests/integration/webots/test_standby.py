@@ -14,9 +14,9 @@ import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_sim.protocol.control import SidecarState
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.simulators.budget import Care
 from palaestra_trainer.simulators.keeper import Keeper, settle
-from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode

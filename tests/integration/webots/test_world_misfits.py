@@ -10,9 +10,9 @@ import palaestra_trainer.environments  # noqa: F401 - registers the environment
 from palaestra_sim.stub.ros import Loop, RosNode
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.simulators.keeper import Keeper, await_one
-from palaestra_trainer.simulators.process import ProcessLauncher
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.webots import Webots
 from palaestra_trainer.webots.requirements import require_devices

@@ -14,7 +14,7 @@ from palaestra.api.crd import crd
 from palaestra.cli import operator
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
-from palaestra_trainer.tensorboard_link import FOLDER
+from palaestra_trainer.run.tensorboard_link import FOLDER
 from tests.chart.helm import CHART, NAMESPACE, HelmRefused, helm, objects
 from tests.chart.installation import SECRETS_ROLE
 from tests.chart.modes import DIGEST, MODES, merged

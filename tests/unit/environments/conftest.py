@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from palaestra_trainer.environments import MoveToTargetEnv
-from palaestra_trainer.environments.move_to_target import make
+from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import fake_arena
 
 

@@ -10,8 +10,8 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 from palaestra_trainer.configuration import parse
-from palaestra_trainer.environments.claims import claim
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.simulators.claims import claim
 
 LONG_S = 60
 

@@ -13,10 +13,10 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import palaestra_trainer.environments
 from palaestra_trainer.environments import MoveToTargetEnv
-from palaestra_trainer.environments.move_to_target import make
 from palaestra_trainer.environments.observation import PARTS
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots import Movement
+from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import FakeRobotino, FakeScene, fake_arena
 
 NAME = "MoveToTargetEnv-v0"

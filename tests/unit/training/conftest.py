@@ -14,9 +14,9 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_sim.protocol.status import Termination
-from palaestra_trainer import training
 from palaestra_trainer.configuration import Configuration, parse
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault
+from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
 
 PATIENCE_S = 20.0

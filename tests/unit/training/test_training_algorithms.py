@@ -15,9 +15,9 @@ from torch import nn, optim
 from palaestra_trainer.algorithms import ALGORITHMS, DQN, PPO, REINFORCE, check, make_model
 from palaestra_trainer.algorithms.rows import OnPolicyRows
 from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 TINY = {"policy_kwargs": {"net_arch": [8]}}
 HYPERPARAMETERS = {

@@ -10,8 +10,8 @@ from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorH
 from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Nobody
-from palaestra_trainer.simulators.pace import Pace
-from palaestra_trainer.turns import let_others, take_turns
+from palaestra_trainer.simulators.meter import Pace
+from palaestra_trainer.waiting.turns import let_others, take_turns
 
 DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("robotino", "does not answer")
 

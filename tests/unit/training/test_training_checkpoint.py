@@ -18,9 +18,9 @@ import torch
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import buffers, make_model
 from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 HYPERPARAMETERS = {
     "DQN": {

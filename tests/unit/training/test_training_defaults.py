@@ -14,9 +14,9 @@ import stable_baselines3 as sb3
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms.table import ALGORITHMS, resolve
 from palaestra_trainer.configuration import Algorithm
-from palaestra_trainer.measuring import measure
+from palaestra_trainer.episodes.seeds import EVALUATE
+from palaestra_trainer.run.measuring import measure
 from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.seeds import EVALUATE
 
 SB3 = {"DQN": sb3.DQN, "SAC": sb3.SAC, "PPO": sb3.PPO, "A2C": sb3.A2C}
 ARENA = "MoveToTargetEnv-v0"

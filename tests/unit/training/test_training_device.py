@@ -14,9 +14,9 @@ from structlog.testing import capture_logs
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
 from palaestra_trainer.checkpoint.generators import Generators
-from palaestra_trainer.measuring import measure
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run.measuring import measure
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 TINY = {"policy_kwargs": {"net_arch": [8]}}
 OFF_POLICY = TINY | {"learning_starts": 10, "batch_size": 8, "buffer_size": 200}

@@ -8,7 +8,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from palaestra_sim.protocol.status import SimulatorStatus, TrainerStatus
-from palaestra_trainer.display import Bar, Lines, for_stream
+from palaestra_trainer.telemetry.display import Bar, Lines, for_stream
 
 STATUS = TrainerStatus(
     step=50,

@@ -9,10 +9,10 @@ import torch
 from stable_baselines3.common.logger import Logger
 
 from palaestra_trainer import algorithms
-from palaestra_trainer.divergence import Learner
+from palaestra_trainer.algorithms.divergence import Learner
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 ALL = ("DQN", "PPO", "A2C", "REINFORCE")
 

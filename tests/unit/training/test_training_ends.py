@@ -21,11 +21,11 @@ from palaestra_trainer.errors import (
     SimulatorDead,
     SimulatorHung,
 )
-from palaestra_trainer.interruption import Interrupted, Interruption
-from palaestra_trainer.logs import configure_logs, last_lines
-from palaestra_trainer.progress import Progress
-from palaestra_trainer.termination import end_of, write_last_word
-from palaestra_trainer.watchdog import Watchdog, stalled
+from palaestra_trainer.run.termination import end_of, write_last_word
+from palaestra_trainer.run.watchdog import Watchdog, stalled
+from palaestra_trainer.telemetry.logs import configure_logs, last_lines
+from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.waiting.interruption import Interrupted, Interruption
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_run_that_moves_is_left_alone():
 def test_a_stalled_process_shows_its_stacks_and_exits_with_82():
     """The stacks are the only clue to the cause."""
     program = (
-        "import threading; from palaestra_trainer.watchdog import Watchdog\n"
+        "import threading; from palaestra_trainer.run.watchdog import Watchdog\n"
         "def hang(): threading.Event().wait(60)\n"
         "with Watchdog(lambda: 9.0, 0.1, lambda: None): hang()\n"
     )

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_trainer.simulators.episode_state import ActionLog, EpisodeState
+from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 RIGHT, LEFT = 1, 0
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from palaestra_trainer.episodes.evaluation import evaluate, evaluate_on_all
 from palaestra_trainer.errors import FaultBudgetSpent
-from palaestra_trainer.evaluation import evaluate, evaluate_on_all
-from palaestra_trainer.interruption import Interrupted
 from palaestra_trainer.simulators.budget import Care, Group
 from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.waiting.interruption import Interrupted
 
 
 class Walker:

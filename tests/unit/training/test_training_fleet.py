@@ -19,11 +19,11 @@ from palaestra_trainer.errors import (
     SimulatorHung,
     WorldMisfit,
 )
-from palaestra_trainer.interruption import Interrupted, Interruption
 from palaestra_trainer.simulators.budget import Care
 from palaestra_trainer.simulators.fleet import Fleet, resting
 from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.waiting.interruption import Interrupted, Interruption
 
 DEADLINE_S = 5.0
 

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer.goodput import Goodput, trained_share
-from palaestra_trainer.progress import Progress
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
-from palaestra_trainer.waits import count_wait, waited_s
+from palaestra_trainer.telemetry.goodput import Goodput, trained_share
+from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.waiting.waits import count_wait, waited_s
 
 
 class Clock:

@@ -13,13 +13,14 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import FlattenExtractor, NatureCNN
 
-from palaestra_trainer import checkpoint, training
+from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
 from palaestra_trainer.configuration import Algorithm, Normalize
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory, read_lines
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 ROWS, COLUMNS = 36, 48
 OFF_POLICY = {"learning_starts": 10, "batch_size": 8, "buffer_size": 60, "target_update_interval": 10}

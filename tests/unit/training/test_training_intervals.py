@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.intervals import wilson
+from palaestra_trainer.episodes.intervals import wilson
 
 
 @st.composite

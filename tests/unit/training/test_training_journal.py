@@ -7,8 +7,8 @@ import pytest
 from palaestra_sim.protocol.status import Cause
 from palaestra_trainer import checkpoint
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.journal import Journal
-from palaestra_trainer.progress import Counters, Progress
+from palaestra_trainer.run.journal import Journal
+from palaestra_trainer.telemetry.progress import Counters, Progress
 
 KILLED = ZeroDivisionError("as good as a kill")
 
@@ -88,7 +88,7 @@ def test_a_killed_attempt_s_faults_and_steps_are_in_the_next_one_s_counters(
     play, job, directory, monkeypatch, step
 ):
     """Else a run would look the better the more it is killed."""
-    monkeypatch.setattr("palaestra_trainer.journal.EVERY_S", 0.0)
+    monkeypatch.setattr("palaestra_trainer.run.journal.EVERY_S", 0.0)
     play(job(), {"collect-0": {"steps": {20: SimulatorDead("collect-0", "gone"), step: KILLED}}})
     found = checkpoint.newest(directory.checkpoints)
 

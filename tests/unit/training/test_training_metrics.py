@@ -12,17 +12,17 @@ import pytest
 from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
-from palaestra_trainer import metrics
-from palaestra_trainer.display import Lines
+from palaestra_trainer.episodes.evaluation import Episode, Evaluation
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
-from palaestra_trainer.evaluation import Episode, Evaluation
 from palaestra_trainer.families import FAMILIES
-from palaestra_trainer.figures import Logged
-from palaestra_trainer.progress import Progress
+from palaestra_trainer.run.training import Attempt, Surroundings
 from palaestra_trainer.simulators.budget import Care
 from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.standby import Standby
-from palaestra_trainer.training import Attempt, Surroundings
+from palaestra_trainer.telemetry import metrics
+from palaestra_trainer.telemetry.display import Lines
+from palaestra_trainer.telemetry.figures import Logged
+from palaestra_trainer.telemetry.progress import Progress
 
 
 @pytest.fixture

@@ -15,12 +15,12 @@ from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model, policy_of
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.configuration import Algorithm, Normalize
+from palaestra_trainer.episodes.evaluation import evaluate
+from palaestra_trainer.episodes.seeds import EVALUATE
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.evaluation import evaluate
-from palaestra_trainer.measuring import measure
-from palaestra_trainer.seeds import EVALUATE
+from palaestra_trainer.run.measuring import measure
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 from tests.pages import blocks
 
 DOCS = Path(__file__).parents[3] / "docs"

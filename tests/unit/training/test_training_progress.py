@@ -11,10 +11,10 @@ import urllib.request
 import pytest
 
 from palaestra_sim.protocol.status import Cause, TrainerStatus
+from palaestra_trainer.episodes.evaluation import Episode, Evaluation
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
-from palaestra_trainer.evaluation import Episode, Evaluation
-from palaestra_trainer.progress import Counters, Progress
-from palaestra_trainer.status_server import StatusServer
+from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.telemetry.status_server import StatusServer
 
 
 @pytest.fixture

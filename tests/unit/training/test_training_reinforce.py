@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from palaestra_trainer.algorithms import REINFORCE
 from palaestra_trainer.algorithms.episodes import EpisodeRecorder, returns_to_go
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 
 @pytest.fixture

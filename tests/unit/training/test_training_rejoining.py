@@ -10,10 +10,10 @@ import structlog
 
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
-from palaestra_trainer.rejoining import rejoin
-from palaestra_trainer.simulators.episode_state import EpisodeState
+from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run.rejoining import rejoin
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
 
 TINY = {"name": "A2C", "hyperparameters": {"n_steps": 5, "policy_kwargs": {"net_arch": [4]}}}
 

@@ -10,11 +10,12 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer import checkpoint, training
+from palaestra_trainer import checkpoint
+from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, MasterLost
-from palaestra_trainer.measuring import measure
+from palaestra_trainer.run import training
+from palaestra_trainer.run.measuring import measure
 from palaestra_trainer.run_directory import RunDirectory, read_lines
-from palaestra_trainer.seeds import CONFIRM, EVALUATE, episode_seeds
 
 
 @pytest.mark.parametrize(("name", "collectors", "steps"), [("DQN", 1, 100), ("PPO", 2, 128), ("A2C", 1, 100)])

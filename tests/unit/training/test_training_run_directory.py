@@ -8,9 +8,9 @@ from zipfile import ZipFile
 
 import pytest
 
-from palaestra_trainer.progress import Counters, Progress
+from palaestra_trainer.run.summary import finished, summarise, write_summary
 from palaestra_trainer.run_directory import RunDirectory, append_line, read_lines, replace_file
-from palaestra_trainer.summary import finished, summarise, write_summary
+from palaestra_trainer.telemetry.progress import Counters, Progress
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.seeds import COLLECT, EVALUATE, episode_seed, episode_seeds
+from palaestra_trainer.episodes.seeds import COLLECT, EVALUATE, episode_seed, episode_seeds
 
 NUMBERS = st.integers(0, 2**31)
 

@@ -10,9 +10,9 @@ from stable_baselines3.common.save_util import load_from_zip_file
 from torch import equal
 
 from palaestra_trainer import checkpoint
+from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
+from palaestra_trainer.run.selection import best_of
 from palaestra_trainer.run_directory import drop_lines, read_lines
-from palaestra_trainer.seeds import CONFIRM, EVALUATE, episode_seeds
-from palaestra_trainer.selection import best_of
 
 EVALUATED = {*episode_seeds(1, EVALUATE, 4)}  # by every evaluation of the runs here
 GOAL = {"everySteps": 40, "episodes": 4, "stopAtSuccessRate": 0.9}

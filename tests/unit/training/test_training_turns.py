@@ -14,9 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer import patience
-from palaestra_trainer.turns import away_s, let_others, take_turns
-from palaestra_trainer.waits import waited_s
+from palaestra_trainer.waiting import patience
+from palaestra_trainer.waiting.turns import away_s, let_others, take_turns
+from palaestra_trainer.waiting.waits import waited_s
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from palaestra_trainer.seeds import EVALUATE, episode_seeds
+from palaestra_trainer.episodes.seeds import EVALUATE, episode_seeds
 
 DISCRETE = ["DQN", "PPO", "A2C", "REINFORCE"]
 

@@ -11,14 +11,14 @@ import structlog
 from gymnasium import Wrapper, spaces
 from stable_baselines3.common.vec_env import VecEnv
 
+from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
-from palaestra_trainer.interruption import Interrupted
-from palaestra_trainer.seeds import COLLECT, episode_seed
 from palaestra_trainer.simulators.budget import Care, Group
-from palaestra_trainer.simulators.episode_state import EpisodeState
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
-from palaestra_trainer.turns import let_others
+from palaestra_trainer.waiting.interruption import Interrupted
+from palaestra_trainer.waiting.turns import let_others
 
 RIGHT, LEFT = 1, 0
 

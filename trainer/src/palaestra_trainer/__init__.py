@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from palaestra_trainer.policies import Policy
+    from palaestra_trainer.run.policies import Policy
 
 
 def load_policy(run_or_zip: str | Path) -> Policy:
     """Return the policy of a run directory, or of a model zip inside one; see `policies.load_policy`."""
-    from palaestra_trainer import policies  # noqa: PLC0415 - PyTorch takes seconds to import
+    from palaestra_trainer.run import policies  # noqa: PLC0415 - PyTorch takes seconds to import
 
     return policies.load_policy(run_or_zip)
 
@@ -31,6 +31,6 @@ def report(*, step: int, success_rate: float | None = None) -> None:
         ValueError: the step is negative, or the rate not within 0 to 1.
         ConfigurationError: the configuration cannot be read, or its statusAddress is in use.
     """
-    from palaestra_trainer import reporting  # noqa: PLC0415 - its imports take seconds
+    from palaestra_trainer.run import reporting  # noqa: PLC0415 - its imports take seconds
 
     reporting.report(step, success_rate)

@@ -17,10 +17,10 @@ from palaestra_sim.protocol.status import ExitCode, Termination
 from palaestra_sim.typed import whole
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.interruption import leaving_when_asked
-from palaestra_trainer.logs import configure_logs, last_lines
+from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word
 from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
-from palaestra_trainer.termination import UNEXPECTED, end_of, write_last_word
+from palaestra_trainer.telemetry.logs import configure_logs, last_lines
+from palaestra_trainer.waiting.interruption import leaving_when_asked
 
 log = structlog.get_logger(__name__)
 
@@ -87,8 +87,9 @@ def train(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error)
     with leaving_when_asked():
         # Imported here, so that a wrong configuration is reported at once, not after 3 s of imports.
-        from palaestra_trainer import display, training  # noqa: PLC0415
+        from palaestra_trainer.run import training  # noqa: PLC0415
         from palaestra_trainer.simulators.connect import connect_members  # noqa: PLC0415
+        from palaestra_trainer.telemetry import display  # noqa: PLC0415
 
         return training.run(
             configuration,
@@ -129,7 +130,7 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     in_pod = CONFIG_VARIABLE in os.environ
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
-    from palaestra_trainer.measuring import measure  # noqa: PLC0415 - see train()
+    from palaestra_trainer.run.measuring import measure  # noqa: PLC0415 - see train()
     from palaestra_trainer.simulators.connect import connect_here, connect_members  # noqa: PLC0415
 
     members = connect_members if in_pod else partial(connect_here, run=directory.path)

@@ -4,8 +4,8 @@ TrainerError
 ├── ConfigurationError   the configuration is wrong; retrying cannot help     exit 2
 ├── UnreadableAnswer     the ROS master or a node sent an invalid ROS response
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
-├── Interrupted          a signal asked the run to end (interruption)         exit 75
-├── Enough               the wanted success rate is reached (selection)       exit 0
+├── Interrupted          a signal asked the run to end (waiting.interruption) exit 75
+├── Enough               the wanted success rate is reached (run.selection)   exit 0
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
 ├── NoSuchSensor         this robot does not have it

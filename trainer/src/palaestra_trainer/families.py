@@ -1,4 +1,4 @@
-"""The definition of every metric of a trainer, by name; `palaestra_trainer.metrics` reads the values.
+"""Definitions of all metrics of a trainer, by name; `palaestra_trainer.telemetry.metrics` reads the values.
 
 Metrics of the run continue from attempt to attempt, because they are kept in its checkpoints. Metrics of its
 simulators begin at 0 with each attempt. Prometheus adds the labels of job and replica when it scrapes.

@@ -21,7 +21,7 @@ from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
 from palaestra_trainer.algorithms.images import as_returned, as_seen
 from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
 from palaestra_trainer.checkpoint.generators import Generators
-from palaestra_trainer.simulators.episode_state import EpisodeState
+from palaestra_trainer.episodes.episode_state import EpisodeState
 
 STATE = "state.json"
 ARRAYS = "state.npz"

@@ -12,5 +12,6 @@ from palaestra_trainer.environments.options import Options
 
 __all__ = ["MoveToTargetEnv", "Options"]
 
+# As text, since the entry point finds simulators, which this package does not know.
 # No max_episode_steps: the environment counts its steps itself, since Sparse rewards the last.
-gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.environments.move_to_target:make")
+gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")

@@ -16,15 +16,12 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from palaestra_trainer.configuration import Role
 from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
 from palaestra_trainer.environments.arena import Point, chosen_task
-from palaestra_trainer.environments.configured import simulator_for
 from palaestra_trainer.environments.observation import Situation
-from palaestra_trainer.environments.options import Options, parse
+from palaestra_trainer.environments.options import Options
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
-from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene, Twist
 
 REACHED_M = 0.20
@@ -226,39 +223,6 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     def _numbers_of(self, seen: Situation) -> Observation:
         return observation.observe(seen, self.options.observe, self._numbers)
-
-
-def make(
-    robot: RobotinoAbc | None = None,
-    scene: Scene | None = None,
-    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
-    role: Role = "Collect",
-    **options: Any,
-) -> MoveToTargetEnv:
-    """Return the environment for `gymnasium.make("MoveToTargetEnv-v0", ...)`.
-
-    Args:
-        robot: the robot to drive, given together with its `scene`.
-        scene: arranges episodes.
-        simulator: returns robot and scene if none are given; called once for each environment of
-            `make_vec`. `palaestra_trainer.testing.fake_arena` needs no simulator.
-        role: without `robot` and `simulator`, the environment takes the first simulator of PALAESTRA_CONFIG
-            with this role that no environment of any process uses. Without PALAESTRA_CONFIG it starts a
-            stub, which ends with `close()` or with this process.
-        options: see `Options`; names of movements and parts are text.
-
-    Raises:
-        ConfigurationError: an option is wrong, or no simulator with this role is left.
-    """
-    chosen = parse(options)
-    if (robot is None) != (scene is None):
-        raise ConfigurationError("robot, scene: only one of them was given; give both or neither")
-    if robot is not None and scene is not None:
-        return MoveToTargetEnv(robot, scene, chosen)
-    if simulator is not None:
-        return MoveToTargetEnv(*simulator(), chosen)
-    taken = simulator_for(role)
-    return MoveToTargetEnv(taken.robot, taken.scene, chosen, taken.release)
 
 
 def _transition(before: Situation, after: Situation, outcome: Outcome) -> Transition:

@@ -14,9 +14,9 @@ from collections.abc import Mapping
 
 from palaestra_sim.protocol import sockets
 from palaestra_sim.protocol.tcpros import LENGTH, MAX_FRAME_BYTES, FramingError, decode_header, encode_header
-from palaestra_trainer import patience
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, WrongData
-from palaestra_trainer.waits import count_wait
+from palaestra_trainer.waiting import patience
+from palaestra_trainer.waiting.waits import count_wait
 
 _TIMEVAL = struct.Struct("@ll")
 _BUFFER_BYTES = 8192

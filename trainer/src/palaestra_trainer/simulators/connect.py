@@ -13,12 +13,12 @@ import palaestra_trainer.environments  # noqa: F401 - the import registers the s
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration, load
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import care_of
 from palaestra_trainer.simulators.member import Member
-from palaestra_trainer.simulators.process import ProcessLauncher
-from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots

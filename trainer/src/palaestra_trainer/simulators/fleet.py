@@ -12,12 +12,12 @@ import structlog
 
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member, Watcher
 from palaestra_trainer.simulators.meter import Meter
+from palaestra_trainer.waiting.interruption import Check, go_on
 
 LONG_S = 5.0  # a start longer than this is logged with the missing simulators, again after each doubling
 

@@ -21,14 +21,13 @@ import structlog
 
 from palaestra_sim.protocol.status import Cause
 from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
-from palaestra_trainer.interruption import Check, go_on
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
 from palaestra_trainer.simulators.member import Member, Nobody, Step, Watcher
 from palaestra_trainer.simulators.meter import Meter
 from palaestra_trainer.simulators.numbers import check_observation, check_reward
-from palaestra_trainer.simulators.pace import Pace
-from palaestra_trainer.turns import away_s, let_others
+from palaestra_trainer.waiting.interruption import Check, go_on
+from palaestra_trainer.waiting.turns import away_s, let_others
 
 log = structlog.get_logger(__name__)
 
@@ -70,7 +69,6 @@ class Keeper:
         self._clock = clock
         self._recycled, self._tell_next = 0, -math.inf
         self.meter = Meter(member, self._budget)
-        self._pace = Pace()
         self._work: Future[None] | None = None
         self._abandoned = False
         self._recycles_resting = False
@@ -154,8 +152,7 @@ class Keeper:
         began = time.perf_counter() - away_s()
         step: Step = self.member.env.step(action)
         seconds = time.perf_counter() - away_s() - began
-        self.meter.steps.observe(seconds)
-        if self._pace.slow(seconds):
+        if self.meter.count_step(seconds):
             self.watcher.slow(self.name, seconds)
         check_observation(self.name, self.member.env, step[0])
         check_reward(self.name, self.member.env, step[1], step[4])

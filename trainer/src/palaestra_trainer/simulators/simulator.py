@@ -12,10 +12,10 @@ import gymnasium
 
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
+from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.simulators.recycling import Wear
-from palaestra_trainer.simulators.sidecar import Sidecar
 from palaestra_trainer.webots import Mode, Webots
 
 _POLL_S = 0.1

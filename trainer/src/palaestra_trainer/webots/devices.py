@@ -8,7 +8,7 @@ from typing import Any
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber, call_together
-from palaestra_trainer.turns import let_others
+from palaestra_trainer.waiting.turns import let_others
 from palaestra_trainer.webots.readings import BOOL, FLOAT64, RANGE, Reading
 from palaestra_trainer.webots.services import Services
 

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, TrainerError
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.supervisor import Supervisor
@@ -96,9 +97,6 @@ class Webots:
         self._own: Owned | None = None
         self._suffix = ""
         if launcher is None:
-            # The launcher talks to a sidecar, which this layer does not depend on.
-            from palaestra_trainer.simulators.process import ProcessLauncher  # noqa: PLC0415
-
             own = ProcessLauncher.beside_others(world_path, driver, options)
             launcher = self._own = own
             self._suffix = own.suffix

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from palaestra_trainer.errors import Paused, SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
-from palaestra_trainer.turns import let_others
+from palaestra_trainer.waiting.turns import let_others
 from palaestra_trainer.webots.devices import Motor, Sensor
 from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.requirements import require_devices, require_node

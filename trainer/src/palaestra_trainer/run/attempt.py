@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.display import Display
-from palaestra_trainer.interruption import Interruption
-from palaestra_trainer.progress import Progress
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.fleet import Fleet
+from palaestra_trainer.telemetry.display import Display
+from palaestra_trainer.telemetry.progress import Progress
+from palaestra_trainer.waiting.interruption import Interruption
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

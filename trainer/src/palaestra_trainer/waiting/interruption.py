@@ -18,8 +18,8 @@ from types import FrameType, TracebackType
 from typing import Any, Self
 
 from palaestra_sim.protocol.status import ExitCode
-from palaestra_trainer import patience
 from palaestra_trainer.errors import TrainerError
+from palaestra_trainer.waiting import patience
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 HURRY = "a second signal ends at once"

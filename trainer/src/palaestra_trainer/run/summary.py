@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.goodput import trained_share
-from palaestra_trainer.progress import Progress
+from palaestra_trainer.run.selection import best_of, confirmation_of
 from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_file
-from palaestra_trainer.selection import best_of, confirmation_of
+from palaestra_trainer.telemetry.goodput import trained_share
+from palaestra_trainer.telemetry.progress import Progress
 
 
 def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:

@@ -22,13 +22,13 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_sim.protocol.status import Cause
 from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer.episodes.evaluation import Evaluation, evaluate_on_all
+from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.errors import ConfigurationError, TrainerError
-from palaestra_trainer.evaluation import Evaluation, evaluate_on_all
-from palaestra_trainer.progress import Progress
-from palaestra_trainer.run import Run
+from palaestra_trainer.run.attempt import Run
 from palaestra_trainer.run_directory import RunDirectory, append_line, drop_lines, read_lines, replace_file
-from palaestra_trainer.seeds import CONFIRM, EVALUATE, episode_seeds
 from palaestra_trainer.simulators.fleet import resting, running
+from palaestra_trainer.telemetry.progress import Progress
 
 log = structlog.get_logger(__name__)
 

@@ -17,14 +17,15 @@ import structlog
 from stable_baselines3.common.callbacks import BaseCallback
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer import checkpoint, patience
+from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms.buffers import valid_rows
+from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.checkpoint import Checkpoint, State, Tensors
-from palaestra_trainer.divergence import Learner
-from palaestra_trainer.journal import Journal
-from palaestra_trainer.run import Run
-from palaestra_trainer.selection import Selection, last_evaluated
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.run.attempt import Run
+from palaestra_trainer.run.journal import Journal
+from palaestra_trainer.run.selection import Selection, last_evaluated
+from palaestra_trainer.waiting import patience
 
 log = structlog.get_logger(__name__)
 

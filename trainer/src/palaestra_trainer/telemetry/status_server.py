@@ -15,9 +15,9 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
 from palaestra_sim.protocol.metrics import Family, Values
-from palaestra_trainer import metrics
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.progress import Progress
+from palaestra_trainer.telemetry import metrics
+from palaestra_trainer.telemetry.progress import Progress
 
 READ_DEADLINE_S = 5.0
 

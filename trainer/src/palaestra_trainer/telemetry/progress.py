@@ -25,11 +25,11 @@ from palaestra_sim.protocol.status import (
     TrainerStatus,
 )
 from palaestra_trainer.configuration import Role
+from palaestra_trainer.episodes.evaluation import Evaluation
 from palaestra_trainer.errors import SimulatorFault
-from palaestra_trainer.evaluation import Evaluation
-from palaestra_trainer.figures import EPISODES_IN_MEAN, Figures
-from palaestra_trainer.goodput import Goodput
-from palaestra_trainer.standings import AskStandby, Standings
+from palaestra_trainer.telemetry.figures import EPISODES_IN_MEAN, Figures
+from palaestra_trainer.telemetry.goodput import Goodput
+from palaestra_trainer.telemetry.standings import AskStandby, Standings
 
 SPEED_WINDOW_S = 30.0
 PHASES: Mapping[Cause, str] = MappingProxyType(

@@ -13,10 +13,10 @@ from functools import cache
 
 from palaestra_sim.protocol.status import Termination
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
-from palaestra_trainer.metrics import constants
-from palaestra_trainer.progress import Counters, Progress
-from palaestra_trainer.status_server import StatusServer
-from palaestra_trainer.termination import write_last_word
+from palaestra_trainer.run.termination import write_last_word
+from palaestra_trainer.telemetry.metrics import constants
+from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.telemetry.status_server import StatusServer
 
 _lock = threading.Lock()
 

@@ -20,8 +20,8 @@ from palaestra_sim.protocol.metrics import Family, Values
 from palaestra_sim.protocol.status import SimulatorStatus, SuccessInterval, TrainerStatus
 from palaestra_trainer import families
 from palaestra_trainer.configuration import Configuration
-from palaestra_trainer.figures import Figures
-from palaestra_trainer.progress import Counters, Progress
+from palaestra_trainer.telemetry.figures import Figures
+from palaestra_trainer.telemetry.progress import Counters, Progress
 
 # For each value of the label, the name under which Stable-Baselines3 logs it.
 LOSSES = MappingProxyType({name: f"train/{name}" for name in families.LOSSES})

@@ -3,7 +3,7 @@
 All members step at the same time, in turns of the caller's thread: each sends
 its simulator the step before the first answer is awaited. A broken member is
 restarted in the background. Its rows are invalid until it is up again, see
-`palaestra_trainer.simulators.collector`, and the other members continue. Only
+`palaestra_trainer.episodes.collector`, and the other members continue. Only
 if no member can step does the thread wait for one.
 """
 
@@ -21,12 +21,12 @@ from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer.interruption import Check, go_on
-from palaestra_trainer.simulators.collector import Collector, Row
-from palaestra_trainer.simulators.episode_state import EpisodeState
+from palaestra_trainer.episodes.collector import Collector, Row
+from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
 from palaestra_trainer.simulators.member import Environment
-from palaestra_trainer.turns import take_turns
+from palaestra_trainer.waiting.interruption import Check, go_on
+from palaestra_trainer.waiting.turns import take_turns
 
 
 class SimulatorsVecEnv(VecEnv):

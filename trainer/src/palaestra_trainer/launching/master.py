@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 from palaestra_trainer.errors import MasterLost
+from palaestra_trainer.launching.child import first_line, start_child
 from palaestra_trainer.ros import Master
-from palaestra_trainer.simulators.child import first_line, start_child
 
 
 def ensure_master() -> None:
@@ -19,7 +19,7 @@ def ensure_master() -> None:
     try:
         Master("/palaestra").ping()
     except MasterLost:
-        module = [sys.executable, "-m", "palaestra_trainer.simulators.own_master"]
+        module = [sys.executable, "-m", "palaestra_trainer.launching.own_master"]
         uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
         if not uri.startswith("http://"):
             raise MasterLost("a ROS master could not be started; start rosmaster yourself") from None

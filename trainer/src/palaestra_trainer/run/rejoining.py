@@ -12,8 +12,8 @@ import numpy as np
 import structlog
 
 from palaestra_trainer.checkpoint import State
-from palaestra_trainer.simulators.episode_state import EpisodeState
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
+from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 
 log = structlog.get_logger(__name__)
 

@@ -17,8 +17,8 @@ from typing import Any, Protocol
 
 from greenlet import getcurrent, greenlet
 
-from palaestra_trainer import patience
-from palaestra_trainer.waits import count_wait
+from palaestra_trainer.waiting import patience
+from palaestra_trainer.waiting.waits import count_wait
 
 # After this time the first greenlet waits alone; its own deadline and fault attribution then apply. The time
 # is longer than a step, because the wait counts as its turn, and short beside a deadline, which begins then.

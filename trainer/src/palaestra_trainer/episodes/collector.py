@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
+from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
+from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.errors import Diverged, SimulatorFault
-from palaestra_trainer.interruption import Check, go_on
-from palaestra_trainer.seeds import COLLECT, episode_seed
-from palaestra_trainer.simulators.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Environment, Step
+from palaestra_trainer.waiting.interruption import Check, go_on
 
 
 class Row(NamedTuple):

@@ -12,7 +12,7 @@ from stable_baselines3.common.logger import KVWriter
 
 from palaestra_sim.protocol.metrics import Tally
 from palaestra_trainer import families
-from palaestra_trainer.evaluation import Evaluation
+from palaestra_trainer.episodes.evaluation import Evaluation
 from palaestra_trainer.simulators.meter import Meter
 
 EPISODES_IN_MEAN = 100  # as in Stable-Baselines3's rollout/ep_rew_mean

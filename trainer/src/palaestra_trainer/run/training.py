@@ -22,30 +22,30 @@ from torch.utils.tensorboard.writer import SummaryWriter
 
 from palaestra_sim.protocol.status import Cause, ExitCode, SuccessInterval, Termination
 from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.checkpoint import Checkpoint
-from palaestra_trainer.conductor import Conductor, Resumed
 from palaestra_trainer.configuration import Configuration, dump
-from palaestra_trainer.display import Display, Lines
-from palaestra_trainer.divergence import Learner
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
-from palaestra_trainer.figures import Logged
-from palaestra_trainer.interruption import Interruption
-from palaestra_trainer.journal import Journal
-from palaestra_trainer.logs import last_lines
-from palaestra_trainer.metrics import constants
-from palaestra_trainer.progress import Counters, Progress
-from palaestra_trainer.rejoining import rejoin
-from palaestra_trainer.run import Run
+from palaestra_trainer.run.attempt import Run
+from palaestra_trainer.run.conductor import Conductor, Resumed
+from palaestra_trainer.run.journal import Journal
+from palaestra_trainer.run.rejoining import rejoin
+from palaestra_trainer.run.selection import Enough, forget_after
+from palaestra_trainer.run.summary import finished, summarise, write_summary
+from palaestra_trainer.run.tensorboard_link import link_curves
+from palaestra_trainer.run.termination import End, end_of, write_last_word
+from palaestra_trainer.run.watchdog import Watchdog, stalled
 from palaestra_trainer.run_directory import RunDirectory, replace_file
-from palaestra_trainer.selection import Enough, forget_after
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.member import Member, Spared
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
-from palaestra_trainer.status_server import StatusServer
-from palaestra_trainer.summary import finished, summarise, write_summary
-from palaestra_trainer.tensorboard_link import link_curves
-from palaestra_trainer.termination import End, end_of, write_last_word
-from palaestra_trainer.watchdog import Watchdog, stalled
+from palaestra_trainer.telemetry.display import Display, Lines
+from palaestra_trainer.telemetry.figures import Logged
+from palaestra_trainer.telemetry.logs import last_lines
+from palaestra_trainer.telemetry.metrics import constants
+from palaestra_trainer.telemetry.progress import Counters, Progress
+from palaestra_trainer.telemetry.status_server import StatusServer
+from palaestra_trainer.waiting.interruption import Interruption
 
 log = structlog.get_logger(__name__)
 

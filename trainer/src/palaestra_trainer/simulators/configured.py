@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, Role, load
-from palaestra_trainer.environments.claims import claim
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.simulators.claims import claim
+from palaestra_trainer.simulators.connect import Arena, connect
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +49,6 @@ def own_simulator() -> Configured:
     Raises:
         SimulatorFault: it does not start.
     """
-    from palaestra_trainer.simulators.connect import Arena  # noqa: PLC0415 - as below
-
     arena = Arena()
     return Configured(name=arena.webots.robot_name, robot=arena.robot, scene=arena.scene, release=arena.close)
 
@@ -61,9 +60,6 @@ def configured_simulator(role: Role) -> Configured:
         ConfigurationError: there is no configuration, or each simulator with this role has an environment.
         SimulatorFault: the simulator does not start.
     """
-    # Environments use ROS only here, and only if no robot was passed.
-    from palaestra_trainer.simulators.connect import connect  # noqa: PLC0415
-
     configuration = load()
     claimed = claim(configuration, role)
     try:

@@ -22,7 +22,7 @@ from palaestra_trainer.errors import (
     SimulatorFault,
     SimulatorHung,
 )
-from palaestra_trainer.interruption import Interrupted
+from palaestra_trainer.waiting.interruption import Interrupted
 
 log = structlog.get_logger(__name__)
 

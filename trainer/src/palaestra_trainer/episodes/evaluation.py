@@ -19,11 +19,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from palaestra_sim.protocol.status import SuccessInterval
+from palaestra_trainer.episodes.intervals import wilson
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
-from palaestra_trainer.interruption import Check, go_on
-from palaestra_trainer.intervals import wilson
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.waiting.interruption import Check, go_on
 
 
 class Policy(Protocol):

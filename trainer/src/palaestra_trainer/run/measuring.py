@@ -8,14 +8,14 @@ from typing import Any
 
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.configuration import Configuration
+from palaestra_trainer.episodes.evaluation import evaluate_on_all
+from palaestra_trainer.episodes.seeds import episode_seeds
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.evaluation import evaluate_on_all
+from palaestra_trainer.run.training import MakeMembers, use_threads
 from palaestra_trainer.run_directory import RunDirectory
-from palaestra_trainer.seeds import episode_seeds
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.member import Nobody
-from palaestra_trainer.simulators.vec_env import SimulatorsVecEnv
-from palaestra_trainer.training import MakeMembers, use_threads
 
 
 def measure(

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.child import drain, end_child, first_line, start_child
-from palaestra_trainer.simulators.master import ensure_master
-from palaestra_trainer.simulators.reservations import Reservation
-from palaestra_trainer.simulators.sidecar import Sidecar
+from palaestra_trainer.launching.child import drain, end_child, first_line, start_child
+from palaestra_trainer.launching.master import ensure_master
+from palaestra_trainer.launching.reservations import Reservation
+from palaestra_trainer.launching.sidecar import Sidecar
 
 _END_S = 20.0
 _MOST_BESIDE = 100

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 from palaestra_sim.protocol.status import Cause
-from palaestra_trainer.waits import waited_s
+from palaestra_trainer.waiting.waits import waited_s
 
 TRAINING = (Cause.STEPPING, Cause.TRANSPORT, Cause.LEARNING)
 
