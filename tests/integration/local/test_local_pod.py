@@ -86,12 +86,17 @@ def test_a_container_that_does_not_come_up_for_long_is_named_with_since_when(sta
     assert re.fullmatch(r"waits for silent since \d\d:\d\d:\d\d; see .*/logs/silent\.log", line)
 
 
-@pytest.mark.parametrize(("first", "lines"), [("", 1), ("echo up; ", 0)])
-def test_a_trainer_is_waited_for_until_its_first_line(stage, first, lines):
+@pytest.mark.parametrize(
+    ("first", "long_s", "lines"),
+    # A shell needs up to seconds for its first line where all processors are busy.
+    [("", 0.3, 1), ("echo up; ", 3, 0)],
+    ids=["silent", "up"],
+)
+def test_a_trainer_is_waited_for_until_its_first_line(stage, first, long_s, lines):
     """From then on it reports itself what it waits for."""
-    stage.long_s = 0.3
+    stage.long_s = long_s
 
-    stage.run(main=f"{first}sleep 0.6")
+    stage.run(main=f"{first}sleep {1.2 * long_s}")
 
     assert len(stage.shown) == lines
 
