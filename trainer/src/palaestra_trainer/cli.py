@@ -87,9 +87,9 @@ def train(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error)
     with leaving_when_asked():
         # Imported here, so that a wrong configuration is reported at once, not after 3 s of imports.
-        from palaestra_trainer.run import training  # noqa: PLC0415
-        from palaestra_trainer.simulators.connect import connect_members  # noqa: PLC0415
-        from palaestra_trainer.telemetry import display  # noqa: PLC0415
+        from palaestra_trainer.run import training
+        from palaestra_trainer.simulators.connect import connect_members
+        from palaestra_trainer.telemetry import display
 
         return training.run(
             configuration,
@@ -115,7 +115,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     try:
         result = _evaluate(chosen.run, chosen.episodes, chosen.seeds)
     except KeyboardInterrupt:
-        log.error("ended by Ctrl-C")  # noqa: TRY400 - the user asked for it; a traceback would not help
+        log.error("ended by Ctrl-C")
         return KEYBOARD_INTERRUPT
     except (TrainerError, OSError) as error:
         code = _refuse(error)
@@ -130,8 +130,8 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     in_pod = CONFIG_VARIABLE in os.environ
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
-    from palaestra_trainer.run.measuring import measure  # noqa: PLC0415 - see train()
-    from palaestra_trainer.simulators.connect import connect_here, connect_members  # noqa: PLC0415
+    from palaestra_trainer.run.measuring import measure
+    from palaestra_trainer.simulators.connect import connect_here, connect_members
 
     members = connect_members if in_pod else partial(connect_here, run=directory.path)
     return measure(configuration, directory.model, members, episodes=episodes, stream=stream)

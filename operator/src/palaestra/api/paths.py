@@ -63,9 +63,10 @@ class Pruned:
         tree, found = self._tree, []
         for piece in path:
             if isinstance(tree, _SparseList) and isinstance(piece, int):
-                piece = list(tree)[piece]  # noqa: PLW2901 - the same piece, as the original had it
-            found.append(piece)
-            tree = tree.get(piece) if isinstance(tree, dict) else None
+                found.append(list(tree)[piece])
+            else:
+                found.append(piece)
+            tree = tree.get(found[-1]) if isinstance(tree, dict) else None
         return tuple(found)
 
 

@@ -26,8 +26,8 @@ class Reason(StrEnum):
     WORLD_MISSING = "WorldMissing"
     WORLD_INVALID = "WorldInvalid"
     CONFIG_MAP_NOT_FOR_JOBS = "ConfigMapNotForJobs"
-    SECRET_MISSING = "SecretMissing"  # noqa: S105 - a reason
-    SECRET_NOT_FOR_JOBS = "SecretNotForJobs"  # noqa: S105 - a reason
+    SECRET_MISSING = "SecretMissing"
+    SECRET_NOT_FOR_JOBS = "SecretNotForJobs"
     CLAIM_MISSING = "ClaimMissing"
     CLAIM_NOT_FOR_JOBS = "ClaimNotForJobs"
     POD_METADATA_NOT_ALLOWED = "PodMetadataNotAllowed"

@@ -70,7 +70,7 @@ def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
                 return
     finally:
         # At once: a peer that is gone would not answer a farewell.
-        socket.shutdown()  # type: ignore[no-untyped-call]  # the library is half typed
+        socket.shutdown()
 
 
 def _message(socket: websocket.WebSocket, deadline: float) -> tuple[int, bytes]:

@@ -27,7 +27,7 @@ def access(files: str, context: str | None) -> Access:
     configuration.connection_pool_maxsize = POOL
     configuration.keep_alive = True  # the kernel finds peers that are gone, also behind silent proxies
     try:
-        load_kube_config(files, context=context, client_configuration=configuration)  # type: ignore[no-untyped-call]  # the client is half typed
+        load_kube_config(files, context=context, client_configuration=configuration)
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
     host = configuration.host.rstrip("/")
@@ -54,7 +54,7 @@ def namespace(files: str, context: str | None) -> str | None:
         NotConfigured: it has no such context, or cannot be read.
     """
     try:
-        contexts: Any = list_kube_config_contexts(files)  # type: ignore[no-untyped-call]  # as above
+        contexts: Any = list_kube_config_contexts(files)
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
     known, current = contexts

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import urllib.request
 from collections.abc import Mapping
+from http import HTTPStatus
 
 from palaestra.local.process import Process
 from palaestra.local.spec import Probe
@@ -52,6 +53,6 @@ def _answers(url: str, timeout_s: float) -> bool:
     """Return whether a GET is answered with a status from 200 to 399."""
     try:
         with _DIRECT.open(url, timeout=timeout_s) as answer:
-            return bool(answer.status < 400)  # noqa: PLR2004 - the kubelet's own rule
+            return bool(answer.status < HTTPStatus.BAD_REQUEST)  # the kubelet's own rule
     except OSError:  # refused, timed out, or an HTTP error status
         return False

@@ -170,6 +170,9 @@ def _flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield path, value
 
 
+_SHOWN = 40
+
+
 def _short(value: Any) -> str:
     text = "absent" if value is None else repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."  # noqa: PLR2004 - what fits in a line
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."

@@ -20,7 +20,7 @@ class SourceKind(StrEnum):
     """The kinds of object that a job may refer to."""
 
     CONFIG_MAP = "ConfigMap"
-    SECRET = "Secret"  # noqa: S105 - the name of a kind
+    SECRET = "Secret"
     CLAIM = "PersistentVolumeClaim"
 
 

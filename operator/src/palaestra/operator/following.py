@@ -80,4 +80,4 @@ class Followed:
 
     def keys(self) -> set[Key]:
         """Return namespace and name of all objects."""
-        return {key for each in self._reflectors for key in each.store.keys()}  # noqa: SIM118 - no dict
+        return set().union(*(reflector.store.keys() for reflector in self._reflectors))

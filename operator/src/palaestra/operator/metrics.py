@@ -26,7 +26,7 @@ Object = Mapping[str, Any]
 Counted = TypeVar("Counted", Counter, Histogram)
 
 # Else each counter has a second series, which nobody reads.
-disable_created_metrics()  # type: ignore[no-untyped-call]  # the client is half typed
+disable_created_metrics()
 
 
 class Metrics:

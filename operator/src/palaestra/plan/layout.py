@@ -118,23 +118,23 @@ class ClusterLayout:
 
     images: Images
     ports: Ports = Ports()
-    health_host: str = "0.0.0.0"  # noqa: S104 - the pod's address, for the kubelet and Prometheus
+    health_host: str = "0.0.0.0"
     operator_namespace: str = "palaestra-system"
     monitoring_namespace: str = "monitoring"
     node_selector: Mapping[str, str] = field(default_factory=dict)
     allowed_pod_labels: tuple[str, ...] = ()
     allowed_pod_annotations: tuple[str, ...] = ()
 
-    def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - no container differs
+    def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the same places for every container; runs are kept apart by the job's uid."""
         return Places(
             config="/etc/palaestra",
             volume="/var/lib/palaestra",
             run=self.another_run(uid, replica),
-            scratch="/tmp",  # noqa: S108 - a volume of the container's own
+            scratch="/tmp",
             termination="/dev/termination-log",
-            home="/tmp",  # noqa: S108
-            shared_memory="/dev/shm",  # noqa: S108
+            home="/tmp",
+            shared_memory="/dev/shm",
             sidecar="/palaestra",
         )
 
@@ -158,7 +158,7 @@ class LocalLayout:
     monitoring_namespace: None = None
     node_selector: Mapping[str, str] = field(default_factory=dict)
 
-    def places(self, uid: str, replica: int, container: str) -> Places:  # noqa: ARG002 - the folder is the job's already
+    def places(self, uid: str, replica: int, container: str) -> Places:
         """Return the places of one container, all below `<job_directory>/<replica>`."""
         run = f"{self.job_directory}/{replica}"
         return Places(
@@ -169,7 +169,7 @@ class LocalLayout:
             termination=f"{run}/termination.json",
         )
 
-    def another_run(self, uid: str, replica: int) -> str:  # noqa: ARG002 - there is none
+    def another_run(self, uid: str, replica: int) -> str:
         """Refuse: a laptop has no claims."""
         raise PlanError(
             "spec.storage.resumeFrom: names a run on a claim of a cluster, which is not to be had here; "

@@ -49,10 +49,10 @@ def adopt_orphans() -> None:
 def children(parents: set[int]) -> set[int]:
     """Return the processes whose parent is one of `parents`, from one pass over /proc."""
     found = set()
-    for name in os.listdir("/proc"):  # noqa: PTH208 - pathlib is slow to import
+    for name in os.listdir("/proc"):
         if name.isdigit():
             with contextlib.suppress(OSError):  # it ended meanwhile
-                with open(f"/proc/{name}/stat", "rb") as file:  # noqa: PTH123 - pathlib is slow to import
+                with open(f"/proc/{name}/stat", "rb") as file:
                     fields = file.read().rpartition(b")")[2].split()
                 if int(fields[_PARENT]) in parents:
                     found.add(int(name))

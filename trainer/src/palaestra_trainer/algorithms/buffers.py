@@ -155,7 +155,7 @@ class ValidRolloutBuffer(RolloutBuffer):
         """Yield minibatches of valid rows in random order; the last one may be smaller."""
         if not self.generator_ready:
             next(super().get(1))  # flattens the rows of all members into one column
-        rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))  # noqa: NPY002 - SB3's generator, which set_random_seed seeds
+        rows = np.random.permutation(np.flatnonzero(self.swap_and_flatten(self.valid)))
         size = batch_size or max(len(rows), 1)
         for start in range(0, len(rows), size):
             yield self._get_samples(rows[start : start + size])

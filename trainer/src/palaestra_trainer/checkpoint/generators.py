@@ -30,7 +30,7 @@ class Generators:
         """Return where they stand now."""
         return cls(
             python=random.getstate(),
-            numpy=np.random.get_state(legacy=False),  # noqa: NPY002 - the one that Stable-Baselines3 draws from
+            numpy=np.random.get_state(legacy=False),
             pytorch=torch.get_rng_state(),
             action_space=dict(action_space.np_random.bit_generator.state),
             gpu=torch.cuda.get_rng_state(device) if device.type == "cuda" else None,
@@ -39,7 +39,7 @@ class Generators:
     def put_back(self, action_space: spaces.Space[Any], device: torch.device) -> None:
         """Let them go on from here; that of a GPU only if the model lives on one still."""
         random.setstate(self.python)
-        np.random.set_state(self.numpy)  # noqa: NPY002 - see now()
+        np.random.set_state(self.numpy)
         torch.set_rng_state(self.pytorch)
         action_space.np_random.bit_generator.state = self.action_space
         if self.gpu is not None and device.type == "cuda":

@@ -75,12 +75,12 @@ class State:
     def of(cls, model: BaseAlgorithm, members: Sequence[EpisodeState], rollout: Mapping[str, Any]) -> State:
         """Return the state of a model that has begun to learn and is at a rollout boundary."""
         buffer, normalizer = replay_buffer(model), normalizer_of(model)
-        seen = normalizer.old_obs if normalizer else model._last_obs  # noqa: SLF001 - Stable-Baselines3 keeps it there
+        seen = normalizer.old_obs if normalizer else model._last_obs
         return cls(
             numbers={name: getattr(model, name) for name in _NUMBERS if hasattr(model, name)},
             generators=Generators.now(model.action_space, model.device),
             observation=as_returned(model, seen),
-            episode_starts=np.asarray(model._last_episode_starts),  # noqa: SLF001 - as above
+            episode_starts=np.asarray(model._last_episode_starts),
             episodes=tuple(model.ep_info_buffer or ()),
             successes=tuple(model.ep_success_buffer or ()),
             positions=buffer.positions if buffer else None,
@@ -98,9 +98,9 @@ class State:
             setattr(model, name, value)
         self.generators.put_back(model.action_space, model.device)
         self._show_observation(model)
-        model._last_episode_starts = self.episode_starts  # noqa: SLF001 - see of()
-        model.ep_info_buffer = deque(self.episodes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
-        model.ep_success_buffer = deque(self.successes, maxlen=model._stats_window_size)  # noqa: SLF001 - as above
+        model._last_episode_starts = self.episode_starts
+        model.ep_info_buffer = deque(self.episodes, maxlen=model._stats_window_size)
+        model.ep_success_buffer = deque(self.successes, maxlen=model._stats_window_size)
         buffer = replay_buffer(model)
         if buffer and self.positions:
             buffer.positions = self.positions
@@ -117,8 +117,8 @@ class State:
             if self.scales is not None:
                 normalizer.scales = self.scales
             seen = normalizer.go_on(original, self.running_returns)
-        model._last_obs = seen  # noqa: SLF001 - see of()
-        model._last_original_obs = original  # noqa: SLF001 - as above
+        model._last_obs = seen
+        model._last_original_obs = original
 
     def write(self, folder: Path) -> None:
         """Write it into a folder, but for what is part of the model."""

@@ -58,7 +58,7 @@ class Saver:
             shutil.rmtree(draft, ignore_errors=True)
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
-            log.error(  # noqa: TRY400 - one clear line
+            log.error(
                 "checkpoint not written: disk full", step=described.step, folder=str(self._folder)
             )
             return False

@@ -39,7 +39,7 @@ class Tensors:
     @classmethod
     def of(cls, model: BaseAlgorithm) -> Self:
         """Return a copy of a model's tensors."""
-        _, names = model._get_torch_save_params()  # noqa: SLF001 - Stable-Baselines3 tells nobody else
+        _, names = model._get_torch_save_params()
         variables = {name: recursive_getattr(model, name).detach().clone() for name in names}
         return cls(deepcopy(model.get_parameters()), variables)
 

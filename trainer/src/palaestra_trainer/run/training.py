@@ -254,7 +254,7 @@ class Attempt:
         forget_after(self._directory, step)
         if curves.exists():
             # In files older than this mark, TensorBoard hides points from this step on.
-            with SummaryWriter(str(curves), purge_step=step + 1):  # type: ignore[no-untyped-call]  # as torch has it
+            with SummaryWriter(str(curves), purge_step=step + 1):
                 pass
 
     def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: Checkpoint) -> Resumed:
@@ -330,5 +330,4 @@ def use_threads(environment: Mapping[str, str] = os.environ) -> None:
 
 
 def _write_text(path: os.PathLike[str], text: str) -> None:
-    with open(path, "w", encoding="utf-8") as file:  # noqa: PTH123 - any path-like
-        file.write(text)
+    Path(path).write_text(text, encoding="utf-8")

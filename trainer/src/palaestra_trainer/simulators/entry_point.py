@@ -41,8 +41,7 @@ def make(
         return MoveToTargetEnv(robot, scene, chosen)
     if simulator is not None:
         return MoveToTargetEnv(*simulator(), chosen)
-    # ROS is imported only if a simulator is asked for.
-    from palaestra_trainer.simulators.configured import simulator_for  # noqa: PLC0415
+    from palaestra_trainer.simulators.configured import simulator_for  # noqa: PLC0415 - it needs ROS
 
     taken = simulator_for(role)
     return MoveToTargetEnv(taken.robot, taken.scene, chosen, taken.release)

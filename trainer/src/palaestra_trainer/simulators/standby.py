@@ -211,5 +211,5 @@ class Side:
         try:
             self._budget.spend(fault)
         except FaultBudgetSpent as spent:
-            log.error("standby left down until it is wanted", simulator=self.simulator.name, fact=str(spent))  # noqa: TRY400 - one clear line
+            log.error("standby left down until it is wanted", simulator=self.simulator.name, fact=str(spent))
             raise fault from spent

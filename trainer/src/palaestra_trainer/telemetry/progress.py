@@ -305,9 +305,9 @@ class Progress:
     def steps_per_second(self) -> float | None:
         """Return the speed over the last 30 seconds; None before a second has passed."""
         with self._lock:
-            if len(self._samples) < 2:  # noqa: PLR2004 - a speed needs two points
+            if len(self._samples) <= 1:
                 return None
-            (then, before), (_, _) = self._samples[0], self._samples[-1]
+            then, before = self._samples[0]
             return (self.step - before) / max(self._clock() - then, 1e-9)
 
     def status(self) -> TrainerStatus:

@@ -137,7 +137,7 @@ def _check_images(robot: RobotinoAbc) -> None:
             image = take()
         except NoSuchSensor:
             continue
-        _require(image.ndim >= 2, IMAGES_ARE_TYPED, image.shape)  # noqa: PLR2004 - rows and columns
+        _require(image.ndim > 1, IMAGES_ARE_TYPED, image.shape)
 
 
 def _drive_after_reset(
