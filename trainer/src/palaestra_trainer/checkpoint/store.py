@@ -58,9 +58,7 @@ class Saver:
             shutil.rmtree(draft, ignore_errors=True)
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
-            log.error(
-                "checkpoint not written: disk full", step=described.step, folder=str(self._folder)
-            )
+            log.error("checkpoint not written: disk full", step=described.step, folder=str(self._folder))
             return False
         self._before = Checkpoint(path=target, manifest=complete)
         if buffer := replay_buffer(model):
