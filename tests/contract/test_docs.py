@@ -46,8 +46,8 @@ def test_every_verb_that_is_typed_exists(text):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_link_leads_somewhere(page):
+def test_every_link_and_picture_is_there(page):
     """Relative to the page it stands on."""
-    targets = re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text())
+    targets = re.findall(r"(?:\]\(|src=\")(?!https?:)([^)#\"]+)", page.read_text())
 
     assert [target for target in targets if not (page.parent / target).exists()] == []
