@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from palaestra_sim.stub.catalogue import FieldType, field_kinds, type_number
 from palaestra_sim.stub.fields import quaternion_to_axis_angle
 from palaestra_sim.stub.geometry import axis_angle_to_quaternion
-from palaestra_sim.stub.nodes import SceneTree
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.stub.tree import SceneTree
 from palaestra_sim.world import builtin
 
 HALF = math.sqrt(0.5)
@@ -433,7 +433,7 @@ def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, wri
     """So that a newer or rarer field can still be read."""
     tree = SceneTree(Simulation.load(world(f"DEF A Pose {{ novelty {written} }}")))
 
-    assert tree.of_def("A").field("novelty").kind.name == kind
+    assert tree.field_of(tree.of_def("A"), "novelty").kind.name == kind
 
 
 def test_every_field_of_the_shipped_worlds_has_values():
@@ -442,7 +442,7 @@ def test_every_field_of_the_shipped_worlds_has_values():
         tree = SceneTree(Simulation.load(builtin(name)))
         for node in list(tree.nodes):
             for field_name, kind in node.kinds.items():
-                found = node.field(field_name)
+                found = tree.field_of(node, field_name)
                 on_joint = node.jointed and field_name in ("translation", "rotation")
                 if not kind.multiple and not on_joint:
                     found.get(FieldType(kind.type))

@@ -10,6 +10,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final, NamedTuple
 
+from palaestra_sim.world import Node, Value
+
 
 class FieldType(IntEnum):
     """What one value of a field is; `get_type` adds 0x10 where there may be several."""
@@ -176,3 +178,19 @@ def field_kinds(type_name: str) -> dict[str, FieldKind]:
             name, sort, *default = words
             kinds[name] = FieldKind(_TYPES[sort[2:]], sort.startswith("MF"), "".join(default))
     return kinds
+
+
+def guessed_kind(value: Value) -> FieldKind:
+    """Return the kind of a field that is not in the catalogue, from its value in the world file."""
+    items = value.items
+    if not items or items[0] is None or isinstance(items[0], Node):
+        return FieldKind(FieldType.NODE, value.bracketed)
+    if isinstance(items[0], bool):
+        return FieldKind(FieldType.BOOL, value.bracketed)
+    if isinstance(items[0], str):
+        return FieldKind(FieldType.STRING, value.bracketed)
+    if value.bracketed:
+        return FieldKind(FieldType.FLOAT, True)
+    by_width = {2: FieldType.VEC2F, 3: FieldType.VEC3F, 4: FieldType.ROTATION}
+    # Nothing is wider than a rotation: more numbers are several values.
+    return FieldKind(by_width.get(len(items), FieldType.FLOAT), len(items) > max(by_width))

@@ -16,11 +16,11 @@ answered, but its messages never come. Without, the messages of the one before g
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from palaestra_sim.errors import SimError
 from palaestra_sim.stub.arguments import Arguments
-from palaestra_sim.stub.nodes import SceneTree
+from palaestra_sim.stub.host import Host
 from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
 from palaestra_sim.stub.seam import Handler, Node, Publisher, Service
@@ -37,9 +37,7 @@ from palaestra_sim.stub.services.sensors import (
 from palaestra_sim.stub.services.supervisor import SupervisorServices
 from palaestra_sim.stub.simulation import Mode, Simulation
 from palaestra_sim.stub.stepping import Stepping
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.stub.tree import SceneTree
 
 _MODEL_NAME = "/model_name"
 _CLOCK = "/clock"
@@ -52,12 +50,10 @@ class Controller:
         blocked: whether a step is pending, so that every other request has to wait.
     """
 
-    def __init__(
-        self, host: Simulator, stepping: Stepping, tree: SceneTree, robot: Robot, node: Node
-    ) -> None:
-        self.host = host
+    def __init__(self, host: Host, stepping: Stepping, tree: SceneTree, robot: Robot, node: Node) -> None:
+        self._host = host
         self.simulation: Simulation = tree.simulation
-        self.tree = tree
+        self._tree = tree
         self.robot = robot
         self.node = node
         self.blocked = False
@@ -90,12 +86,13 @@ class Controller:
         model_name.send({"data": node.name})
         if self._arguments.clock:
             self._clock = node.advertise(_CLOCK, "rosgraph_msgs/Clock")
-        services = RobotServices(self)
+        services = RobotServices(self._host, self.simulation, self.robot)
         self._serve(Service("robot/time_step", "webots_ros/set_int", self._time_step))
         self._serve(*services.table())
         if self.robot.parts.node.flag("supervisor", False):
-            for group in (SupervisorServices, NodeServices, FieldServices):
-                self._serve(*group(self).table())
+            self._serve(*SupervisorServices(self._host, self._tree, self.robot).table())
+            self._serve(*NodeServices(self._host, self._tree).table())
+            self._serve(*FieldServices(self._tree).table())
         self._serve_devices()
         if self._arguments.auto_publish:
             for feed in self._feeds.values():

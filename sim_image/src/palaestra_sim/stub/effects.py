@@ -5,12 +5,10 @@ Webots would give it an effect, so a client that randomizes a world would train 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from palaestra_sim.errors import SimError
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.nodes import SceneNode
+from palaestra_sim.stub.nodes import SceneNode
 
 # Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
 _ACTING: Final = frozenset(
@@ -40,19 +38,15 @@ class UnsimulatedError(SimError, NotImplementedError):
     """What is asked for works in Webots, and not here."""
 
 
-def require_effect(node: SceneNode, field: str, *, outline: bool) -> None:
-    """Return if a write of a node's field does what it does in Webots.
-
-    Args:
-        node: whose field it is.
-        field: the name.
-        outline: whether the node is part of a boundingObject.
+def require_effect(node: SceneNode, field: str) -> None:
+    """Return if a write of the node's field `field` has the effect that it has in Webots.
 
     Raises:
         UnsimulatedError: it would have no effect.
     """
-    if outline or not (_is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)):
-        part = " of a boundingObject" if outline else ""
+    takes_effect = _is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)
+    if node.outline or not takes_effect:
+        part = " of a boundingObject" if node.outline else ""
         raise UnsimulatedError(
             f"the stub cannot change {node.type_name}.{field}{part} while it runs;"
             " write it into the world file, or use driver webots"

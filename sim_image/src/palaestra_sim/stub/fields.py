@@ -10,16 +10,14 @@ As in Webots, a value that the field cannot hold is ignored without an error.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from palaestra_sim.errors import SimError
 from palaestra_sim.stub.catalogue import WIDTH, FieldKind, FieldType
 from palaestra_sim.stub.effects import require_effect, require_true_value
 from palaestra_sim.stub.geometry import AxisAngle
-from palaestra_sim.world import Node, Value
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.nodes import SceneNode, SceneTree
+from palaestra_sim.stub.nodes import SceneNode
+from palaestra_sim.stub.simulation import Simulation
 
 
 class NoValueError(SimError, LookupError):
@@ -30,19 +28,18 @@ class Field:
     """One field of one node.
 
     Attributes:
-        handle: for clients.
-        node: whose field it is.
+        handle: for clients; the tree sets it.
+        node: the node that has it.
         name: as in the world file.
         kind: what it holds.
     """
 
-    def __init__(self, tree: SceneTree, node: SceneNode, name: str, kind: FieldKind) -> None:
-        self.handle = tree.new_handle(self)
+    def __init__(self, node: SceneNode, name: str, kind: FieldKind, simulation: Simulation) -> None:
+        self.handle = 0
         self.node = node
         self.name = name
         self.kind = kind
-        self._tree = tree
-        self._simulation = tree.simulation
+        self._simulation = simulation
         self._values = _initial(node, name, kind)
         self._writes = 0  # written, not yet seen by the simulation
 
@@ -114,7 +111,7 @@ class Field:
         return True
 
     def _require_effect(self) -> None:
-        require_effect(self.node, self.name, outline=self._tree.is_outline(self.node))
+        require_effect(self.node, self.name)
 
     def _current(self) -> list[Any]:
         """Return the values: as written last, else as the simulation has them."""
@@ -144,22 +141,6 @@ class Field:
         else:
             return
         self._simulation.moved(node.place)
-
-
-def guessed_kind(value: Value) -> FieldKind:
-    """Return the kind of a field that only its value in the world file tells about."""
-    items = value.items
-    if not items or items[0] is None or isinstance(items[0], Node):
-        return FieldKind(FieldType.NODE, value.bracketed)
-    if isinstance(items[0], bool):
-        return FieldKind(FieldType.BOOL, value.bracketed)
-    if isinstance(items[0], str):
-        return FieldKind(FieldType.STRING, value.bracketed)
-    if value.bracketed:
-        return FieldKind(FieldType.FLOAT, True)
-    by_width = {2: FieldType.VEC2F, 3: FieldType.VEC3F, 4: FieldType.ROTATION}
-    # Nothing is wider than a rotation: more numbers are several values.
-    return FieldKind(by_width.get(len(items), FieldType.FLOAT), len(items) > max(by_width))
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:

@@ -13,12 +13,12 @@ from pathlib import Path
 from palaestra_sim.errors import WorldError
 from palaestra_sim.stub.arguments import Arguments
 from palaestra_sim.stub.controller import Controller
-from palaestra_sim.stub.nodes import SceneTree
 from palaestra_sim.stub.options import StubOptions
 from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.seam import Node
 from palaestra_sim.stub.simulation import Mode, Simulation
 from palaestra_sim.stub.stepping import Stepping
+from palaestra_sim.stub.tree import SceneTree
 
 MakeNode = Callable[[str], Node]
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from palaestra_sim.stub.host import Host
+from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Handler, Service
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.controller import Controller
+from palaestra_sim.stub.simulation import Simulation
 
 Fields = dict[str, Any]
 Row = tuple[str, str, Handler]
@@ -18,10 +18,10 @@ Row = tuple[str, str, Handler]
 class RobotServices:
     """The services of one robot about itself, but for `time_step` and `get_device_list`."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
-        self._simulation = controller.simulation
-        self._robot = controller.robot
+    def __init__(self, host: Host, simulation: Simulation, robot: Robot) -> None:
+        self._host = host
+        self._simulation = simulation
+        self._robot = robot
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
@@ -32,7 +32,7 @@ class RobotServices:
 
     def _constants(self) -> Iterator[Row]:
         node = self._robot.parts.node
-        world_path = self._controller.host.world_path
+        world_path = self._host.world_path
         for name, type_name, value in (
             ("get_model", "get_string", node.text("model") or ""),
             ("get_mode", "get_int", 0),
@@ -61,7 +61,7 @@ class RobotServices:
         )
 
     def device_list(self) -> Service:
-        """Return the service that is advertised last, so that whoever finds it finds all."""
+        """Return the service that is advertised last, so that a client that finds it finds all."""
         names = list(self._robot.parts.devices.order)
         return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
 

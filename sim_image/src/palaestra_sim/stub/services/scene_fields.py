@@ -10,15 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from palaestra_sim.stub.catalogue import FieldType
 from palaestra_sim.stub.fields import Field, NoValueError, quaternion_to_axis_angle
 from palaestra_sim.stub.geometry import axis_angle_to_quaternion
 from palaestra_sim.stub.seam import Handler, Service
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.controller import Controller
+from palaestra_sim.stub.tree import SceneTree
 
 Fields = dict[str, Any]
 
@@ -61,8 +59,8 @@ _CODECS: Final = {
 class FieldServices:
     """The services of one supervisor that take a field's handle."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._tree = controller.tree
+    def __init__(self, tree: SceneTree) -> None:
+        self._tree = tree
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""

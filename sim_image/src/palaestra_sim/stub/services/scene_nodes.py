@@ -6,17 +6,16 @@ instead of a success that did nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from palaestra_sim.stub.effects import require_true_value
 from palaestra_sim.stub.geometry import Pose, to_quaternion, transposed
+from palaestra_sim.stub.host import Host
 from palaestra_sim.stub.nodes import SceneNode
 from palaestra_sim.stub.places import Place
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Handler, Service
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.controller import Controller
+from palaestra_sim.stub.tree import SceneTree
 
 Fields = dict[str, Any]
 Row = tuple[str, str, Handler]
@@ -25,9 +24,9 @@ Row = tuple[str, str, Handler]
 class NodeServices:
     """The services of one supervisor that take a node's handle."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
-        self._tree = controller.tree
+    def __init__(self, host: Host, tree: SceneTree) -> None:
+        self._host = host
+        self._tree = tree
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
@@ -153,7 +152,8 @@ class NodeServices:
         return {"success": 1}
 
     def _get_field(self, request: Any) -> Fields:
-        field = self._node(request).field(request.fieldName) if not request.proto else None
+        node = self._node(request)
+        field = self._tree.field_of(node, request.fieldName) if not request.proto else None
         return {"field": 0 if field is None else field.handle}
 
     def _get_field_by_index(self, request: Any) -> Fields:
@@ -161,7 +161,7 @@ class NodeServices:
         names = list(node.kinds)
         if request.proto or request.index >= len(names):
             return {"field": 0}
-        field = node.field(names[request.index])
+        field = self._tree.field_of(node, names[request.index])
         return {"field": 0 if field is None else field.handle}
 
     def _get_number_of_fields(self, request: Any) -> Fields:
@@ -171,7 +171,7 @@ class NodeServices:
     def _export_string(self, request: Any) -> Fields:
         """Answer the node as the world file has it."""
         node = self._node(request)
-        source = self._controller.simulation.world.source
+        source = self._tree.simulation.world.source
         start, end = node.source.span if node.source is not None else (0, len(source))
         return {"value": source[start:end].decode()}
 
@@ -184,7 +184,7 @@ class NodeServices:
     def _restart_controller(self, request: Any) -> Fields:
         node = self._node(request)
         if node.robot is not None:
-            self._controller.host.restart(node.robot)
+            self._host.restart(node.robot)
         return {"success": int(node.robot is not None)}
 
     def _accept(self, request: Any) -> Fields:

@@ -6,15 +6,15 @@ There is no rendering here, so pictures, movies and animations fail, as in Webot
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from palaestra_sim.stub.host import Host
 from palaestra_sim.stub.nodes import SceneNode
+from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Service
 from palaestra_sim.stub.simulation import Mode
-
-if TYPE_CHECKING:
-    from palaestra_sim.stub.controller import Controller
+from palaestra_sim.stub.tree import SceneTree
 
 Fields = dict[str, Any]
 
@@ -22,10 +22,11 @@ Fields = dict[str, Any]
 class SupervisorServices:
     """The services of one supervisor that act on the whole simulation."""
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
-        self._simulation = controller.simulation
-        self._tree = controller.tree
+    def __init__(self, host: Host, tree: SceneTree, robot: Robot) -> None:
+        self._host = host
+        self._simulation = tree.simulation
+        self._tree = tree
+        self._robot = robot
         self._movie_asked = False
 
     def table(self) -> tuple[Service, ...]:
@@ -60,7 +61,7 @@ class SupervisorServices:
         )
 
     def _quit(self, request: Any) -> Fields:
-        self._controller.host.quit(request.value)
+        self._host.quit(request.value)
         return {"success": True}
 
     def _reset(self, _request: Any) -> Fields:
@@ -72,11 +73,11 @@ class SupervisorServices:
         return {"value": True}
 
     def _reload(self, _request: Any) -> Fields:
-        self._controller.host.reload()
+        self._host.reload()
         return {"value": True}
 
     def _load(self, request: Any) -> Fields:
-        return {"success": self._controller.host.load(request.value)}
+        return {"success": self._host.load(request.value)}
 
     def _get_mode(self, _request: Any) -> Fields:
         return {"value": int(self._simulation.mode)}
@@ -84,7 +85,7 @@ class SupervisorServices:
     def _set_mode(self, request: Any) -> Fields:
         known = request.value in set(Mode)
         if known:
-            self._controller.host.set_mode(Mode(request.value))
+            self._host.set_mode(Mode(request.value))
         return {"success": known}
 
     def _start_movie(self, _request: Any) -> Fields:
@@ -98,7 +99,7 @@ class SupervisorServices:
         return {"value": self._tree.root.handle}
 
     def _get_self(self, _request: Any) -> Fields:
-        return {"value": self._tree.of_robot(self._controller.robot).handle}
+        return {"value": self._tree.of_robot(self._robot).handle}
 
     def _get_from_def(self, request: Any) -> Fields:
         """Look for a DEF anywhere; there are no PROTOs here, so inside one (`proto`) there is none."""
@@ -108,7 +109,7 @@ class SupervisorServices:
         return _handle(self._tree.of_number(request.id))
 
     def _get_from_device(self, request: Any) -> Fields:
-        node = self._tree.of_device(self._controller.robot, request.value)
+        node = self._tree.of_device(self._robot, request.value)
         if node is None:
             raise ServiceFailed(f"no device {request.value!r}; get_device_list tells the names")
         return _handle(node)
