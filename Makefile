@@ -6,7 +6,7 @@ SHELL := /bin/bash
 BIN := .venv/bin
 PACKAGES := operator trainer sim_image
 SOURCES := operator/src trainer/src sim_image/src
-WEBOTS_ROS := $(addprefix sim_image/src/palaestra_sim/,protocol/ros_definitions.txt message_package/files.py)
+WEBOTS_ROS := $(addprefix sim_image/src/,palaestra_protocol/ros/definitions.txt palaestra_sim/message_package/files.py)
 JOB := manifests/examples/move-to-target.yaml
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from typing import BinaryIO
 
 from palaestra.plan.layout import STATUS_PORT
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_protocol.pod.status import TrainerStatus
 
 HEAD = b"HTTP/1.0 200 OK\r\nContent-Type: application/json\r\n"
 

@@ -2,7 +2,7 @@
 
 import time
 
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_protocol.pod.status import TrainerStatus
 from tests.bench import crowd
 from tests.integration.operator.cluster import Place
 from tests.integration.operator.installed import READS, asked

@@ -11,7 +11,7 @@ import time
 import genpy
 import rospy
 
-from palaestra_sim.protocol.rostypes import service_type
+from palaestra_protocol.ros.rostypes import service_type
 from tests.bench.arena import running
 
 ROUNDS = 5

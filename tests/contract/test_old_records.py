@@ -18,7 +18,7 @@ from palaestra.local import rundir
 from palaestra.local.outcome import Outcome
 from palaestra.plan import ClusterLayout, Images, LocalLayout, identified, plan
 from palaestra.view.describe import describe
-from palaestra_sim.protocol.status import Termination, TrainerStatus
+from palaestra_protocol.pod.status import Termination, TrainerStatus
 from palaestra_trainer import checkpoint
 from palaestra_trainer import configuration as trainer
 from palaestra_trainer.run_directory import RunDirectory

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.definitions import type_names
-from palaestra_sim.protocol.rostypes import message_type, service_type
-from palaestra_sim.protocol.tcpros import frame
+from palaestra_protocol.ros.definitions import type_names
+from palaestra_protocol.ros.rostypes import message_type, service_type
+from palaestra_protocol.ros.tcpros import frame
 
 MD5 = json.loads(Path(__file__).with_name("ros_md5.json").read_text())
 MESSAGES, SERVICES = type_names()

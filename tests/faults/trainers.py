@@ -8,7 +8,7 @@ import time
 from dataclasses import replace
 from typing import BinaryIO
 
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_protocol.pod.status import TrainerStatus
 from tests.faults.course import Course
 from tests.faults.plans import Kind
 from tests.faults.requests import ANSWER, Asked

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from palaestra.cluster import Api, ApiError
 from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NAMESPACES, PODS, TRAINING_JOBS
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from tests.faults.course import Course
 from tests.faults.trainers import Trainer
 from tests.integration.operator.cluster import Place, world_map, world_of

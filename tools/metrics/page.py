@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from palaestra.api.marks import between_marks
 from palaestra.operator import families as operator
-from palaestra_sim.protocol.metrics import Family, Kind, Label
+from palaestra_protocol.metrics import Family, Kind, Label
 from palaestra_sim.sidecar import families as sidecar
 from palaestra_trainer import families as trainer
 

@@ -5,7 +5,6 @@
     │   └── WorldRefusedError   it has several mistakes; the message lists them all
     ├── UnknownWorldError       no shipped world has that name: retrying cannot help
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
-    ├── ProtocolError           a message is not as agreed (protocol.fields)
     ├── SidecarError            the sidecar cannot run as asked (sidecar.errors)
     ├── FaultError              the description of a fault is wrong (stub.faults.language)
     ├── NoSuchHandleError       this load of the world has no such node (stub.nodes)

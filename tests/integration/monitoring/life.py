@@ -1,6 +1,6 @@
 """What happens in the cluster that is scraped."""
 
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from tests.integration.operator.cluster import Place
 from tests.integration.operator.operators import RunningOperator
 from tests.waiting import eventually

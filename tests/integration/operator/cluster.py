@@ -16,7 +16,7 @@ from palaestra.cluster.resources import (
     PODS,
     TRAINING_JOBS,
 )
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from palaestra_sim.world import builtin
 from tests.waiting import DEADLINE_S, TooLate, eventually
 

@@ -5,7 +5,7 @@ import pytest
 from palaestra.cluster import Resource
 from palaestra.cluster.resources import JOBS, PODS, TRAINING_JOBS
 from palaestra.observe.jobs import REPLACED
-from palaestra_sim.protocol.status import FaultRecord, Termination
+from palaestra_protocol.pod.status import FaultRecord, Termination
 from tests.waiting import eventually
 
 FAULT = FaultRecord(

@@ -8,7 +8,7 @@ import pytest
 from palaestra.cluster.resources import JOBS, LEASES, PODS
 from palaestra.operator.options import DEFAULT_NAMESPACE as NAMESPACE
 from palaestra.operator.options import NAME
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from tests.waiting import eventually
 
 DONE = Termination(step=20, reason="Completed", success_rate=0.9)

@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.cluster.resources import CLAIMS, CONFIG_MAPS, JOBS, PODS, TRAINING_JOBS
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from tests.integration.operator.cluster import stranger, world_map, world_of
 from tests.waiting import eventually
 

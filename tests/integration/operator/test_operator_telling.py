@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from palaestra_sim.protocol.status import CheckpointStatus, SimulatorStatus, TrainerStatus
+from palaestra_protocol.pod.status import CheckpointStatus, SimulatorStatus, TrainerStatus
 from tests.integration.operator.installed import USER
 from tests.metrics import complaints, documented, served
 from tests.trainer_status import serving

@@ -7,8 +7,8 @@ import xmlrpc.client
 
 import pytest
 
-from palaestra_sim.protocol.rostypes import message_type, service_type
-from palaestra_sim.protocol.tcpros import FrameReader, decode_header, encode_header, frame
+from palaestra_protocol.ros.rostypes import message_type, service_type
+from palaestra_protocol.ros.tcpros import FrameReader, decode_header, encode_header, frame
 from palaestra_sim.stub.ros import LATER
 from palaestra_trainer.ros import Master
 

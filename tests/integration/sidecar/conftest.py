@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.control import SidecarState, SimulatorState
+from palaestra_protocol.control import SidecarState, SimulatorState
 from palaestra_sim.sidecar.signals import EXIT_HUNG
 from palaestra_sim.world import builtin
 from tests import waiting

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from palaestra_sim.protocol.control import LastExit, SidecarState
+from palaestra_protocol.control import LastExit, SidecarState
 from palaestra_sim.sidecar.keeper import children
 from palaestra_sim.sidecar.signals import SHUTDOWN_S
 from palaestra_sim.sidecar.simulator import SHUTDOWN_GRACE_S

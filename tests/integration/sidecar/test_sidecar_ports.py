@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.control import SidecarState
+from palaestra_protocol.control import SidecarState
 from palaestra_sim.sidecar.keeper import children
 
 BUSY = """

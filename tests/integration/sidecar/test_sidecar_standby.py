@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
+from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar.keeper import children
 from palaestra_sim.world import RunIdentity, robots, ros_name
 from tests.integration.sidecar.conftest import ENDS, was_seen

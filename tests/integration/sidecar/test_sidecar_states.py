@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from palaestra_sim.protocol.control import SidecarState, SimulatorState
+from palaestra_protocol.control import SidecarState, SimulatorState
 from palaestra_sim.sidecar.lifecycle import Event
 from palaestra_sim.sidecar.process import Command
 from palaestra_sim.sidecar.simulator import Simulator

@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
+from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
 
 IDLE, STARTING, READY, STOPPING, FAILED = SidecarState
 

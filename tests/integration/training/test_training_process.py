@@ -11,7 +11,7 @@ import signal
 
 import pytest
 
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 
 DEADLINE_S = 120.0
 PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.definitions import type_names
-from palaestra_sim.protocol.rostypes import message_type, service_type
+from palaestra_protocol.ros.definitions import type_names
+from palaestra_protocol.ros.rostypes import message_type, service_type
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]

@@ -11,7 +11,7 @@ import gymnasium
 import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
-from palaestra_sim.protocol.control import SidecarState
+from palaestra_protocol.control import SidecarState
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
 from palaestra_trainer.launching.process import ProcessLauncher

@@ -29,7 +29,7 @@ from palaestra.decide import (
 )
 from palaestra.observe import Objects, Polled, observe, references
 from palaestra.plan import ClusterLayout, Images
-from palaestra_sim.protocol.status import SimulatorStatus, Termination, TrainerStatus
+from palaestra_protocol.pod.status import SimulatorStatus, Termination, TrainerStatus
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)

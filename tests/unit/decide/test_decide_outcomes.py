@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.api.status import Phase
-from palaestra_sim.protocol.status import SuccessInterval
+from palaestra_protocol.pod.status import SuccessInterval
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from palaestra.api.status import Phase
 from palaestra.decide import Create, Times, accept, as_data, decide, prepare
 from palaestra.observe import Objects, Polled, observe, trimmed
 from palaestra.plan import ClusterLayout, Images
-from palaestra_sim.protocol.status import (
+from palaestra_protocol.pod.status import (
     Cause,
     FaultKind,
     FaultRecord,

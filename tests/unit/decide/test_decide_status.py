@@ -9,7 +9,7 @@ from palaestra.api.history import Faults, Goodput
 from palaestra.api.status import ConditionStatus, Phase
 from palaestra.decide import accept, prepare
 from palaestra.observe import Objects, observe
-from palaestra_sim.protocol.status import (
+from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
     FaultKind,

@@ -7,9 +7,9 @@ import genmsg.gentools
 import genmsg.msg_loader
 import pytest
 
+from palaestra_protocol.ros.definitions import type_names
+from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_sim.message_package.files import package_files
-from palaestra_sim.protocol.definitions import type_names
-from palaestra_sim.protocol.rostypes import message_type, service_type
 
 FILES = dict(package_files())
 MESSAGES, SERVICES = ([name for name in names if name.startswith("webots_ros/")] for names in type_names())

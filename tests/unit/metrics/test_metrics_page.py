@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from palaestra_sim.protocol.metrics import PREFIX, Kind
+from palaestra_protocol.metrics import PREFIX, Kind
 from tools.metrics import page
 
 PAGE = Path(__file__).parents[3] / page.PAGE

@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra.observe import ContainerKind
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 
 
 def state(name, **status):

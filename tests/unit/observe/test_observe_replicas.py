@@ -7,7 +7,7 @@ import pytest
 
 from palaestra.api.status import PodReference, ReplicaStatus
 from palaestra.observe import JobEnd, Objects, Polled, observe, trimmed
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_protocol.pod.status import TrainerStatus
 
 NOW = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 

@@ -10,7 +10,7 @@ from structlog.testing import capture_logs
 
 from palaestra.operator.poller import MOST_BYTES, Poller
 from palaestra.operator.schedule import Target
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_protocol.pod.status import TrainerStatus
 
 JOB = ("robots", "job")
 STATUS = TrainerStatus(step=7, target=10, episodes=1, phase="collecting")

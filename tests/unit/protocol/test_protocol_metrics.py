@@ -7,7 +7,7 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 from prometheus_client.registry import Collector
 
-from palaestra_sim.protocol.metrics import Family, Kind, Label, Tally
+from palaestra_protocol.metrics import Family, Kind, Label, Tally
 
 MOST_S = 2e-6
 

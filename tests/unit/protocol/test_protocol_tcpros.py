@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.protocol.tcpros import (
+from palaestra_protocol.ros.tcpros import (
     MAX_FRAME_BYTES,
     FrameReader,
     FramingError,

@@ -5,7 +5,7 @@ from itertools import product
 
 import pytest
 
-from palaestra_sim.protocol.control import SidecarState
+from palaestra_protocol.control import SidecarState
 from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.lifecycle import TABLE, Action, Event
 

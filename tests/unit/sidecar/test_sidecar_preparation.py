@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import WorldError
-from palaestra_sim.protocol.control import RobotName
 from palaestra_sim.sidecar import preparation
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.world import RunIdentity, builtin, ros_name

@@ -11,7 +11,7 @@ from collections import deque
 
 import pytest
 
-from palaestra_sim.protocol.rostypes import service_type
+from palaestra_protocol.ros.rostypes import service_type
 from palaestra_sim.stub.options import StubOptions
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
 from palaestra_sim.stub.simulation import Mode

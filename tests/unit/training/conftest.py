@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from palaestra_trainer.configuration import Configuration, parse
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault
 from palaestra_trainer.run import training

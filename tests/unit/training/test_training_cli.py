@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from palaestra_trainer import cli
 from palaestra_trainer.errors import FaultBudgetSpent, MasterLost, SimulatorHung
 

@@ -7,7 +7,7 @@ import io
 import pytest
 from structlog.testing import capture_logs
 
-from palaestra_sim.protocol.status import SimulatorStatus, TrainerStatus
+from palaestra_protocol.pod.status import SimulatorStatus, TrainerStatus
 from palaestra_trainer.telemetry.display import Bar, Lines, for_stream
 
 STATUS = TrainerStatus(

@@ -12,7 +12,7 @@ import threading
 import pytest
 import structlog
 
-from palaestra_sim.protocol.status import Cause, ExitCode, Termination
+from palaestra_protocol.pod.status import Cause, ExitCode, Termination
 from palaestra_trainer.errors import (
     ConfigurationError,
     Diverged,

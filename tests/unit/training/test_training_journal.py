@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer import checkpoint
 from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.run.journal import Journal

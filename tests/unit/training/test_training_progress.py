@@ -10,7 +10,7 @@ import urllib.request
 
 import pytest
 
-from palaestra_sim.protocol.status import Cause, TrainerStatus
+from palaestra_protocol.pod.status import Cause, TrainerStatus
 from palaestra_trainer.episodes.evaluation import Episode, Evaluation
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.telemetry.progress import Counters, Progress

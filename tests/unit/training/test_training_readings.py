@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from palaestra_sim.protocol.rostypes import message_type
+from palaestra_protocol.ros.rostypes import message_type
 from palaestra_trainer.webots.readings import BOOL, FLOAT64, RANGE, Reading
 
 KINDS = {

@@ -12,7 +12,7 @@ from urllib.request import urlopen
 import pytest
 import yaml
 
-from palaestra_sim.protocol.status import Termination, TrainerStatus
+from palaestra_protocol.pod.status import Termination, TrainerStatus
 from palaestra_trainer import report
 
 LONG_S = 60

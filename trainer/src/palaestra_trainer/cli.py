@@ -13,8 +13,8 @@ from typing import Any
 
 import structlog
 
-from palaestra_sim.protocol.status import ExitCode, Termination
-from palaestra_sim.typed import whole
+from palaestra_protocol.numbers import whole
+from palaestra_protocol.pod.status import ExitCode, Termination
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word

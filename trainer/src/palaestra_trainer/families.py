@@ -6,8 +6,8 @@ simulators begin at 0 with each attempt. Prometheus adds the labels of job and r
 
 from __future__ import annotations
 
-from palaestra_sim.protocol.metrics import Family, Label, counter, gauge, histogram
-from palaestra_sim.protocol.status import Cause, FaultKind, SimulatorRole
+from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
+from palaestra_protocol.pod.status import Cause, FaultKind, SimulatorRole
 
 # The scale of returns is not known in advance, and they are often negative. So the buckets are the same on
 # both sides of 0, and each is at most two and a half times as wide as the one before.

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from palaestra.api.fields import Count, Listed, Sentence, Word
 from palaestra.api.model import Reported
-from palaestra_sim.protocol.status import MOST_FAULTS, MOST_LINE, MOST_LINES
+from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES
 
 Line = Annotated[str, Field(max_length=MOST_LINE)]
 Seconds = Annotated[int, Field(ge=0, le=2_000_000_000)]

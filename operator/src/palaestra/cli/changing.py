@@ -7,7 +7,7 @@ from palaestra.api.storage import Retain
 from palaestra.cli.cluster import cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client
-from palaestra_sim.typed import seconds
+from palaestra_protocol.numbers import seconds
 
 SUSPEND = """\
 Sets spec.suspend of TrainingJobs to true: the pods save a checkpoint and are deleted. Refuses a job with a

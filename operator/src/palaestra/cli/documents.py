@@ -11,7 +11,7 @@ from palaestra.cli.parsing import Commands, command
 from palaestra.local.rundir import job_directory, uid_of
 from palaestra.plan import ClusterLayout, Images, Layout, LocalLayout, identified, plan
 from palaestra.plan.text import as_yaml
-from palaestra_sim.typed import whole
+from palaestra_protocol.numbers import whole
 from palaestra_sim.world import RunIdentity, generate
 
 UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # stands for the uid that a cluster gives

@@ -8,7 +8,7 @@ from palaestra.cli.parsing import Commands
 from palaestra.client import Client
 from palaestra.client.client import FETCH_S
 from palaestra.local.outcome import uses
-from palaestra_sim.typed import seconds, whole
+from palaestra_protocol.numbers import seconds, whole
 
 FETCH = """\
 Copies policy, evaluations and TensorBoard data of a run to <dir>/<job>/<replica>/. This folder must not exist

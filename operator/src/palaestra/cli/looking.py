@@ -13,7 +13,7 @@ from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
 from palaestra.plan.text import as_yaml
 from palaestra.view import describe, happened, server_table
-from palaestra_sim.typed import seconds, whole
+from palaestra_protocol.numbers import seconds, whole
 
 READS = "Reads the cluster and changes nothing.\n"
 GET = f"""\

@@ -9,7 +9,7 @@ from palaestra.cluster import own_namespace
 from palaestra.operator.options import DEFAULT_NAMESPACE, Options, address
 from palaestra.operator.run import run
 from palaestra.plan import Images
-from palaestra_sim.typed import seconds, whole
+from palaestra_protocol.numbers import seconds, whole
 
 OPERATOR = """\
 Watches the TrainingJobs of a cluster, creates the objects that they need, and writes their status. Reads the

@@ -7,7 +7,7 @@ from pathlib import Path
 from palaestra.cli.files import add_dir, job
 from palaestra.cli.parsing import Commands, command
 from palaestra.local.run import Options, run
-from palaestra_sim.typed import MOST_PORT, whole
+from palaestra_protocol.numbers import MOST_PORT, whole
 
 RUN = """\
 Trains as the TrainingJob in FILE specifies, and writes <dir>/<job name>/<replica>/: checkpoints/,

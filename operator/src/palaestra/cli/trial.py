@@ -10,7 +10,7 @@ from palaestra.cli.parsing import Commands
 from palaestra.client import Client, asked
 from palaestra.errors import PalaestraError, SpecErrors
 from palaestra.trial import TrialFailed, attempt
-from palaestra_sim.typed import seconds
+from palaestra_protocol.numbers import seconds
 
 TRY = """\
 Creates the TrainingJob in FILE under a unique name, waits until it has ended, and deletes it in any case.

@@ -14,7 +14,7 @@ from palaestra.cli.parsing import Commands
 from palaestra.client import Client, why
 from palaestra.client.reading import current
 from palaestra.view import History, live, progress
-from palaestra_sim.typed import seconds
+from palaestra_protocol.numbers import seconds
 
 WATCH = """\
 Shows the progress of a TrainingJob, with a line for each figure of each replica, until the job has ended;

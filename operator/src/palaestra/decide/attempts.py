@@ -15,7 +15,7 @@ from palaestra.decide.suspending import ended_by_suspension, suspended_by
 from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, storage_eviction
 from palaestra.observe.views import JobView, PodView
 from palaestra.plan.replica import TRAINER
-from palaestra_sim.protocol.status import ExitCode, Termination
+from palaestra_protocol.pod.status import ExitCode, Termination
 
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # what a deletion may lead to
 GONE = "its pod is gone; no last word"

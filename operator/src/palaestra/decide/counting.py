@@ -25,7 +25,7 @@ from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase, PodReference, ReplicaStatus, Restarts
 from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import JobView, PodView, ReplicaObserved
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 
 MOST_UNSEEN = 100  # pods that a trainer's record may have and nobody saw: a record is not to be trusted
 # The Job controller makes the pod first and takes the time of the resumption then; both are whole seconds.

@@ -20,8 +20,8 @@ from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation
 from palaestra.decide.times import Wait
 from palaestra.observe.reading import MOST_COUNT, as_time
-from palaestra_sim.protocol import status as protocol
-from palaestra_sim.protocol.status import Cause, CheckpointStatus, Termination, TrainerStatus
+from palaestra_protocol.pod import status as protocol
+from palaestra_protocol.pod.status import Cause, CheckpointStatus, Termination, TrainerStatus
 
 EVALUATING = "evaluating"  # the trainer's phase while nothing is learned from
 LONGEST_NAME = 63  # of a simulator; those of our plan have 23 characters at most

@@ -16,7 +16,7 @@ from palaestra.decide.situation import Situation, Verdict
 from palaestra.decide.troubles import left_by
 from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra.observe.views import PodView
-from palaestra_sim.protocol.status import MOST_FAULTS, MOST_LINE, MOST_LINES, FaultRecord
+from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, FaultRecord
 
 
 def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | None:

@@ -16,7 +16,7 @@ from palaestra.decide.suspending import ended_by_suspension
 from palaestra.decide.times import Wait
 from palaestra.observe.views import ContainerKind, ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
-from palaestra_sim.protocol.status import SimulatorStatus, Termination
+from palaestra_protocol.pod.status import SimulatorStatus, Termination
 
 LOST_AFTER_S = 30  # past the moment at which a deleted pod was to be gone
 CRASHES = 3  # of one sidecar, before they are called a loop

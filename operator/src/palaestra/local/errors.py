@@ -9,7 +9,7 @@ LocalError              one line for a person, and the exit code of `palaestra r
 import signal
 
 from palaestra.errors import PalaestraError
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 
 KILLED = 128 + signal.SIGINT  # the exit code after a second Ctrl-C
 

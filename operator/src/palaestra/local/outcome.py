@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Self
 
 from palaestra.local.files import write
-from palaestra_sim.protocol.status import SuccessInterval
+from palaestra_protocol.pod.status import SuccessInterval
 
 FILE = "outcome.json"
 

@@ -19,7 +19,7 @@ from palaestra.local.pod import Kubelet, RunningPod
 from palaestra.local.spec import Pod, read_pod
 from palaestra.local.volumes import mount
 from palaestra.plan import ReplicaPlan
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 
 FAILED = 1
 DEADLINE_EXCEEDED = "DeadlineExceeded"

@@ -20,7 +20,7 @@ from palaestra.local.replica import DEADLINE_EXCEEDED, Setting, meaning, run_rep
 from palaestra.local.spec import read_pod
 from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, plan
 from palaestra.plan.replica import TRAINER
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 
 SHOWN_LINES = 5  # of the trainer's log, when it failed without a last word
 

@@ -21,7 +21,7 @@ from palaestra.observe.views import (
     ReplicaObserved,
 )
 from palaestra.plan.replica import REPLICA_LABEL, UID_LABEL
-from palaestra_sim.protocol.status import ProtocolError, Termination
+from palaestra_protocol.pod.status import ProtocolError, Termination
 
 UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})  # a kubelet's events, and a controller's
 

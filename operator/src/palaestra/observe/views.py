@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Any
 
 from palaestra.plan.pod import GRACE_S
-from palaestra_sim.protocol.status import Termination, TrainerStatus
+from palaestra_protocol.pod.status import Termination, TrainerStatus
 
 Raw = Mapping[str, Any]  # an object as its JSON, of which nothing is believed
 

@@ -6,7 +6,7 @@ pods.
 
 from palaestra.api.reasons import ROWS, WAITING, Reason
 from palaestra.api.status import Phase, Restarts
-from palaestra_sim.protocol.metrics import Family, Label, counter, gauge, histogram
+from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
 
 SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
 # From a node that has all images to a queue that takes the night.

@@ -20,7 +20,7 @@ from prometheus_client.registry import Collector
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, ConditionType, Phase
 from palaestra.operator import families
-from palaestra_sim.protocol.metrics import Family, Values
+from palaestra_protocol.metrics import Family, Values
 
 Object = Mapping[str, Any]
 Counted = TypeVar("Counted", Counter, Histogram)

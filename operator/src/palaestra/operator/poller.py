@@ -18,7 +18,7 @@ import structlog
 
 from palaestra.observe import Polled
 from palaestra.operator.schedule import Entry, Schedule, Standing, Target
-from palaestra_sim.protocol.status import ProtocolError, TrainerStatus, decoded
+from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
 DEADLINE_S = 3.0  # of one answer, from the connection to its last byte

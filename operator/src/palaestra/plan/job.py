@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from palaestra.plan.replica import TRAINER, Replica
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 
 QUEUE_LABEL = "kueue.x-k8s.io/queue-name"
 SUSPEND_SET = "palaestra.dev/suspend-set"  # annotation: the spec.suspend that the operator set last

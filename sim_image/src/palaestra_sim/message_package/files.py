@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import genpy.generator
 
-from palaestra_sim.protocol import definitions
+from palaestra_protocol.ros import definitions
 
 NAME = "webots_ros"
 MANIFEST = "manifest.xml"

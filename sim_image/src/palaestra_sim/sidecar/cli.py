@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from palaestra_protocol.control import SidecarState, SimulatorState
 from palaestra_sim.errors import SimError
-from palaestra_sim.protocol.control import SidecarState, SimulatorState
 from palaestra_sim.sidecar import metrics, preparation, signals
 from palaestra_sim.sidecar.drivers import Driver, Launch, command
 from palaestra_sim.sidecar.errors import SidecarError

@@ -4,8 +4,8 @@ They are about the simulator's process. How it plays is told by the trainer, who
 simulator of which job this is is said by whoever scrapes, not here.
 """
 
-from palaestra_sim.protocol.control import SidecarState
-from palaestra_sim.protocol.metrics import Family, Label, counter, gauge
+from palaestra_protocol.control import SidecarState
+from palaestra_protocol.metrics import Family, Label, counter, gauge
 from palaestra_sim.sidecar.preparation import SLOTS
 from palaestra_sim.sidecar.simulator import FAULT_KINDS
 

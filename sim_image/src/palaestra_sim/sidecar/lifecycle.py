@@ -33,7 +33,7 @@ All decisions about states are in this file; the actions are carried out in `sim
 from enum import StrEnum
 from types import MappingProxyType
 
-from palaestra_sim.protocol.control import SidecarState
+from palaestra_protocol.control import SidecarState
 
 
 class Event(StrEnum):

@@ -7,8 +7,8 @@ from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
-from palaestra_sim.protocol.control import SidecarState
-from palaestra_sim.protocol.metrics import Family, Values
+from palaestra_protocol.control import SidecarState
+from palaestra_protocol.metrics import Family, Values
 from palaestra_sim.sidecar import families
 from palaestra_sim.sidecar.preparation import SLOTS
 from palaestra_sim.sidecar.simulator import Simulator

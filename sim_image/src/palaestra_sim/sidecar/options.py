@@ -5,16 +5,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from palaestra_protocol.numbers import whole
 from palaestra_sim.sidecar.drivers import Driver
 from palaestra_sim.sidecar.preparation import located
 from palaestra_sim.sidecar.server import Address
-from palaestra_sim.typed import whole
 
 EXIT_WRONG = 2
 
 EPILOG = """
 This program does not start the simulator by itself; POST /start on the control port does, see
-palaestra_sim.protocol.control. The simulator inherits the environment: ROS_MASTER_URI and ROS_HOSTNAME.
+palaestra_protocol.control. The simulator inherits the environment: ROS_MASTER_URI and ROS_HOSTNAME.
 
 reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import WorldError
-from palaestra_sim.protocol.control import RobotName
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots
 

@@ -18,7 +18,7 @@ from typing import Any, cast
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 
-from palaestra_sim.protocol.control import STANDBY, PlainRequest, ProtocolError, StopRequest, decoded
+from palaestra_protocol.control import STANDBY, PlainRequest, ProtocolError, StopRequest, decoded
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.sidecar.lifecycle import Event
 from palaestra_sim.sidecar.simulator import Answer, NoAnswer, Simulator
@@ -72,7 +72,7 @@ Routes = Mapping[tuple[str, str], Route]
 
 
 def control_routes(simulators: Sequence[Simulator]) -> Routes:
-    """Return what the control port can do; see `palaestra_sim.protocol.control`."""
+    """Return what the control port can do; see `palaestra_protocol.control`."""
     routes: dict[tuple[str, str], Route] = {}
     for above, simulator in zip(_ABOVE, simulators, strict=False):
         routes |= {

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from palaestra_sim.protocol.control import LastExit, SidecarState, SimulatorState
+from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar import lifecycle
 from palaestra_sim.sidecar.lifecycle import Action, Event
 from palaestra_sim.sidecar.process import Command, Ended, Process, Started, Usage

@@ -12,13 +12,13 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+from palaestra_protocol.numbers import milliseconds
 from palaestra_sim.errors import SimError, WorldRefusedError
 from palaestra_sim.stub import faults
 from palaestra_sim.stub.options import StubOptions
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.simulation import Mode
 from palaestra_sim.stub.simulator import Simulator
-from palaestra_sim.typed import milliseconds
 
 log = logging.getLogger(__name__)
 

@@ -5,8 +5,8 @@ import struct
 
 import pytest
 
-from palaestra_sim.protocol.rostypes import message_type, service_type
-from palaestra_sim.protocol.tcpros import LENGTH, FrameReader, frame
+from palaestra_protocol.ros.rostypes import message_type, service_type
+from palaestra_protocol.ros.tcpros import LENGTH, FrameReader, frame
 from palaestra_sim.stub.faults.damage import damaged_answer, damaged_message
 from palaestra_sim.stub.faults.language import parse
 

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from palaestra_sim.protocol.status import SuccessInterval
+from palaestra_protocol.pod.status import SuccessInterval
 from palaestra_trainer.episodes.intervals import wilson
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 from statistics import NormalDist
 
-from palaestra_sim.protocol.status import SuccessInterval
+from palaestra_protocol.pod.status import SuccessInterval
 
 CONFIDENCE = 0.95
 

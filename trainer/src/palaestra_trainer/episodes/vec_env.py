@@ -20,7 +20,7 @@ from stable_baselines3.common.env_util import is_wrapped
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle

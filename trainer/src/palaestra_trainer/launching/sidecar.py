@@ -8,7 +8,7 @@ import time
 from typing import Any
 from urllib.parse import urlsplit
 
-from palaestra_sim.protocol.control import (
+from palaestra_protocol.control import (
     STANDBY,
     ProtocolError,
     SidecarState,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from palaestra_sim.protocol.rostypes import service_type
-from palaestra_sim.protocol.tcpros import LENGTH
+from palaestra_protocol.ros.rostypes import service_type
+from palaestra_protocol.ros.tcpros import LENGTH
 from palaestra_trainer.errors import SimulatorDead, UnreadableAnswer, WrongData
 from palaestra_trainer.ros.master import Master
 from palaestra_trainer.ros.node import ensure_node

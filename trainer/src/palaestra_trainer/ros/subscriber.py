@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from palaestra_sim.protocol.rostypes import message_type
+from palaestra_protocol.ros.rostypes import message_type
 from palaestra_trainer.errors import (
     MasterLost,
     SimulatorDead,

@@ -12,8 +12,8 @@ import struct
 import time
 from collections.abc import Mapping
 
-from palaestra_sim.protocol import sockets
-from palaestra_sim.protocol.tcpros import LENGTH, MAX_FRAME_BYTES, FramingError, decode_header, encode_header
+from palaestra_protocol.ros import sockets
+from palaestra_protocol.ros.tcpros import LENGTH, MAX_FRAME_BYTES, FramingError, decode_header, encode_header
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung, WrongData
 from palaestra_trainer.waiting import patience
 from palaestra_trainer.waiting.waits import count_wait

@@ -16,7 +16,7 @@ from typing import Any
 import structlog
 from stable_baselines3.common.callbacks import BaseCallback
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.divergence import Learner

@@ -11,7 +11,7 @@ import threading
 from dataclasses import replace
 from functools import cache
 
-from palaestra_sim.protocol.status import Termination
+from palaestra_protocol.pod.status import Termination
 from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.run.termination import write_last_word
 from palaestra_trainer.telemetry.metrics import constants

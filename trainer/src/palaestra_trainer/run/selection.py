@@ -20,7 +20,7 @@ from typing import Any, Self
 import structlog
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.episodes.evaluation import Evaluation, evaluate_on_all
 from palaestra_trainer.episodes.seeds import CONFIRM, EVALUATE, episode_seeds

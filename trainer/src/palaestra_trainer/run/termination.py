@@ -13,7 +13,7 @@ from pathlib import Path
 
 import structlog
 
-from palaestra_sim.protocol.status import ExitCode, Termination
+from palaestra_protocol.pod.status import ExitCode, Termination
 from palaestra_trainer.errors import (
     ConfigurationError,
     Diverged,

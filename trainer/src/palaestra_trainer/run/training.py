@@ -20,7 +20,7 @@ from stable_baselines3.common.logger import configure
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 from torch.utils.tensorboard.writer import SummaryWriter
 
-from palaestra_sim.protocol.status import Cause, ExitCode, SuccessInterval, Termination
+from palaestra_protocol.pod.status import Cause, ExitCode, SuccessInterval, Termination
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.checkpoint import Checkpoint

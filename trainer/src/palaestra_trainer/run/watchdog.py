@@ -15,7 +15,7 @@ from typing import Self
 
 import structlog
 
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.run.termination import End
 from palaestra_trainer.telemetry.progress import Progress
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import structlog
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Care, Group, RestartBudget

@@ -10,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import gymnasium
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.errors import SimulatorFault
 
 Environment = gymnasium.Env[Any, Any]

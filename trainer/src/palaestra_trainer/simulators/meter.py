@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Protocol, runtime_checkable
 
-from palaestra_sim.protocol.metrics import Tally
+from palaestra_protocol.metrics import Tally
 from palaestra_trainer import families
 from palaestra_trainer.simulators.budget import RestartBudget
 from palaestra_trainer.simulators.member import Member

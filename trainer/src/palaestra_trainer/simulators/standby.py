@@ -18,7 +18,7 @@ from concurrent.futures import Future, wait
 
 import structlog
 
-from palaestra_sim.protocol.status import StandbyState
+from palaestra_protocol.pod.status import StandbyState
 from palaestra_trainer.errors import (
     FaultBudgetSpent,
     SimulatorDead,

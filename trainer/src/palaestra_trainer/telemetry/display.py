@@ -11,7 +11,7 @@ import structlog
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from palaestra_sim.protocol.status import TrainerStatus
+from palaestra_protocol.pod.status import TrainerStatus
 
 log = structlog.get_logger(__name__)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from stable_baselines3.common.logger import KVWriter
 
-from palaestra_sim.protocol.metrics import Tally
+from palaestra_protocol.metrics import Tally
 from palaestra_trainer import families
 from palaestra_trainer.episodes.evaluation import Evaluation
 from palaestra_trainer.simulators.meter import Meter

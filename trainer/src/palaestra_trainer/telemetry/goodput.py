@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
-from palaestra_sim.protocol.status import Cause
+from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.waiting.waits import waited_s
 
 TRAINING = (Cause.STEPPING, Cause.TRANSPORT, Cause.LEARNING)

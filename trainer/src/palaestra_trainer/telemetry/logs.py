@@ -11,7 +11,7 @@ from typing import Any
 
 import structlog
 
-from palaestra_sim.protocol.status import MOST_LINES
+from palaestra_protocol.pod.status import MOST_LINES
 
 _last_lines: deque[str] = deque(maxlen=MOST_LINES)
 

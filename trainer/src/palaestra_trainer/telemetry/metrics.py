@@ -16,8 +16,8 @@ from prometheus_client import CollectorRegistry, ProcessCollector
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from palaestra_sim.protocol.metrics import Family, Values
-from palaestra_sim.protocol.status import SimulatorStatus, SuccessInterval, TrainerStatus
+from palaestra_protocol.metrics import Family, Values
+from palaestra_protocol.pod.status import SimulatorStatus, SuccessInterval, TrainerStatus
 from palaestra_trainer import families
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.telemetry.figures import Figures

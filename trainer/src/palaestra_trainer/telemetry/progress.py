@@ -16,7 +16,7 @@ from statistics import fmean
 from types import MappingProxyType
 from typing import Any
 
-from palaestra_sim.protocol.status import (
+from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
     FaultKind,

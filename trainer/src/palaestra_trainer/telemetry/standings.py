@@ -6,7 +6,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from palaestra_sim.protocol.status import MOST_FAULTS, FaultKind, FaultRecord, SimulatorStatus
+from palaestra_protocol.pod.status import MOST_FAULTS, FaultKind, FaultRecord, SimulatorStatus
 from palaestra_trainer.configuration import Role
 from palaestra_trainer.families import RECYCLED
 

@@ -14,7 +14,7 @@ from typing import Self, cast
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
-from palaestra_sim.protocol.metrics import Family, Values
+from palaestra_protocol.metrics import Family, Values
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.telemetry import metrics
 from palaestra_trainer.telemetry.progress import Progress

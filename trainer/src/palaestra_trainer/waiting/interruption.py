@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-from palaestra_sim.protocol.status import ExitCode
+from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.errors import TrainerError
 from palaestra_trainer.waiting import patience
 

@@ -9,8 +9,8 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from palaestra_sim.protocol.rostypes import Codec
-from palaestra_sim.protocol.tcpros import LENGTH, frame
+from palaestra_protocol.ros.rostypes import Codec
+from palaestra_protocol.ros.tcpros import LENGTH, frame
 from palaestra_sim.stub.faults.course import Damage
 from palaestra_sim.stub.faults.kinds import WrongValue
 

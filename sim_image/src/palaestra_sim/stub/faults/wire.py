@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from palaestra_sim.protocol.rostypes import Codec
+from palaestra_protocol.ros.rostypes import Codec
 from palaestra_sim.stub.faults.course import Course, Damage, Ruling
 from palaestra_sim.stub.faults.damage import damaged_answer, damaged_message
 from palaestra_sim.stub.faults.effects import Effects

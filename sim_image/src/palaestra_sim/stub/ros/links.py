@@ -10,8 +10,8 @@ import socket
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from palaestra_sim.protocol import sockets
-from palaestra_sim.protocol.tcpros import FrameReader, FramingError, decode_header, encode_header
+from palaestra_protocol.ros import sockets
+from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.stub.ros.loop import Loop
 
 

@@ -13,8 +13,8 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from palaestra_sim.protocol.rostypes import ServiceType, message_type, service_type
-from palaestra_sim.protocol.tcpros import encode_header, frame
+from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
+from palaestra_protocol.ros.tcpros import encode_header, frame
 from palaestra_sim.stub.ros.links import Connection, Endpoint, Link, Refused
 from palaestra_sim.stub.ros.loop import Loop
 from palaestra_sim.stub.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from palaestra_sim.protocol.rostypes import MessageType
-from palaestra_sim.protocol.tcpros import LENGTH
+from palaestra_protocol.ros.rostypes import MessageType
+from palaestra_protocol.ros.tcpros import LENGTH
 from palaestra_sim.stub.ros.links import Connection, Endpoint
 
 _STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
 
-from palaestra_sim.protocol.fields import (
+from palaestra_protocol.fields import (
     MOST_NAME,
     Fields,
     ProtocolError,

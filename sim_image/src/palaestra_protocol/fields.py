@@ -18,8 +18,6 @@ from datetime import datetime
 from enum import StrEnum
 from typing import TypeVar, cast
 
-from palaestra_sim.errors import SimError
-
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
@@ -33,7 +31,7 @@ _RFC3339 = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(Z|[+-]\d\d:\d
 _TYPES = {dict: "an object", list: "a list", str: "text", bool: "true or false", type(None): "null"}
 
 
-class ProtocolError(SimError, ValueError):
+class ProtocolError(ValueError):
     """What was received is not what was agreed; the message names the field and the fact."""
 
 

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from palaestra_sim.errors import SimError
-from palaestra_sim.protocol.control import (
+from palaestra_protocol.control import (
     LastExit,
     PlainRequest,
     ProtocolError,
@@ -18,8 +17,8 @@ from palaestra_sim.protocol.control import (
     SimulatorState,
     StopRequest,
 )
-from palaestra_sim.protocol.fields import MOST_BYTES, decoded
-from palaestra_sim.protocol.status import (
+from palaestra_protocol.fields import MOST_BYTES, decoded
+from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
     ExitCode,
@@ -412,7 +411,6 @@ def test_an_end_without_code_and_signal_is_one_that_nobody_saw(state) -> None:
     assert SimulatorState.from_json(failed.to_json()).last_exit == unseen
 
 
-def test_a_protocol_error_is_one_of_this_package_and_a_value_error() -> None:
-    """So that either may be caught where it is read."""
-    assert issubclass(ProtocolError, (SimError,))
+def test_a_protocol_error_is_a_value_error() -> None:
+    """So that it may be caught with other wrong values where it is read."""
     assert issubclass(ProtocolError, ValueError)

@@ -3,8 +3,8 @@
 import pytest
 from hypothesis import strategies as st
 
-from palaestra_sim.protocol.control import LastExit, RobotName, SidecarState, SimulatorState
-from palaestra_sim.protocol.status import (
+from palaestra_protocol.control import LastExit, RobotName, SidecarState, SimulatorState
+from palaestra_protocol.pod.status import (
     Cause,
     CheckpointStatus,
     FaultKind,

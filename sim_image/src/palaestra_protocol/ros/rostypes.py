@@ -25,14 +25,14 @@ import genmsg.gentools
 import genpy
 import genpy.generator
 
-from palaestra_sim.protocol.definitions import (
+from palaestra_protocol.ros.definitions import (
     all_nested,
     context_for,
     is_defined,
     message_spec,
     service_spec,
 )
-from palaestra_sim.protocol.tcpros import frame
+from palaestra_protocol.ros.tcpros import frame
 
 _STRUCT_CODES = {
     "bool": "?",
@@ -90,7 +90,7 @@ def message_type(name: str) -> MessageType:
     """Return the message type `package/Name`.
 
     Raises:
-        KeyError: `ros_definitions.txt` has no such message.
+        KeyError: `definitions.txt` has no such message.
     """
     spec = message_spec(name)
     context = context_for(spec)
@@ -107,7 +107,7 @@ def service_type(name: str) -> ServiceType:
     """Return the service type `package/name`.
 
     Raises:
-        KeyError: `ros_definitions.txt` has no such service.
+        KeyError: `definitions.txt` has no such service.
     """
     spec = service_spec(name)
     md5 = genmsg.gentools.compute_md5(context_for(spec.request, spec.response), spec)

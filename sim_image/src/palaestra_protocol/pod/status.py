@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Self, TypeVar
 
-from palaestra_sim.protocol.control import SidecarState
-from palaestra_sim.protocol.fields import (
+from palaestra_protocol.control import SidecarState
+from palaestra_protocol.fields import (
     MOST_COUNT,
     MOST_NAME,
     Fields,
@@ -22,7 +22,7 @@ from palaestra_sim.protocol.fields import (
     decoded,
     known,
 )
-from palaestra_sim.protocol.terms import Cause, ExitCode, FaultKind, SimulatorRole, StandbyState
+from palaestra_protocol.pod.terms import Cause, ExitCode, FaultKind, SimulatorRole, StandbyState
 
 __all__ = [
     "Cause",

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.typed import milliseconds, seconds, whole
+from palaestra_protocol.numbers import milliseconds, seconds, whole
 
 
 @given(st.integers(), st.integers(-5, 5), st.none() | st.integers(5, 10))

@@ -1,6 +1,6 @@
 """The definitions of the ROS types: the text of each `.msg` and `.srv` file, and what genmsg reads in it.
 
-They stand in `ros_definitions.txt`, so no ROS package with definitions has to be installed: a message inside
+They stand in `definitions.txt`, so no ROS package with definitions has to be installed: a message inside
 another is looked up in the same table.
 """
 
@@ -32,7 +32,7 @@ def text(name: str) -> str:
     """Return the text of the type's `.msg` or `.srv` file, a field a line.
 
     Raises:
-        KeyError: `ros_definitions.txt` has no such type.
+        KeyError: `definitions.txt` has no such type.
     """
     parts = (_lines(part) for part in _table()[name].split(_PARTING))
     return f"{_PARTING}\n".join(parts)
@@ -42,7 +42,7 @@ def message_spec(name: str) -> Any:
     """Return genmsg's `MsgSpec` of a message.
 
     Raises:
-        KeyError: `ros_definitions.txt` has no such message.
+        KeyError: `definitions.txt` has no such message.
     """
     return genmsg.msg_loader.load_msg_from_string(genmsg.MsgContext.create_default(), text(name), name)
 
@@ -51,7 +51,7 @@ def service_spec(name: str) -> Any:
     """Return genmsg's `SrvSpec` of a service.
 
     Raises:
-        KeyError: `ros_definitions.txt` has no such service.
+        KeyError: `definitions.txt` has no such service.
     """
     return genmsg.msg_loader.load_srv_from_string(genmsg.MsgContext.create_default(), text(name), name)
 
@@ -91,7 +91,7 @@ def _nested(spec: Any) -> list[str]:
 
 @cache
 def _table() -> dict[str, str]:
-    table = resources.files("palaestra_sim.protocol").joinpath("ros_definitions.txt").read_text("utf-8")
+    table = resources.files("palaestra_protocol.ros").joinpath("definitions.txt").read_text("utf-8")
     lines = (line for line in table.splitlines() if line and not line.startswith("#"))
     return {name: fields for name, _, fields in (line.partition(":") for line in lines)}
 
