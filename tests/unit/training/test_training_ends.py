@@ -163,7 +163,7 @@ def progress():
 
 def test_a_stall_while_a_simulator_is_down_is_that_simulator_s(progress):
     """It is named, so that a person reads its log and not the trainer's."""
-    progress.fault("collect-0", SimulatorHung("collect-0", "no answer"))
+    progress.fault("collect-0", SimulatorHung("collect-0", "no answer"), steps_lost=0)
 
     end = stalled(progress)
 

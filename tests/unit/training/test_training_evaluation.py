@@ -8,7 +8,19 @@ from palaestra_trainer.episodes.evaluation import evaluate, evaluate_on_all
 from palaestra_trainer.errors import FaultBudgetSpent
 from palaestra_trainer.simulators.budget import Care, Group
 from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.member import Nobody
 from palaestra_trainer.waiting.interruption import Interrupted
+
+
+class Losses(Nobody):
+    """A watcher that adds up the steps of episodes that faults cut."""
+
+    steps = 0
+
+    def fault(self, simulator, fault, steps_lost):
+        """Add them."""
+        del simulator, fault
+        self.steps += steps_lost
 
 
 class Walker:
@@ -38,12 +50,12 @@ def test_every_seed_is_an_episode(make_member):
 
 def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
     """All policies are measured on the same episodes, whatever broke."""
-    member = make_member(steps=[5])
+    member, losses = make_member(steps=[5]), Losses()
 
-    evaluation = evaluate(Walker(), member, [10, 20])
+    evaluation = evaluate(Walker(), Keeper(member, watcher=losses), [10, 20])
 
     assert member.env.seeds == [10, 20, 20]
-    assert (evaluation.faults, evaluation.steps_lost) == (1, 1)
+    assert (evaluation.faults, losses.steps) == (1, 1)
     assert evaluation.success_rate == 1.0
 
 

@@ -31,7 +31,7 @@ def test_what_came_after_the_checkpoint_is_not_forgotten(journal, progress, cloc
     saved = progress.counted()
     with progress.spending(Cause.LEARNING):
         clock.now = 6.0
-        progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
+        progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
         progress.collected(47, [{"episode": {"r": 1.0, "l": 7}}])
         journal.keep(progress)
 

@@ -93,7 +93,7 @@ def test_the_metrics_of_an_evaluation_stay_until_the_next(progress):
     """With the number of evaluations."""
     for success in (True, False):
         played = Episode(seed=1, total_reward=2.0, length=3, success=success)
-        progress.evaluated(Evaluation(episodes=(played,), faults=0, steps_lost=0, seconds=0.1))
+        progress.evaluated(Evaluation(episodes=(played,), faults=0, seconds=0.1))
 
     assert values(progress, "palaestra_trainer_evaluations_total") == {(): 2}
     assert values(progress, "palaestra_trainer_evaluation_success_ratio") == {(): 0}
@@ -119,8 +119,8 @@ def test_figures_for_tensorboard_are_metrics_too(progress):
 
 def test_faults_and_restarts_are_counted_by_simulator_and_cause(progress):
     """A restart has the cause of the fault that it mended; wear is none."""
-    progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
-    progress.fault("collect-0", SimulatorHung("collect-0", "silent"))
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
+    progress.fault("collect-0", SimulatorHung("collect-0", "silent"), steps_lost=0)
     progress.restarted("collect-0", recycled=False)
     progress.restarted("evaluate-0", recycled=True)
     progress.slow("evaluate-0", 0.4)

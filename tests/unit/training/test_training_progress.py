@@ -32,7 +32,7 @@ def get(server, path):
 def evaluation(*, success):
     """Return an evaluation of one episode."""
     episode = Episode(seed=1, total_reward=1.0, length=3, success=success)
-    return Evaluation(episodes=(episode,), faults=1, steps_lost=4, seconds=0.1)
+    return Evaluation(episodes=(episode,), faults=1, seconds=0.1)
 
 
 def test_at_the_start_nothing_is_known(progress):
@@ -69,7 +69,7 @@ def test_speed_is_that_of_the_last_half_minute(progress, clock):
 def test_a_fault_is_reported_for_its_simulator(progress):
     """Which one, in which state, and why."""
     progress.started("collect-0")
-    progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     broken = progress.status().simulators[0]
     progress.restarted("collect-0", recycled=False)
     mended = progress.status().simulators[0]
@@ -144,7 +144,7 @@ def test_a_step_ends_the_age_of_progress(progress, clock):
 
 def test_counters_go_into_a_checkpoint_and_come_back(progress, clock):
     """A run's faults are those of all its attempts."""
-    progress.fault("collect-0", SimulatorHung("collect-0", "slow"))
+    progress.fault("collect-0", SimulatorHung("collect-0", "slow"), steps_lost=0)
     clock.now = 1.5
 
     again = Counters.from_json(json.loads(json.dumps(progress.counted().to_json())))
@@ -203,7 +203,7 @@ def test_slowness_is_counted_and_breaks_nothing(progress):
     """A simulator that needs its time is not restarted for it."""
     progress.started("collect-0")
     progress.slow("collect-0", 0.4)
-    progress.fault("evaluate-0", SimulatorDead("evaluate-0", "gone"))
+    progress.fault("evaluate-0", SimulatorDead("evaluate-0", "gone"), steps_lost=0)
 
     status = progress.status()
     assert status.faults == {"dead": 1, "hung": 0, "slow": 1, "wrong_data": 0}
@@ -249,7 +249,7 @@ def test_the_last_ten_faults_are_remembered(progress):
     """With what is needed to find the cause: when, who, what and how far the run was."""
     for number in range(12):
         progress.collected(number, [])
-        progress.fault("collect-0", SimulatorDead("collect-0", f"gone {number}"))
+        progress.fault("collect-0", SimulatorDead("collect-0", f"gone {number}"), steps_lost=0)
 
     faults = progress.faults()
     assert [fault.step for fault in faults] == list(range(2, 12))
@@ -260,17 +260,10 @@ def test_the_last_ten_faults_are_remembered(progress):
 
 
 def test_the_steps_of_an_episode_that_a_fault_cut_are_lost(progress):
-    """They were learnt from, and led nowhere."""
-    progress.collected(7, [{"valid": False, "sim_fault": {"step": 5}}, {"valid": True}])
+    """Those of training were learned from, and led nowhere; those of an evaluation took as long."""
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=5)
 
     assert progress.status().steps_lost == 5
-
-
-def test_the_steps_of_an_evaluation_that_a_fault_cut_are_lost(progress):
-    """Nothing is learnt from them in any case, but they took as long."""
-    progress.evaluated(evaluation(success=True))
-
-    assert progress.status().steps_lost == 4
 
 
 def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progress):
@@ -285,7 +278,7 @@ def test_the_steps_after_the_checkpoint_that_a_run_goes_on_from_are_lost(progres
 def test_time_and_faults_are_drawn_over_the_steps(progress, clock):
     """By cause and by kind, as TensorBoard names them."""
     clock.now = 2.0
-    progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     progress.slow("collect-0", 0.4)
 
     scalars = progress.scalars()
@@ -323,7 +316,7 @@ def test_status_is_the_protocol_s(progress):
 def test_metrics_are_the_same_numbers(progress):
     """Unknown values are absent."""
     progress.collected(7, [{"episode": {"r": 2.0, "l": 3}}])
-    progress.fault("collect-0", SimulatorDead("collect-0", "gone"))
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
     with StatusServer("127.0.0.1:0", progress) as server:
         text = get(server, "/metrics")
 

@@ -178,7 +178,7 @@ class Collector:
             }
         }
         self._actions = None
-        self.keeper.begin_mending(fault)
+        self.keeper.begin_mending(fault, self._length)
 
     def _recover(self) -> Row:
         """Return the row of a step that no episode is under way for."""
@@ -189,7 +189,7 @@ class Collector:
         return row
 
     def _invalid(self, seen: Any, *, done: bool) -> Row:
-        """Return a row that nothing is learnt from; the first one after a fault tells of it."""
+        """Return a row that nothing is learned from; the first one after a fault has its `sim_fault`."""
         info = {"valid": False, "TimeLimit.truncated": done, "terminal_observation": seen} | self._news
         self._news = {}
         return Row(self._observation, 0.0, done, info)

@@ -73,13 +73,11 @@ class Evaluation:
     Attributes:
         episodes: in the order of their seeds.
         faults: episodes that a fault cut and that were played again.
-        steps_lost: steps of those episodes, up to the faults.
         seconds: wall time of the whole evaluation.
     """
 
     episodes: tuple[Episode, ...]
     faults: int
-    steps_lost: int
     seconds: float
 
     @property
@@ -172,7 +170,6 @@ def evaluate_on_all(
     return Evaluation(
         episodes=games.in_order(),
         faults=games.faults,
-        steps_lost=games.steps_lost,
         seconds=time.monotonic() - started,
     )
 
@@ -185,11 +182,10 @@ class _Games:
 
     Attributes:
         faults: number of episodes that were cut.
-        steps_lost: steps of those episodes.
     """
 
     def __init__(self, policy: Policy, seeds: Iterable[int]) -> None:
-        self.faults = self.steps_lost = 0
+        self.faults = 0
         self._policy = policy
         self._waiting = deque(enumerate(seeds))
         self._played: dict[int, Episode] = {}
@@ -224,10 +220,9 @@ class _Games:
         try:
             episode = _play(self._policy, keeper, seed, check, rewards)
         except SimulatorFault as fault:
-            keeper.begin_mending(fault)
+            keeper.begin_mending(fault, len(rewards))
             with self._changed:
                 self.faults += 1
-                self.steps_lost += len(rewards)
                 self._waiting.appendleft((place, seed))
                 self._changed.notify_all()
         else:

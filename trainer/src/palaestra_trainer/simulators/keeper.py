@@ -35,7 +35,7 @@ LOOK_EVERY_S = 0.1
 # A try that is told to fail ends at once, unless it waits for somebody who does not answer.
 SETTLE_S = 10.0
 # A simulator that dies every two dozen resets is recycled every few seconds, all night.
-TELL_OF_RECYCLING_EVERY_S = 60.0
+LOG_RECYCLING_EVERY_S = 60.0
 
 
 class Keeper:
@@ -67,7 +67,7 @@ class Keeper:
         self._care = care or Care()
         self._budget = RestartBudget(member.name, self._care, clock)
         self._clock = clock
-        self._recycled, self._tell_next = 0, -math.inf
+        self._recycled, self._log_next = 0, -math.inf
         self.meter = Meter(member, self._budget)
         self._work: Future[None] | None = None
         self._abandoned = False
@@ -108,9 +108,14 @@ class Keeper:
         """Begin to start the member, again after each fault; then it is up, or lost."""
         self._begin(self._start)
 
-    def begin_mending(self, fault: SimulatorFault) -> None:
-        """Begin to restart the broken member until it is up, or lost."""
-        self._tell(fault)
+    def begin_mending(self, fault: SimulatorFault, steps_lost: int = 0) -> None:
+        """Begin to restart the broken member until it is up, or lost.
+
+        Args:
+            fault: how it broke.
+            steps_lost: environment steps of the episode that the fault cut.
+        """
+        self._report(fault, steps_lost)
         self._begin(partial(self._mend, fault))
 
     def abandon(self) -> None:
@@ -191,7 +196,7 @@ class Keeper:
         try:
             self.member.start()
         except SimulatorFault as fault:
-            self._tell(fault)
+            self._report(fault)
             self.tried = True
             self._mend(fault)
         else:
@@ -204,7 +209,7 @@ class Keeper:
                 self.member.restart()
             except SimulatorFault as again:
                 fault = again
-                self._tell(fault)
+                self._report(fault)
             else:
                 self.watcher.restarted(self.name, recycled=False)
                 return
@@ -237,8 +242,8 @@ class Keeper:
         with contextlib.suppress(SimulatorFault):
             self.member.stop()
 
-    def _tell(self, fault: SimulatorFault) -> None:
-        self.watcher.fault(self.name, fault)
+    def _report(self, fault: SimulatorFault, steps_lost: int = 0) -> None:
+        self.watcher.fault(self.name, fault, steps_lost)
         log.warning("simulator fault", simulator=self.name, kind=fault.kind, fact=str(fault))
 
     def _switch(self, switch: Callable[[], None]) -> None:
@@ -266,9 +271,9 @@ class Keeper:
     def _log_recycling(self, reason: str) -> None:
         """Log the first time, then one line a minute at most, with the number of all times."""
         self._recycled += 1
-        if self._clock() >= self._tell_next:
+        if self._clock() >= self._log_next:
             log.info("simulator recycled", simulator=self.name, times=self._recycled, reason=reason)
-            self._tell_next = self._clock() + TELL_OF_RECYCLING_EVERY_S
+            self._log_next = self._clock() + LOG_RECYCLING_EVERY_S
 
     def _recycle(self) -> None:
         self.member.restart()

@@ -75,8 +75,8 @@ class Watcher(Protocol):
         """`steps` environment steps were taken."""
         ...
 
-    def fault(self, simulator: str, fault: SimulatorFault) -> None:
-        """A simulator broke."""
+    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
+        """A simulator broke; its episode, of so many steps, is cut."""
         ...
 
     def started(self, simulator: str) -> None:
@@ -110,7 +110,7 @@ class Nobody:
     def stepped(self, steps: int) -> None:
         """Ignore it."""
 
-    def fault(self, simulator: str, fault: SimulatorFault) -> None:
+    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
         """Ignore it."""
 
     def started(self, simulator: str) -> None:

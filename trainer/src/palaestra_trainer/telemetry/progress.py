@@ -163,9 +163,10 @@ class Progress:
         """Restore the returns of the last episodes before this attempt."""
         self._returns.extend(returns)
 
-    def fault(self, simulator: str, fault: SimulatorFault) -> None:
-        """Count a fault of a simulator and mark it as down."""
+    def fault(self, simulator: str, fault: SimulatorFault, steps_lost: int) -> None:
+        """Count a fault and the steps of the episode that it cut; mark the simulator as down."""
         with self._lock:
+            self.counters.steps_lost += steps_lost
             self.counters.faults[fault.kind] += 1
             self._goodput.in_vain()
             self._standings.broke(
@@ -222,8 +223,6 @@ class Progress:
             self.step = step
             for info in infos:
                 self.counters.extra_steps += int(info.get("extra_steps", 0))
-                if (fault := info.get("sim_fault")) is not None:
-                    self.counters.steps_lost += int(fault["step"])
                 if (episode := info.get("episode")) is not None:
                     self.counters.episodes += 1
                     self._returns.append(episode["r"])
@@ -239,7 +238,6 @@ class Progress:
         with self._lock:
             self.success_rate = evaluation.success_rate
             self.success_interval = evaluation.success_interval
-            self.counters.steps_lost += evaluation.steps_lost
         self.figures.evaluated(evaluation)
 
     def saved(self, step: int) -> None:
