@@ -144,10 +144,12 @@ def of_docstring(line: int, text: str) -> Iterator[Paragraph]:
 
 
 def of_comments(text: str) -> Iterator[Paragraph]:
-    """Yield comments; lines of one comment belong together."""
-    lines = dict(comments(text))
-    numbers = range(1, max(lines, default=0) + 1)
-    yield from of_lines([(number, without_code(lines.get(number, ""))) for number in numbers])
+    """Yield comments; full lines of one comment belong together, a comment behind code is one by itself."""
+    found = [(number, without_code(comment)) for number, comment in comments(text)]
+    sources = text.split("\n")
+    full = {number: comment for number, comment in found if sources[number - 1].lstrip().startswith("#")}
+    yield from ((number, comment) for number, comment in found if number not in full)
+    yield from of_lines([(number, full.get(number, "")) for number in range(1, max(full, default=0) + 1)])
 
 
 def comments(text: str) -> Iterator[Paragraph]:
