@@ -210,9 +210,9 @@ ROWS: dict[Reason, Row] = {
     Reason.OLD_POD_TERMINATING: Row(
         "pod {pod} of an earlier TrainingJob of this name has not ended and mounts claim {claim}; "
         "if node {node} is lost, delete the Node object or taint it node.kubernetes.io/out-of-service",
-        "the TrainingJob was deleted and created again, a pod of the deleted one still terminates (for "
-        "example on a lost node), and both use the same `existingClaim`; the operator creates no second pod "
-        "while the first may still write",
+        "a pod of a deleted TrainingJob of the same name still terminates, for example on a lost node, and "
+        "both use the same `existingClaim`. The operator creates no second pod while the first may still "
+        "write",
         "wait; if the node is lost and its machine is off, run `kubectl delete node NODE`; or use another "
         "claim",
     ),
@@ -234,9 +234,9 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.SUSPENDED: Row(
         "suspended by {by}",
-        "the pods have ended after a checkpoint; the message names the cause: the TrainingJob's "
-        "`spec.suspend`, or a field manager that changed the Job, such as Kueue; "
-        "the operator does not undo a change by another field manager",
+        "the pods have ended after a checkpoint. The message names the cause: the TrainingJob's "
+        "`spec.suspend`, or a field manager that changed the Job, such as Kueue. "
+        "The operator does not undo a change by another field manager",
         "set `spec.suspend: false`; if another field manager suspended the Job, resume it there",
         warning=False,
     ),

@@ -1,15 +1,22 @@
-"""The only place that talks to an API server.
+"""The only package that connects to an API server.
 
-Requests and answers are plain JSON; the official client gives configuration, credentials and TLS, no models
-(docs/decisions/0004). What is here knows Kubernetes and nothing of TrainingJobs:
+Requests and answers are plain JSON. The official client reads a kubeconfig and its credentials; its models
+are not used (docs/decisions/0004). These modules know Kubernetes and no TrainingJob:
 
-    resources   the kinds of objects and their addresses        errors      what can be answered instead
-    connection  which API server, and who we are                limits      how long anything may take
-    api         one request, with a deadline                    transport   the bytes of it
-    watching    one watch, until it ends                        reflector   a cache that follows it
-    store       what the cache holds                            queue       work, one worker a key
-    lease       who leads                                       recorder    events for people
-    lines       a log that goes on                              executing   a command in a container
+- `resources`: the kinds of objects and their addresses
+- `connection`: the API server and the identity to use
+- `limits`: deadlines, and waits before the next attempt
+- `api`: one request, with a deadline
+- `transport`: the bytes of a request
+- `errors`: one error for each refusal
+- `watching`: one watch, until it ends
+- `reflector`: a cache that follows the API server
+- `store`: the objects of that cache
+- `queue`: work for the controller, one worker a key
+- `lease`: leader election
+- `recorder`: events for people
+- `lines`: the log of a running container
+- `executing`: a command in a container
 """
 
 from palaestra.cluster.api import Api

@@ -1,4 +1,4 @@
-"""The way to an API server: its address, connections and credentials, wherever they come from."""
+"""The address, connections and credentials of an API server."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ POOL = 32  # connections kept open: more than there are workers and watches
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Access:
-    """Where an API server is, and how to be let in.
+    """An API server's address, and the credentials for it.
 
     Attributes:
         host: address, as `https://10.0.0.1:443`.
-        pool: connections, with TLS as it has to be.
+        pool: connections, with the TLS settings of that server.
         authorization: returns the header of that name, None without one; called by one thread at a time.
-            Raises Unreachable where the credentials cannot be read.
-        channel: options of a websocket to that host, its TLS and a proxy among them.
+            Raises Unreachable if the credentials cannot be read.
+        channel: options of a websocket to that host, including its TLS and a proxy.
     """
 
     host: str
@@ -29,7 +29,7 @@ class Access:
 
 
 def channel_options(tls: Mapping[str, Any], proxy: str | None) -> dict[str, Any]:
-    """Return options of a websocket; of `tls` those that are None are left out."""
+    """Return the options of a websocket; entries of `tls` that are None are left out."""
     options: dict[str, Any] = {"sslopt": {name: value for name, value in tls.items() if value is not None}}
     if proxy is not None:
         address = urlsplit(proxy)

@@ -1,6 +1,6 @@
-"""A pod's service account: two files, which the kubelet keeps up to date, and two variables.
+"""A pod's service account: two files, which the kubelet keeps up to date, and two environment variables.
 
-They are read here and not by the official client, which takes 10 MiB of memory for it.
+They are read here, because the official client needs 10 MiB of memory to read them.
 """
 
 import ipaddress
@@ -32,10 +32,10 @@ KEPT_ALIVE = (
 
 
 def account(files: Path | None = None, clock: Callable[[], float] = time.monotonic) -> Access:
-    """Return the access of the pod that this process runs in; `files` is the folder of its account.
+    """Return the access of the pod in which this process runs; `files` is the folder of its account.
 
     Raises:
-        NotConfigured: it does not run in a pod, or the pod has no account.
+        NotConfigured: this process does not run in a pod, or the pod has no account.
     """
     folder = files or FILES
     host, port = os.environ.get(HOST), os.environ.get(PORT)
@@ -58,7 +58,7 @@ def account(files: Path | None = None, clock: Callable[[], float] = time.monoton
 
 
 class Token:
-    """The token of a service account, read anew every minute, since kubelets replace it."""
+    """The token of a service account, read again every minute, because kubelets replace it."""
 
     def __init__(self, file: Path, clock: Callable[[], float]) -> None:
         self._file = file
@@ -67,10 +67,10 @@ class Token:
         self._read_at = float("-inf")
 
     def __call__(self) -> str:
-        """Return the header that carries it.
+        """Return the header `Authorization` with the token.
 
         Raises:
-            Unreachable: it cannot be read.
+            Unreachable: the token cannot be read.
         """
         if self._clock() - self._read_at >= FRESH_S:
             self._text = _read(self._file)
@@ -81,7 +81,7 @@ class Token:
 
 
 def _read(file: Path) -> str:
-    """Return the text of a file, "" where it cannot be read."""
+    """Return the text of a file; "" if it cannot be read."""
     try:
         return file.read_text(encoding="ascii").strip()
     except (OSError, UnicodeDecodeError):
@@ -89,14 +89,14 @@ def _read(file: Path) -> str:
 
 
 def _proxy(host: str) -> str | None:
-    """Return the proxy that the environment names for a host, None without one."""
+    """Return the proxy that the environment names for a host; None without one."""
     proxies = getproxies()
     direct = proxy_bypass(host) or any(_covers(each, host) for each in proxies.get("no", "").split(","))
     return None if direct else proxies.get("https")
 
 
 def _covers(network: str, host: str) -> bool:
-    """Return whether a network such as `10.0.0.0/8` holds a host that is given as an address."""
+    """Return whether a network such as `10.0.0.0/8` contains the address `host`."""
     try:
         return ipaddress.ip_address(host) in ipaddress.ip_network(network.strip(), strict=False)
     except ValueError:

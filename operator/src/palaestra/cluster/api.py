@@ -1,7 +1,7 @@
 """Requests to an API server: plain JSON in and out, a deadline on each, one typed error for each refusal.
 
-Nothing is retried but what certainly was not done: a request that a busy server turned away (429), within the
-deadline of the call, and a read on a connection that broke. Everything else is for the caller's queue.
+Only two kinds of requests are retried, within the deadline of the call: a request that a busy server rejected
+(429), and a read whose connection broke. For all others the caller's queue retries.
 """
 
 import time
@@ -37,7 +37,7 @@ class Page:
 
     Attributes:
         items: the objects, with apiVersion and kind, which lists leave out.
-        version: the resourceVersion of the whole list, from which a watch goes on.
+        version: the resourceVersion of the whole list, from which a watch continues.
     """
 
     items: tuple[Object, ...]
@@ -77,7 +77,7 @@ class Api:
         return str(self._object(Call(verb="get", plural="version", path="/version")).get("gitVersion", ""))
 
     def serves(self, group_version: str) -> bool:
-        """Whether the API server knows a group and version, such as `kueue.x-k8s.io/v1beta1`."""
+        """Return whether the API server has a group and version, such as `kueue.x-k8s.io/v1beta1`."""
         try:
             self._object(Call(verb="get", plural="groups", path=f"/apis/{group_version}"))
         except NotFound:
@@ -87,7 +87,7 @@ class Api:
     def schema(self, group_version: str, kind: str) -> Object:
         """Return the OpenAPI schema of a kind, as the API server publishes it to every account.
 
-        One of a custom resource is published some seconds after its definition.
+        The schema of a custom resource is published some seconds after its definition.
 
         Raises:
             NotFound: the kind is not published.
@@ -111,16 +111,16 @@ class Api:
         fields: str | None = None,
         limit: int = PAGE,
     ) -> Objects:
-        """Return all objects that match, of one moment, read in pages of `limit`.
+        """Return all objects that match, as of one moment, read in pages of `limit`.
 
-        Namespace None means all of them. `labels` and `fields` are selectors as kubectl takes them:
+        Namespace None means all namespaces. `labels` and `fields` are selectors as in kubectl:
         `palaestra.dev/job=x,palaestra.dev/replica` and `involvedObject.uid=…`.
         """
         for attempt in range(LISTS_FROM_THE_START):
             try:
                 pages = self.pages(resource, namespace, labels=labels, fields=fields, limit=limit)
                 return [item for page in pages for item in page.items]
-            except Gone:  # the list changed for so long that its next page is forgotten
+            except Gone:  # the version of the list has expired before its last page was read
                 if attempt == LISTS_FROM_THE_START - 1:
                     raise
         raise AssertionError("unreachable: the last attempt returns or raises")
@@ -134,10 +134,10 @@ class Api:
         fields: str | None = None,
         limit: int = PAGE,
     ) -> Iterator[Page]:
-        """Yield a list page by page, so that no more than one is in memory.
+        """Yield a list page by page, so that at most one page is in memory.
 
         Raises:
-            Gone: the rest of the list is forgotten; start again.
+            Gone: the version of the list has expired; start again.
         """
         query = {"limit": str(limit), "labelSelector": labels, "fieldSelector": fields, "continue": None}
         while True:
@@ -145,7 +145,7 @@ class Api:
             metadata = answer.get("metadata") or {}
             items = tuple(_complete(resource, item) for item in answer.pop("items", None) or ())
             yield Page(items=items, version=str(metadata.get("resourceVersion", "")))
-            del items  # as all that was read of this page, before the next one is
+            del items  # frees this page before the next one is read
             query["continue"] = metadata.get("continue")
             if not query["continue"]:
                 return
@@ -177,7 +177,7 @@ class Api:
     def create(self, resource: Resource, obj: Mapping[str, Any], *, dry_run: bool = False) -> Object:
         """Create an object in the namespace that it names, and return it as stored.
 
-        With `dry_run` the API server goes through everything, admission included, and stores nothing.
+        With `dry_run` the API server does all its checks, admission included, and stores nothing.
 
         Raises:
             AlreadyExists: the name is taken.
@@ -200,11 +200,11 @@ class Api:
     ) -> Object:
         """Change the fields in `patch` (RFC 7386: null removes, lists are replaced), and return the object.
 
-        `subresource` is `status`, for instance. With a `resource_version` the change is refused where the
-        object is not this version any more.
+        `subresource` is `status`, for instance. With a `resource_version` the API server refuses the change
+        if the object has another version.
 
         Raises:
-            Conflict: the object is another version.
+            Conflict: the object has another version.
         """
         if resource_version is not None:
             metadata = {**patch.get("metadata", {}), "resourceVersion": resource_version}
@@ -213,9 +213,9 @@ class Api:
         return self._object(call.sending(patch, method="PATCH", media_type=MERGE_PATCH))
 
     def apply(self, obj: Mapping[str, Any], *, manager: str = MANAGER, force: bool = True) -> Object:
-        """Make the fields in `obj` so (server-side apply), and return the object as stored.
+        """Apply the fields in `obj` (server-side apply), and return the object as stored.
 
-        Fields that the same manager applied before and leaves out now are removed.
+        Fields that the same manager applied before and that `obj` leaves out are removed.
 
         Raises:
             Conflict: another manager owns a field, and `force` is false.
@@ -235,14 +235,14 @@ class Api:
         resource_version: str | None = None,
         propagation: str = "Background",
     ) -> None:
-        """Delete one object, and what it owns by `propagation`: `Background`, `Foreground` or `Orphan`.
+        """Delete one object; its dependents by `propagation`: `Background`, `Foreground` or `Orphan`.
 
-        With a `uid` this object only, not a later one of the same name; with a `resource_version` only while
-        the object is this version.
+        With a `uid`, a later object of the same name is not deleted. With a `resource_version`, the object is
+        deleted only if it has this version.
 
         Raises:
             NotFound: there is none.
-            Conflict: the object of this name has another uid, or is another version.
+            Conflict: the object of this name has another uid or version.
         """
         options: Object = {"kind": "DeleteOptions", "apiVersion": "v1", "propagationPolicy": propagation}
         wanted = {"uid": uid, "resourceVersion": resource_version}
@@ -253,12 +253,12 @@ class Api:
     def evict(self, namespace: str, name: str, *, uid: str) -> None:
         """Ask for the eviction of the pod with this uid.
 
-        A disruption budget refuses as a busy server does, maybe for days, so a refusal is not waited out.
+        A disruption budget refuses with 429 as a busy server does, maybe for days, so this is not retried.
 
         Raises:
             NotFound: there is none of this name.
             Conflict: the pod of this name has another uid.
-            TooManyRequests: a disruption budget allows none now, or the server is busy.
+            TooManyRequests: a disruption budget allows no eviction now, or the server is busy.
         """
         eviction = {
             "apiVersion": "policy/v1",
@@ -281,10 +281,10 @@ class Api:
     ) -> Watch:
         """Return the changes after `version`, where a list or an earlier watch ended.
 
-        The API server ends the watch after so many `seconds`; iterate over it once, to its end or to `close`.
+        The API server ends the watch after `seconds`. Iterate over it once, to its end or to `close`.
 
         Raises:
-            Gone: the version is forgotten; here, or from the iterator.
+            Gone: the version has expired; raised here or by the iterator.
         """
         query = {
             "watch": "true",
@@ -308,11 +308,11 @@ class Api:
         tail: int | None = None,
         within_s: float,
     ) -> Iterator[str]:
-        """Yield the lines of a container's log, the last `tail` of them; `follow`: until it has ended.
+        """Yield the last `tail` lines of a container's log; with `follow` until the container has ended.
 
         Raises:
             NotFound: there is no such pod.
-            Invalid: the container has not started, or there is none of that name.
+            Invalid: the container has not started, or the pod has no container of that name.
             Unreachable: the connection broke, or the log did not end `within_s`.
         """
         query = {
@@ -324,10 +324,10 @@ class Api:
         yield from self._lines(call, within_s)
 
     def proxied(self, namespace: str, pod: str, port: int, path: str) -> str:
-        """Return what a pod answers to a GET, by way of the API server; `path` has no leading slash.
+        """Return a pod's answer to a GET through the API server; `path` has no leading slash.
 
         Raises:
-            ApiError: the pod's answer is none, or the API server does not reach it.
+            ApiError: the pod answers with an error, or the API server does not reach it.
         """
         call = _call("get", PODS, namespace, f"{pod}:{port}", subresource=f"proxy/{path}")
         return "\n".join(self._lines(call, self._call_s))
@@ -335,11 +335,11 @@ class Api:
     def execute(
         self, namespace: str, pod: str, container: str, command: Sequence[str], *, within_s: float
     ) -> Iterator[bytes]:
-        """Run a command in a container and yield what it writes to standard output; it gets no input.
+        """Run a command in a container, without input, and yield its standard output.
 
         Raises:
-            CommandFailed: it ended with another code than 0.
-            Unreachable: the connection broke, or the command did not end `within_s`: what came is not whole.
+            CommandFailed: its exit code is not 0.
+            Unreachable: the connection broke, or the command did not end `within_s`; output is missing.
             ApiError: the API server refuses.
         """
         from palaestra.cluster.executing import output  # noqa: PLC0415 - a library of people's tools

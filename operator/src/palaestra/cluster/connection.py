@@ -1,4 +1,4 @@
-"""Which API server, and who we are: by a kubeconfig, or as the pod that this process runs in."""
+"""The API server to connect to, and the identity: by a kubeconfig, or by the pod's service account."""
 
 import os
 from pathlib import Path
@@ -15,7 +15,7 @@ REMEDY = "name a kubeconfig with --kubeconfig or KUBECONFIG, or run in a pod wit
 
 
 def connect(kubeconfig: str | None = None, context: str | None = None, limits: Limits | None = None) -> Api:
-    """Return the API server to talk to; nothing is sent yet.
+    """Return the API server to use; nothing is sent yet.
 
     Args:
         kubeconfig: a file; None for $KUBECONFIG, then ~/.kube/config, then the pod's service account.
@@ -53,7 +53,7 @@ def namespace_of(kubeconfig: str | None = None, context: str | None = None) -> s
 
 
 def own_namespace(default: str) -> str:
-    """Return the namespace of the pod that this process runs in; outside a cluster, `default`."""
+    """Return the namespace of the pod in which this process runs; outside a cluster, `default`."""
     try:
         return OWN_NAMESPACE.read_text(encoding="ascii").strip() or default
     except (OSError, UnicodeDecodeError):

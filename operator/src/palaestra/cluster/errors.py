@@ -1,21 +1,21 @@
-"""What an API server can answer instead of what was asked for.
+"""The errors for an API server's refusals, and for its absence.
 
 ApiError                    any answer but success; `retryable` says whether it may succeed later
 ├── NotFound                404
-│   └── NoSuchKind          404 without a word about an object: the kind itself is not served
+│   └── NoSuchKind          404 that names no object: the kind itself is not served
 ├── AlreadyExists           409, the name is taken
 ├── Conflict                409, somebody else wrote first: read again
-├── Forbidden               403, RBAC, quota or admission says no
+├── Forbidden               403, RBAC, a quota or admission refuses
 │   └── NamespaceTerminating 403, nothing can be created in a namespace that is being deleted
 ├── Invalid                 400 and 422, the object is wrong: never retried
-├── Gone                    410, the version to continue from is forgotten: list again
+├── Gone                    410, the version to continue from has expired: list again
 ├── TooManyRequests         429, with the wait that the server asks for
 ├── ServerError             5xx, the API server or its store is in trouble
 └── Unreachable             no answer, or none that can be read
 NotConfigured               no API server is named, or its credentials cannot be read
-CommandFailed               a command in a container ended with another code than 0
+CommandFailed               the exit code of a command in a container is not 0
 
-A message is the API server's own: it names the object and, for an invalid one, the field.
+A message is the API server's own: it names the object and, if the object is invalid, the field.
 """
 
 import math
@@ -41,9 +41,9 @@ class ApiError(PalaestraError, OSError):
     """An answer other than success.
 
     Attributes:
-        code: the HTTP status; 0 when there was no answer.
-        reason: the API server's word for it, such as `AlreadyExists`; a test for equality is safe.
-        message: the API server's sentence.
+        code: the HTTP status; 0 without an answer.
+        reason: the API server's reason, such as `AlreadyExists`; compare it for equality.
+        message: the API server's message.
     """
 
     retryable: ClassVar[bool] = False
@@ -63,15 +63,15 @@ class NotFound(ApiError):
 
 
 class NoSuchKind(NotFound):
-    """The API server does not serve this kind of objects, as before its definition is installed."""
+    """The API server does not serve this kind of objects; its definition may not be installed yet."""
 
 
 class AlreadyExists(ApiError):
-    """The name is taken; whose it is, its owner reference says."""
+    """An object of this name exists; its owner reference names its owner."""
 
 
 class Conflict(ApiError):
-    """The object was changed by somebody else, or has another uid, since it was read."""
+    """Another client changed the object since it was read, or it has another uid."""
 
     retryable = True
 
@@ -81,12 +81,12 @@ class Forbidden(ApiError):
 
     @property
     def lacks_right(self) -> bool:
-        """Whether it is RBAC that refuses, as its words say: no field of the answer does."""
+        """Return whether RBAC refuses, by its message; no field of the answer says so."""
         return re.search(r" cannot \S+ resource ", self.message) is not None
 
 
 class NamespaceTerminating(Forbidden):
-    """The namespace is being deleted, so that nothing can be created in it any more; it never comes back."""
+    """The namespace is being deleted, so nothing can be created in it any more."""
 
 
 class Invalid(ApiError):
@@ -94,7 +94,7 @@ class Invalid(ApiError):
 
 
 class Gone(ApiError):
-    """The version or the page to continue from is forgotten: list again."""
+    """The version or the page to continue from has expired: list again."""
 
     retryable = True
 
@@ -103,7 +103,7 @@ class TooManyRequests(ApiError):
     """The API server is busy.
 
     Attributes:
-        retry_after_s: seconds that it asks to wait.
+        retry_after_s: seconds that it asks us to wait.
     """
 
     retryable = True
@@ -120,7 +120,7 @@ class ServerError(ApiError):
 
 
 class Unreachable(ApiError):
-    """No answer in time, or none that can be read; whether a write took place is not known."""
+    """No answer in time, or an unreadable one; whether a write took place is unknown."""
 
     retryable = True
 
@@ -129,8 +129,8 @@ class CommandFailed(PalaestraError):
     """A command in a container failed.
 
     Attributes:
-        code: its exit code; -1: not known.
-        said: the beginning of what it wrote to standard error.
+        code: its exit code; -1: unknown.
+        said: the first bytes of its standard error, as text.
     """
 
     def __init__(self, code: int, said: str) -> None:
@@ -162,7 +162,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
         status: the body; anything may be missing in it.
         retry_after: the Retry-After header, in seconds.
     """
-    if code == NOT_FOUND and not status:  # what an API server does not serve, it refuses in plain text
+    if code == NOT_FOUND and not status:  # for a path that it does not serve, the answer is plain text
         return NoSuchKind(code, "NoSuchKind", "the API server does not serve this kind of objects")
     reason = str(status.get("reason") or f"HTTP{code}")
     message = str(status.get("message") or "the API server gave no message")
@@ -175,7 +175,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 
 
 def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
-    """Return the error that a cause names where the reason is that of many."""
+    """Return the error that a cause names, for reasons that several errors share."""
     causes = (status.get("details") or {}).get("causes") or ()
     return next((BY_CAUSE[each["reason"]] for each in causes if each.get("reason") in BY_CAUSE), None)
 

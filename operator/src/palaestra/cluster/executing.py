@@ -1,7 +1,7 @@
-"""A command in a container: what it writes, byte for byte, and how it ended.
+"""A command in a container: its output, byte for byte, and its result.
 
-A websocket whose messages carry the number of a stream in their first byte. The API server tells at the end,
-on a stream of its own, whether the command succeeded: output without that word is not whole.
+The first byte of each message of the websocket is the number of a stream. At the end the API server sends the
+result on a stream of its own. Without a result the output is incomplete.
 """
 
 import json
@@ -23,7 +23,7 @@ UNKNOWN_CODE = -1
 def open_socket(
     url: str, headers: Mapping[str, str], options: Mapping[str, Any], wait_s: float
 ) -> websocket.WebSocket:
-    """Return the socket on which a command runs, to be closed by the caller; a read waits `wait_s` at most.
+    """Return the socket of a running command, which the caller closes; a read waits `wait_s` at most.
 
     Raises:
         ApiError: the API server refuses, or cannot be reached.
@@ -45,14 +45,14 @@ def open_socket(
 
 
 def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
-    """Yield what the command writes to its standard output, until it has succeeded.
+    """Yield the command's standard output until it has succeeded.
 
     Args:
         socket: from `open_socket`; closed at the end.
         deadline: on the monotonic clock, for all of it.
 
     Raises:
-        CommandFailed: it ended with another code than 0.
+        CommandFailed: its exit code is not 0.
         ApiError: it could not be started.
         Unreachable: the connection broke, or the command did not end in time.
     """
@@ -69,7 +69,7 @@ def output(socket: websocket.WebSocket, deadline: float) -> Iterator[bytes]:
                     raise failure
                 return
     finally:
-        # At once: a peer that is gone would not answer a farewell.
+        # No closing handshake: a peer that is gone would not answer it.
         socket.shutdown()
 
 
@@ -87,12 +87,12 @@ def _message(socket: websocket.WebSocket, deadline: float) -> tuple[int, bytes]:
     if opcode == websocket.ABNF.OPCODE_CLOSE:
         raise Unreachable(0, "Unreachable", "the command's output broke off (the connection was closed)")
     if opcode not in (websocket.ABNF.OPCODE_BINARY, websocket.ABNF.OPCODE_TEXT) or not frame.data:
-        return -1, b""  # a ping, which was answered, or nothing
+        return -1, b""  # a ping, which the library has answered, or an empty frame
     return frame.data[0], frame.data[1:]
 
 
 def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError | None:
-    """Return why the command failed, None when it did not."""
+    """Return why the command failed; None if it did not."""
     if status.get("status") == "Success":
         return None
     causes = (status.get("details") or {}).get("causes") or ()
@@ -105,6 +105,6 @@ def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError |
 def _decoded(body: bytes | str | None) -> dict[str, Any]:
     try:
         found = json.loads(body or b"")
-    except ValueError:  # a proxy in between speaks HTML
+    except ValueError:  # a proxy in between answers in HTML
         return {}
     return found if isinstance(found, dict) else {}

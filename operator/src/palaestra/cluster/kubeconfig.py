@@ -1,6 +1,6 @@
-"""A kubeconfig, as kubectl reads it: by the official client, which knows every kind of credentials.
+"""A kubeconfig, read by the official client, which supports every kind of credentials that kubectl does.
 
-Imported only where a kubeconfig is used: the client takes 10 MiB of memory.
+This module is imported only if a kubeconfig is used, because the client needs 10 MiB of memory.
 """
 
 import ssl
@@ -18,7 +18,7 @@ WRONG = (ConfigException, OSError, ValueError, TypeError, KeyError, yaml.YAMLErr
 
 
 def access(files: str, context: str | None) -> Access:
-    """Return the access that a context of a kubeconfig gives; None is its current one.
+    """Return the access of a context in a kubeconfig; None is the current context.
 
     Raises:
         NotConfigured: it cannot be read, or names no API server.
@@ -34,7 +34,7 @@ def access(files: str, context: str | None) -> Access:
 
     def authorization() -> str | None:
         try:
-            settings = configuration.auth_settings()  # reads a token anew, or runs a plugin
+            settings = configuration.auth_settings()  # reads a token again, or runs a plugin
         except (ConfigException, OSError) as error:
             raise Unreachable(0, "NoCredentials", f"credentials for {host}: {error}") from error
         return str(settings["BearerToken"]["value"]) if "BearerToken" in settings else None
@@ -72,7 +72,7 @@ def _fact(files: str, error: Exception) -> str:
 
 
 def _tls(configuration: Configuration) -> dict[str, Any]:
-    """Return what the client's configuration says of TLS, as the websocket library takes it."""
+    """Return the TLS settings of the client's configuration as options of the websocket library."""
     verified = configuration.verify_ssl
     return {
         "cert_reqs": ssl.CERT_REQUIRED if verified else ssl.CERT_NONE,

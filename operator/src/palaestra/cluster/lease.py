@@ -1,9 +1,9 @@
 """Leader election: of several operators, one works.
 
-One Lease object, taken and renewed with its resourceVersion, so that of two that write at once one is
-refused. `leads()` is a question to the clock, not a memory: a process that was stopped for a minute gets the
-answer no before it does anything else (see tenure.py). Correctness does not hang on this: children have
-names, and the API server refuses the second of a name. Election saves work.
+Candidates take and renew one Lease object with its resourceVersion, so the API server refuses the second of
+two concurrent writes. `leads()` compares the clock each time: after a process was paused for a minute, its
+first call returns False (see tenure.py). Election only saves work. Correctness does not depend on it: names
+are deterministic, and the API server refuses a second object of the same name.
 """
 
 import threading
@@ -30,7 +30,7 @@ def _nothing() -> None:
 
 
 class Leadership:
-    """A candidate for one lease, and its leader while `leads()` says so."""
+    """A candidate for one lease, and its leader while `leads()` is true."""
 
     def __init__(
         self,
@@ -45,12 +45,13 @@ class Leadership:
         """Prepare; nothing is sent before `start`.
 
         Args:
-            api: where the Lease stands.
+            api: the API server that stores the Lease.
             namespace: of the Lease.
             name: of the Lease.
             identity: of this process, different from that of any other.
-            duration_s: whole seconds until others may follow a leader that has died.
-            renew_s: seconds between renewals, and between looks at another's lease; a third of it or less.
+            duration_s: whole seconds after which another candidate may replace a leader that has died.
+            renew_s: seconds between renewals, and between reads of another's lease; at most a third of
+                `duration_s`.
         """
         self._api = api.within(renew_s)
         self._namespace, self._name, self._identity = namespace, name, identity
@@ -69,31 +70,31 @@ class Leadership:
         """Stand for election; once.
 
         Args:
-            started: called when this process becomes the leader; has to return soon.
-            stopped: called when it is not the leader any more; may come later than `leads()` says no.
+            started: called when this process becomes the leader; must return soon.
+            stopped: called when it is no longer the leader, maybe some time after `leads()` is false.
         """
         self._started, self._stopped = started, stopped
         self._thread.start()
 
     def stop(self, deadline_s: float = 2.0) -> None:
-        """Lead no more, and give the lease back so that another can follow at once.
+        """Stop leading, and release the lease so that another candidate can take it at once.
 
-        `leads()` is false from here on; end what writes before. After `deadline_s` the lease is left to run
-        out.
+        `leads()` is false from now on, so stop all writers first. If the release takes longer than
+        `deadline_s`, the lease expires instead.
         """
         self._stopping.set()
         if self._thread.ident is not None:
             self._thread.join(deadline_s)
 
     def leads(self) -> bool:
-        """Whether this process may act as the leader at this moment."""
+        """Return whether this process may act as the leader now."""
         tenure = self._tenure
         return tenure is not None and not self._stopping.is_set() and tenure.holds(time.monotonic())
 
     def term(self) -> int | None:
-        """Return the number of this tenure, from 1; None: this process may not act as the leader.
+        """Return the number of this tenure, from 1; None if this process may not act as the leader.
 
-        What was decided in one tenure is not to be written in a later one: another may have led in between.
+        Do not write the decisions of one tenure in a later one: another process may have led in between.
         """
         term = self._terms
         return term if self.leads() else None
@@ -111,7 +112,7 @@ class Leadership:
                 return
 
     def _turn(self) -> None:
-        """Renew, or see whether the lease is free and take it."""
+        """Renew the lease, or take it if it is free."""
         sent = time.monotonic()
         try:
             if self._tenure is not None:
@@ -121,7 +122,7 @@ class Leadership:
         except NotFound:
             self._create(sent)
             return
-        except Conflict:  # written by another, or by a request of ours whose answer was lost
+        except Conflict:  # written by another process, or by a request of ours whose answer was lost
             found = self._api.get(LEASES, self._namespace, self._name)
         claim = Claim.read(found)
         self._version = str(found["metadata"]["resourceVersion"])

@@ -1,4 +1,4 @@
-"""The lines of an answer that goes on, such as the log of a container that runs."""
+"""The lines of a streamed answer, such as the log of a running container."""
 
 import time
 from collections.abc import Iterator
@@ -10,11 +10,11 @@ from palaestra.cluster.transport import read_some
 
 
 def lines(response: BaseHTTPResponse, deadline: float) -> Iterator[str]:
-    """Yield lines without their ends, as soon as each is whole; the last one also where it has no end.
+    """Yield each line without its line end, as soon as it is complete; the last line may lack the end.
 
     Args:
         response: closed at the end.
-        deadline: on the monotonic clock; looked at whenever something came.
+        deadline: on the monotonic clock; checked after each read.
 
     Raises:
         Unreachable: the connection broke, was silent for too long, or the answer did not end in time.

@@ -1,8 +1,8 @@
 """Work for the controller: names of objects, each once, each with one worker at a time.
 
-A name that is added while a worker has it is handed out again when that worker is done: what happened in
-between is never lost, and two workers never meet at one object. The queue holds names, not events: whoever
-gets one reads what is there now.
+A name that is added while a worker has it is handed out again after that worker is done. So no change is
+missed, and two workers never work on one object. The queue holds names, not events: a worker reads the
+current state of the object.
 """
 
 import heapq
@@ -27,9 +27,9 @@ class WorkQueue(Generic[Key]):
     """A deduplicating queue with delays; safe to use from several threads.
 
     Args:
-        again: how long a name that failed waits.
-        waited: called with the seconds that a name was ready before a worker took it.
-        clock: seconds that never go back.
+        again: the wait of a name whose work failed.
+        waited: called with the seconds for which a name was ready before a worker took it.
+        clock: a monotonic clock, in seconds.
     """
 
     def __init__(
@@ -44,24 +44,24 @@ class WorkQueue(Generic[Key]):
         self._clock = clock
         self._changed = threading.Condition()
         self._ready: deque[Key] = deque()
-        self._since: dict[Key, float] = {}  # all that wait for a worker, also those that have one now
+        self._since: dict[Key, float] = {}  # names that wait for a worker, also if one has them now
         self._working: set[Key] = set()
         self._later: list[tuple[float, int, Key]] = []
         self._due: dict[Key, float] = {}
         self._failures: dict[Key, int] = {}
-        self._order = itertools.count()  # makes entries of one moment comparable
+        self._order = itertools.count()  # orders entries of the same moment
         self._closed = False
 
     @property
     def depth(self) -> int:
-        """How many names are ready for a worker."""
+        """Return how many names are ready for a worker."""
         with self._changed:
             self._promote(self._clock())
             return len(self._ready)
 
     @property
     def closed(self) -> bool:
-        """Whether `close` was called; nothing is handed out any more."""
+        """Return whether `close` was called; then no name is handed out."""
         return self._closed
 
     def add(self, key: Key) -> None:
@@ -71,7 +71,7 @@ class WorkQueue(Generic[Key]):
             self._changed.notify_all()
 
     def add_after(self, key: Key, seconds: float) -> None:
-        """Ask for work on a name after some time; of several such requests the earliest counts."""
+        """Ask for work on a name after `seconds`; of several such requests the earliest counts."""
         with self._changed:
             due = self._clock() + seconds
             if due < self._due.get(key, float("inf")):
@@ -80,7 +80,7 @@ class WorkQueue(Generic[Key]):
                 self._changed.notify_all()
 
     def retry(self, key: Key) -> float:
-        """Ask for work on a name that failed, later each time; return the seconds until then."""
+        """Ask for work on a name that failed, later after each failure; return the seconds until then."""
         with self._changed:
             self._failures[key] = self._failures.get(key, 0) + 1
             wait_s = self._again.wait_s(self._failures[key])
@@ -93,12 +93,12 @@ class WorkQueue(Generic[Key]):
             return self._failures.get(key, 0)
 
     def forget(self, key: Key) -> None:
-        """A name's work succeeded: its next failure is its first."""
+        """Reset the failures of a name whose work succeeded."""
         with self._changed:
             self._failures.pop(key, None)
 
     def get(self, deadline_s: float) -> Key | None:
-        """Return a name to work on, which `done` has to follow; None after `deadline_s`, or when closed."""
+        """Return a name to work on, then call `done`; None after `deadline_s`, or if the queue is closed."""
         with self._changed:
             ends = self._clock() + deadline_s
             while not self._closed:
@@ -112,7 +112,7 @@ class WorkQueue(Generic[Key]):
             return None
 
     def done(self, key: Key) -> None:
-        """A worker has finished with a name; it is handed out again if it was added meanwhile."""
+        """End a worker's work on a name; it is handed out again if it was added meanwhile."""
         with self._changed:
             self._working.discard(key)
             if key in self._since:
@@ -141,6 +141,6 @@ class WorkQueue(Generic[Key]):
     def _promote(self, now: float) -> None:
         while self._later and self._later[0][0] <= now:
             due, _, key = heapq.heappop(self._later)
-            if self._due.get(key) == due:  # else an earlier request has taken its place
+            if self._due.get(key) == due:  # else an earlier request has replaced it
                 del self._due[key]
                 self._add(key, due)

@@ -1,9 +1,9 @@
-"""Events: what `kubectl describe` shows below an object.
+"""Events, which `kubectl describe` shows below an object.
 
-One Event for each (object, reason, message), whose count and last time go up when it happens again. Its name
-is made of these three, so that an operator that was started anew goes on counting instead of repeating.
-An event that cannot be written is logged and given up: nothing may wait for it. Only that its namespace is
-being deleted is raised, or the log would have a line for every event in it.
+There is one Event for each (object, reason, message); a repetition increases its count and its last time. Its
+name is derived from these three, so a restarted operator increases the count of the existing event.
+If an event cannot be written, the recorder logs that and drops it, so that nothing waits for it. If the
+namespace is being deleted, it raises instead, because the log would have a line for every event there.
 """
 
 import hashlib
@@ -35,8 +35,8 @@ class Recorder:
 
         Args:
             api: where events are written.
-            component: who reports, as `kubectl describe` shows it.
-            instance: which one of its processes.
+            component: the name of the reporting program, as `kubectl describe` shows it.
+            instance: the name of the reporting process.
         """
         self._api = api
         self._component = component
@@ -47,14 +47,14 @@ class Recorder:
     def record(
         self, obj: Mapping[str, Any], kind: str, reason: str, message: str, *, once: bool = False
     ) -> None:
-        """Say what happened to an object.
+        """Write an event about an object.
 
         Args:
             obj: with apiVersion, kind, and name, namespace and uid in its metadata.
             kind: `Normal` or `Warning`.
             reason: one word.
             message: a sentence; cut at 1024 characters.
-            once: an event that is there already is left as it is.
+            once: leave an event that exists as it is.
 
         Raises:
             NamespaceTerminating: there will be no event about this object any more.
@@ -79,7 +79,7 @@ class Recorder:
                 self._remember(name, 1)
             else:
                 self._again(event, count + 1)
-        except AlreadyExists:  # an operator before this one has written it
+        except AlreadyExists:  # an earlier operator process has written it
             if once:
                 self._remember(name, 1)
                 return
@@ -105,7 +105,7 @@ class Recorder:
     def _event(self, obj: Mapping[str, Any], kind: str, reason: str, message: str) -> dict[str, Any]:
         metadata = obj["metadata"]
         name, uid = str(metadata["name"]), str(metadata.get("uid", ""))
-        namespace = str(metadata.get("namespace") or "default")  # where events on nodes stand
+        namespace = str(metadata.get("namespace") or "default")  # the namespace of events about nodes
         text = message if len(message) <= LONGEST_MESSAGE else message[: LONGEST_MESSAGE - 1] + "…"
         digest = hashlib.sha256(f"{uid}\0{kind}\0{reason}\0{text}".encode()).hexdigest()[:16]
         now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

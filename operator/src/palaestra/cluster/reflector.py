@@ -1,8 +1,9 @@
-"""A cache that follows the API server: list in pages, then watch, for ever.
+"""A cache that follows the API server: list in pages, then watch, forever.
 
-What makes it stand: a watch that is silent for longer than bookmarks allow is given up; a version that is
-forgotten (410, as an answer or as an event) means a new list; attempts that fail come later each time.
-A new list drops what is gone and reports it, so that no deletion is missed.
+- If a watch is silent for longer than the interval of bookmarks, the reflector closes it and opens another.
+- If the version has expired (410, as an answer or as an event), it lists again. A new list removes objects
+  that are gone and reports each, so no deletion is missed.
+- After each failure it waits longer.
 """
 
 import random
@@ -29,7 +30,7 @@ class Reflector:
     """The objects of one kind, as they were a moment ago.
 
     Attributes:
-        store: what is known; read it from any thread.
+        store: the cached objects; any thread may read it.
     """
 
     def __init__(
@@ -49,10 +50,10 @@ class Reflector:
             resource: which kind of objects.
             namespace: None for all namespaces.
             labels: a label selector.
-            keep: returns the part of an object that is cached; its metadata has to keep namespace, name and
-                labels.
-            changed: called after the store is up to date, with what was kept of the object; for deleted ones
-                with what was known last. Called from the reflector's thread, so it has to return at once.
+            keep: returns the part of an object to cache; its metadata must keep namespace, name and labels.
+            changed: called after the store is up to date, with the cached part of the object; for a deleted
+                one with the part that was cached last. The reflector's thread calls it, so it must return at
+                once.
         """
         self.store = Store()
         self._api = api
@@ -70,19 +71,19 @@ class Reflector:
 
     @property
     def synced(self) -> bool:
-        """Whether a whole list was read, at least once."""
+        """Return whether a whole list was read, at least once."""
         return self._synced.is_set()
 
     def wait_synced(self, deadline_s: float) -> bool:
-        """Wait for the first whole list; return whether it is there within `deadline_s`."""
+        """Wait for the first whole list; return whether it was read within `deadline_s`."""
         return self._synced.wait(deadline_s)
 
     def start(self) -> None:
-        """Begin to follow; once."""
+        """Start the thread; once."""
         self._thread.start()
 
     def stop(self, deadline_s: float = 1.0) -> None:
-        """End the watch and wait for the thread, `deadline_s` at most; a thread that hangs ends with us."""
+        """Close the watch and wait at most `deadline_s` for the thread, which is a daemon."""
         self._stopping.set()
         watch = self._watch
         if watch is not None:
@@ -109,7 +110,7 @@ class Reflector:
             self._stopping.wait(waited_s)
 
     def _turn(self) -> ApiError | None:
-        """List if need be and watch until the watch ends; return why it ended if that was not planned."""
+        """List if necessary, and watch until the watch ends; return the error that ended it, if one did."""
         try:
             if self._version is None:
                 self._version = self._relist()
@@ -122,7 +123,7 @@ class Reflector:
         return None
 
     def _relist(self) -> str:
-        """Bring the store up to date with a whole list and return its version."""
+        """Update the store from a whole list, and return the list's version."""
         gone, version = self.store.keys(), ""
         size = self._resource.page
         for page in self._api.pages(self._resource, self._namespace, labels=self._labels, limit=size):
@@ -165,11 +166,11 @@ class Reflector:
             kept = self._keep(obj)
             before = self.store.relabelled(kept)
             different = self.store.put(kept)
-            if before is not None:  # what it belonged to has lost it; as it is now is reported last
+            if before is not None:  # the job that owned it by its old label has lost it
                 self._changed(before)
             if different:
                 self._changed(kept)
-        except Exception:  # one object that nobody foresaw must not hide all others
+        except Exception:  # one unforeseen object must not hide all others
             log.exception("object not cached", resource=self._resource.plural, key=key_of(obj))
 
     def _drop(self, key: Key) -> None:

@@ -12,11 +12,11 @@ class Resource:
 
     Attributes:
         api_version: group and version as objects carry them: `batch/v1`; `v1` for the core group.
-        kind: as objects carry it: `Job`.
-        plural: as addresses and RBAC rules have it: `jobs`.
-        namespaced: false for kinds that stand outside of namespaces.
-        metadata_only: read no more of the objects than their metadata; what they hold stays with the API
-            server (the contents of ConfigMaps and Secrets, for instance).
+        kind: as in objects: `Job`.
+        plural: as in addresses and RBAC rules: `jobs`.
+        namespaced: false for cluster-scoped kinds.
+        metadata_only: read only the metadata of objects, so that the contents of ConfigMaps and Secrets, for
+            instance, are not transferred.
         page: objects that a cache reads at once, so that no page is large.
     """
 
@@ -25,13 +25,13 @@ class Resource:
     plural: str
     namespaced: bool = True
     metadata_only: bool = False
-    page: int = 25  # of some 25 kB each; 200 at a time left 70 MiB of holes in memory, 25 leave 5
+    page: int = 25  # of some 25 kB each; pages of 200 fragmented 70 MiB of memory, pages of 25 only 5 MiB
 
     def address(self, namespace: str | None = None, name: str | None = None) -> str:
         """Return the path of one object, or of all of them.
 
         Args:
-            namespace: None for all namespaces, and for kinds outside of namespaces.
+            namespace: None for all namespaces, and for cluster-scoped kinds.
             name: None for the collection.
         """
         root = "/api/" if "/" not in self.api_version else "/apis/"
@@ -44,7 +44,7 @@ class Resource:
         return "/".join(parts)
 
     def only_metadata(self) -> "Resource":
-        """Return the same kind, read without what its objects hold."""
+        """Return the same kind, of which only the metadata is read."""
         return replace(self, metadata_only=True)
 
 
@@ -61,7 +61,7 @@ CLAIMS = Resource(api_version="v1", kind="PersistentVolumeClaim", plural="persis
 SECRETS = Resource(api_version="v1", kind="Secret", plural="secrets")
 EVENTS = Resource(
     api_version="v1", kind="Event", plural="events"
-)  # the core one: `kubectl describe` shows it
+)  # of the core group, which `kubectl describe` shows
 NETWORK_POLICIES = Resource(
     api_version="networking.k8s.io/v1", kind="NetworkPolicy", plural="networkpolicies"
 )
@@ -76,12 +76,12 @@ DEFINITIONS = Resource(
     plural="customresourcedefinitions",
     namespaced=False,
 )
-# What only people's tools look at.
+# Only the command line reads these.
 DEPLOYMENTS = Resource(api_version="apps/v1", kind="Deployment", plural="deployments")
 STORAGE_CLASSES = Resource(
     api_version="storage.k8s.io/v1", kind="StorageClass", plural="storageclasses", namespaced=False
 )
-# Questions to RBAC, asked by creating them: may I, and may somebody else?
+# Access reviews: creating one asks RBAC whether this account, or another one, has a right.
 OWN_RIGHTS = Resource(
     api_version="authorization.k8s.io/v1",
     kind="SelfSubjectAccessReview",
@@ -116,7 +116,7 @@ def of(obj: Mapping[str, Any]) -> Resource:
     """Return the resource of an object, by its apiVersion and kind.
 
     Raises:
-        KeyError: the object is of a kind that the operator has nothing to do with.
+        KeyError: the operator does not use this kind.
     """
     key = (obj.get("apiVersion", ""), obj.get("kind", ""))
     if key not in _BY_KIND:

@@ -1,7 +1,7 @@
-"""What a reflector knows: objects by namespace and name, found by label without a search.
+"""The objects of a reflector by namespace and name, with an index by one label.
 
-Objects are kept as compressed JSON: a fortieth of the memory of dicts, and no reader can change what another
-reads.
+They are kept as compressed JSON. It needs a fortieth of the memory of dicts, and no reader can change the
+object of another reader.
 """
 
 import json
@@ -21,7 +21,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kept:
-    """One object in the store: its labels, and the whole of it as compressed JSON."""
+    """One object in the store: its labels, and the whole object as compressed JSON."""
 
     labels: Mapping[str, str]
     text: bytes
@@ -41,7 +41,7 @@ class Store:
             return sum(map(len, self._kept.values()))
 
     def get(self, namespace: str | None, name: str) -> dict[str, Any] | None:
-        """Return a copy of one object, or None; namespace None or "" for kinds outside of namespaces."""
+        """Return a copy of one object, or None; namespace None or "" for cluster-scoped kinds."""
         with self._lock:
             kept = self._kept.get(namespace or "", {}).get(name)
         return _object(kept.text) if kept else None
@@ -52,11 +52,11 @@ class Store:
             return name in self._kept.get(namespace, {})
 
     def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[dict[str, Any]]:
-        """Return copies of all objects that carry these labels, in the order of their names.
+        """Return copies of all objects with these labels, in the order of their names.
 
         Args:
             namespace: None for all namespaces.
-            labels: quick where the label `palaestra.dev/job` is among them; none at all selects everything.
+            labels: uses the index if the label `palaestra.dev/job` is among them; {} selects all objects.
         """
         with self._lock:
             namespaces = list(self._kept) if namespace is None else [namespace]
@@ -74,7 +74,7 @@ class Store:
             return {(namespace, name) for namespace, kept in self._kept.items() for name in kept}
 
     def put(self, obj: Mapping[str, Any]) -> bool:
-        """Keep an object, in place of the one of its name; return whether anything is different now."""
+        """Store an object in place of the one of its name; return whether they differ."""
         namespace, name = key_of(obj)
         labels = obj["metadata"].get("labels") or {}
         kept = Kept(labels=dict(labels), text=_text(obj))
@@ -89,7 +89,7 @@ class Store:
             return True
 
     def relabelled(self, obj: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Return a copy of the object of this name, if it is known with another label `palaestra.dev/job`."""
+        """Return a copy of the stored object of this name, if its label `palaestra.dev/job` is another."""
         namespace, name = key_of(obj)
         label = (obj["metadata"].get("labels") or {}).get(self._index)
         with self._lock:
@@ -97,7 +97,7 @@ class Store:
         return _object(kept.text) if kept and kept.labels.get(self._index) != label else None
 
     def drop(self, namespace: str, name: str) -> dict[str, Any] | None:
-        """Forget an object and return what it was last; None if it was not there."""
+        """Remove an object and return its last copy; None if there was none."""
         with self._lock:
             kept = self._forget(namespace, name)
         return _object(kept.text) if kept else None
@@ -123,7 +123,7 @@ class Store:
 
 
 def key_of(obj: Mapping[str, Any]) -> Key:
-    """Return (namespace, name) of an object; namespace is "" for kinds outside of namespaces."""
+    """Return (namespace, name) of an object; namespace is "" for cluster-scoped kinds."""
     return str(obj["metadata"].get("namespace") or ""), str(obj["metadata"]["name"])
 
 

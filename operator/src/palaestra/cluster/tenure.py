@@ -1,27 +1,27 @@
-"""Who may lead, and until when: the arithmetic of a Lease, with the time passed in.
+"""The arithmetic of a Lease: when a leader stops and when another may start. The time is passed in.
 
-Only durations are compared, on each one's own clock that never goes back; the times in a Lease are for
-people. A follower counts from the moment when it *saw* the last renewal, which is after it was written. A
-leader counts from the moment when it *sent* it, which is before, and stops at two thirds. So a leader has
-stopped before anyone else can start, unless a clock runs at two thirds of another's speed.
+Each process compares durations on its own monotonic clock; the times in a Lease are for people. A follower
+counts from the moment when it *saw* the last renewal, which is after the write. A leader counts from the
+moment when it *sent* the renewal, which is before the write, and stops at two thirds. So a leader has stopped
+before another starts, unless one clock runs at two thirds of the other's speed.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-SHARE = 2 / 3  # of a lease's duration that its leader uses; the rest is for writes that are on their way
+SHARE = 2 / 3  # of a lease's duration, for its leader; the rest is for writes that are in flight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Claim:
-    """What a Lease says.
+    """The spec of a Lease.
 
     Attributes:
-        holder: identity of the leader; "" for nobody.
+        holder: identity of the leader; "" without a leader.
         duration_s: seconds without a renewal after which others may take it.
-        renewed: the leader's word for when it renewed; compared for being the same, never as a time.
-        transitions: how many times the lease has passed on.
+        renewed: the leader's time of the last renewal; compared for equality only, never with a clock.
+        transitions: how often the leader has changed.
     """
 
     holder: str = ""
@@ -31,7 +31,7 @@ class Claim:
 
     @classmethod
     def read(cls, lease: Mapping[str, Any]) -> "Claim":
-        """Return what a Lease object says; what it leaves out is nobody's and 0."""
+        """Return the claim in a Lease object; an absent field is "" or 0."""
         spec = lease.get("spec") or {}
         return cls(
             holder=str(spec.get("holderIdentity") or ""),
@@ -43,27 +43,27 @@ class Claim:
 
 @dataclass(slots=True)
 class Sighting:
-    """What a follower saw of another's lease, and when it last saw a change."""
+    """A follower's view of the lease: the last claim, and when the follower saw it change."""
 
     claim: Claim = field(default_factory=Claim)
     since: float = float("-inf")
 
     def see(self, claim: Claim, now: float) -> None:
-        """Take notice of what the Lease says now."""
+        """Record the claim that the Lease has now."""
         if claim != self.claim:
             self.claim, self.since = claim, now
 
     def free(self, now: float) -> bool:
-        """Whether the lease may be taken: nobody has it, or it was not renewed for its whole duration."""
+        """Return whether the lease may be taken: it has no holder, or was not renewed for its duration."""
         return not self.claim.holder or now >= self.since + self.claim.duration_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tenure:
-    """A leader's own: when it sent the renewal that succeeded last.
+    """A leader's own view: when it sent the last successful renewal.
 
     Attributes:
-        sent: on the leader's clock, before the request went out.
+        sent: on the leader's clock, just before the request.
         duration_s: of the lease.
     """
 
@@ -71,5 +71,5 @@ class Tenure:
     duration_s: float
 
     def holds(self, now: float) -> bool:
-        """Whether the leader may still act; false before anybody else may."""
+        """Return whether the leader may still act; false before another may."""
         return now < self.sent + self.duration_s * SHARE

@@ -1,7 +1,7 @@
-"""The bytes of a request: an access to the API server, deadlines of our own.
+"""The bytes of a request, with a deadline on the whole answer.
 
-Of the official client no call is used: its models cost ten times the time and twice the memory of plain JSON,
-and its calls have no deadline on the answer's body.
+The official client makes no request: its models need ten times the time and twice the memory of plain JSON,
+and its calls have no deadline for the answer's body.
 """
 
 import json
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 OnRequest = Callable[[str, str, int, float], None]
 CHUNK = 1 << 16
 MOST_BYTES = 1 << 26  # an object has 1.5 MiB at most, a page 500 objects, of which few are large
-SWITCHED = 101  # to the protocol of websockets
+SWITCHED = 101  # HTTP status: switching to the websocket protocol
 FIRST_ERROR = 400
 JSON = "application/json"
 
 
 class ConnectionBroke(Unreachable):
-    """The connection ended before the answer did: a read may be repeated at once."""
+    """The connection broke before the end of the answer: a read may be repeated at once."""
 
 
 def nothing(verb: str, resource: str, code: int, seconds: float) -> None:
-    """Take no notice of a request."""
+    """Ignore a request; the default of `on_request`."""
     del verb, resource, code, seconds
 
 
@@ -44,13 +44,13 @@ class Call:
     """One request.
 
     Attributes:
-        verb: as metrics and RBAC have it: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
+        verb: as in metrics and RBAC: `list`, `get`, `create`, `patch`, `apply`, `delete`, `watch`.
         plural: the resource, for metrics.
         path: from the root of the API server.
-        query: parameters; those that are None are left out, lists are repeated.
+        query: parameters; those that are None are left out, a list repeats its name.
         accept: media type of the answer.
         body: an object, sent as JSON.
-        waits: whether a server that is busy (429) is asked again within the deadline.
+        waits: whether to retry within the deadline if the server is busy (429).
     """
 
     verb: str
@@ -80,7 +80,7 @@ class Transport:
 
     Attributes:
         limits: how long anything may take.
-        on_request: told about every request.
+        on_request: called after every request.
     """
 
     def __init__(self, access: Access, limits: Limits) -> None:
@@ -94,17 +94,17 @@ class Transport:
     def call(self, call: Call, call_s: float) -> dict[str, Any]:
         """Return the answer to one request, an object.
 
-        Takes at most twice `call_s`, even where the answer comes byte by byte.
+        It takes at most twice `call_s`, even if the answer comes byte by byte.
 
         Raises:
-            ApiError: any other answer, and none.
+            ApiError: the answer is another one, or there is none.
         """
         deadline = time.monotonic() + call_s
         broke, turned_away = False, 0
         while True:
             try:
                 return self._timed(call, deadline)
-            except TooManyRequests as error:  # turned away, so certainly not done
+            except TooManyRequests as error:  # rejected, so certainly not done
                 turned_away += 1
                 wait_s = error.retry_after_s + self.limits.turned_away.wait_s(turned_away)
                 if not call.waits or time.monotonic() + wait_s >= deadline:
@@ -116,7 +116,7 @@ class Transport:
                 broke = True
 
     def open(self, call: Call, *, silence_s: float) -> BaseHTTPResponse:
-        """Return a running answer, to be read and closed by the caller; a read waits `silence_s` at most.
+        """Return a streamed answer, which the caller reads and closes; a read waits `silence_s` at most.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
@@ -129,7 +129,7 @@ class Transport:
             raise
 
     def channel(self, call: Call) -> "WebSocket":
-        """Return the socket of a command in a container, to be closed by the caller.
+        """Return the socket of a command in a container, which the caller closes.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
@@ -209,7 +209,7 @@ class Transport:
             raise _unreachable(error, f"{call.method} {self.host}{call.path}") from error
 
     def _authorization(self) -> dict[str, str]:
-        with self._credentials:  # a token is read anew, or a plugin runs, once for all that wait
+        with self._credentials:  # one thread reads the token or runs the plugin, for all that wait
             header = self._access.authorization()
         return {} if header is None else {"Authorization": header}
 
@@ -225,7 +225,7 @@ class Transport:
 
 
 def read_some(response: BaseHTTPResponse) -> bytes:
-    """Return the next bytes of an answer, as soon as there are any; none at its end.
+    """Return the next bytes of an answer, as soon as there are any; b"" at its end.
 
     Raises:
         Unreachable: the connection broke, or was silent for too long.

@@ -15,8 +15,8 @@ from palaestra.cluster.transport import MOST_BYTES, Call, OnRequest, read_some
 class Watch:
     """The changes after a version: iterate over events, dicts with `type` and `object`.
 
-    Types are ADDED, MODIFIED, DELETED and BOOKMARK; an ERROR event is raised instead. A line that the API
-    server did not finish is never seen.
+    Types are ADDED, MODIFIED, DELETED and BOOKMARK; an ERROR event is raised as an ApiError. An incomplete
+    last line is not yielded.
     """
 
     def __init__(self, response: BaseHTTPResponse, call: Call, on_request: OnRequest) -> None:
@@ -27,12 +27,12 @@ class Watch:
         self._closed = threading.Event()
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        """Yield events; ends when the API server ends the watch, or when it is closed.
+        """Yield events until the API server ends the watch, or until it is closed.
 
         Raises:
-            Gone: the version is forgotten: list again.
+            Gone: the version has expired: list again.
             ApiError: another error from the API server.
-            Unreachable: the connection broke, was silent for too long, or carries no JSON.
+            Unreachable: the connection broke, was silent for too long, or an event is not JSON.
         """
         code = self._response.status
         try:

@@ -1,19 +1,18 @@
-"""From a job and what was seen of it to its status and what is to be done.
+"""Decide the status of a job and the actions for it, from the job and an observation.
 
-Pure: the clocks are passed in. Decisions are lists of small named checks, in order: what keeps a job from
-starting (`holds`), and in `judging` how a replica is judged: how it ended, what ends it, what gets it a new
-pod, and what it waits for.
+Pure: the clocks are passed in. Decisions are ordered lists of small named checks. `HOLDS` in `preparing` has
+those that keep a job from starting; `JUDGED` in `judging` has those of a replica.
 
     job = accept(raw)                                  # Refused: decision = reject(raw, refused, now)
     observed = observe(job, objects)
     planned = prepare(job, observed, layout)           # plans only what is still missing
     decision = decide(job, observed, planned, Times(now=..., clock_s=..., record=...))
     # do decision.actions, write fitted(raw, as_data(decision.status)) if write_in_s(...) is 0, then
-    # decision.events;
-    # decision.record is for the next look
+    # emit decision.events;
+    # decision.record is for the next reconcile
 
-Objects are created only after the status that accepts the job was written: it holds the release's
-images, so that an upgraded operator plans the same. Terminal replicas are never planned again.
+Objects are created only after the status that accepts the job was written. It holds the release's images, so
+that an upgraded operator makes the same plan. Terminal replicas are never planned again.
 """
 
 from palaestra.decide.accepting import Refused, accept, managed_here, reject

@@ -1,4 +1,4 @@
-"""A TrainingJob from the API server's JSON, or why it cannot be one: one bad object delays no other."""
+"""Read a TrainingJob from the API server's JSON, or refuse it, so that a bad object delays no other."""
 
 from collections.abc import Mapping
 from datetime import datetime
@@ -17,15 +17,15 @@ from palaestra.decide.moments import first_of, seconds_to, whole
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.reading import count, part, text
 
-MANAGER = "palaestra.dev/operator"  # spec.managedBy of what is ours, where it is given at all
+MANAGER = "palaestra.dev/operator"  # spec.managedBy of our jobs, if they have it
 
 
 class Refused(TrainingJobError, ValueError):
-    """What an API server holds cannot be looked after as it stands; retrying cannot help.
+    """The operator cannot run this TrainingJob as it is; retrying cannot help.
 
     Attributes:
-        reason: in one word.
-        message: in a sentence.
+        reason: one word.
+        message: a sentence.
     """
 
     def __init__(self, reason: Reason, problem: str) -> None:
@@ -35,7 +35,7 @@ class Refused(TrainingJobError, ValueError):
 
 
 def managed_here(raw: Mapping[str, Any]) -> bool:
-    """Return whether to look after the object: it names no other controller, and nobody deletes it."""
+    """Return whether the operator runs this job: it names no other controller, and is not being deleted."""
     manager = part(raw, "spec").get("managedBy")
     ours = manager is None or manager == MANAGER
     return ours and "deletionTimestamp" not in part(raw, "metadata")
@@ -45,7 +45,7 @@ def accept(raw: Mapping[str, Any]) -> TrainingJob:
     """Return the TrainingJob that `raw` describes, with its status.
 
     Raises:
-        Refused: the spec breaks a rule that an API server cannot check, or the status is not ours.
+        Refused: the spec breaks a rule that an API server cannot check, or the status is unreadable.
     """
     try:
         job = validate({name: value for name, value in raw.items() if name != "status"})
@@ -55,10 +55,10 @@ def accept(raw: Mapping[str, Any]) -> TrainingJob:
 
 
 def reject(raw: Mapping[str, Any], refused: Refused, now: datetime) -> Decision:
-    """Return the decision about an object that was refused.
+    """Return the decision about a refused job.
 
-    A job that was never accepted has failed for good: a spec does not change. One that was accepted, by
-    an older release, goes on as it is: its pods are not this release's to touch.
+    A job that was never accepted has failed for good, because a spec does not change. A job that an older
+    release accepted continues as it is; this release does not touch its pods.
     """
     now = whole(now)
     told = Told(reason=refused.reason, message=refused.message)

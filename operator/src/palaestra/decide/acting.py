@@ -1,4 +1,4 @@
-"""What is to be done, in order: stop, replace pods, suspend or resume, discard, create what is missing."""
+"""The actions for a job, in order: stop, replace pods, suspend or resume, discard, create missing objects."""
 
 from collections.abc import Iterator, Sequence
 
@@ -15,7 +15,7 @@ from palaestra.plan import Object, Plan, ReplicaPlan
 def actions(
     job: TrainingJob, observed: Observed, prepared: Prepared, each: Sequence[Decided]
 ) -> tuple[Action, ...]:
-    """Return everything that is to be done about the replicas of a job."""
+    """Return the actions for the replicas of a job."""
     stops = tuple(_stops(observed, each))
     stopping = {stop.replica for stop in stops}
     switches = tuple(it for it in _switches(job, observed, prepared, each) if it.replica not in stopping)
@@ -26,10 +26,11 @@ def actions(
 
 
 def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) -> tuple[Create, ...]:
-    """Return what is missing of the objects of replicas that have not ended, in the order of creation.
+    """Return the missing objects of replicas that have not ended, in the order of creation.
 
-    A Job waits for the pods of the one before it: two pods of a replica would write to one volume. To a
-    Job that is there belong the volumes that it names, whatever a newer release would call them.
+    A Job is created only after the pods of the Job before it have ended: two pods of a replica would write to
+    one volume. If a Job exists, its volumes have the names in it, even if a newer release names them
+    otherwise.
     """
     going_on = [each for each in observed.replicas if replicas[each.index].phase not in TERMINAL]
     if not going_on:
@@ -59,7 +60,7 @@ def _there(thing: Object, observed: Observed) -> bool:
 
 
 def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
-    """Yield the stop of each replica that has to end and was not stopped yet."""
+    """Yield a stop for each replica that has to end and was not stopped yet."""
     for seen, it in zip(observed.replicas, each, strict=True):
         if seen.job is None or seen.job.end is not None:
             continue
@@ -74,7 +75,7 @@ def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
 
 
 def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Replace]:
-    """Yield the replacement of each pod that no kubelet heals; one that is being deleted is."""
+    """Yield a replacement for each pod that no kubelet repairs, unless the pod is being deleted."""
     for seen, it in zip(observed.replicas, each, strict=True):
         why = it.course.replace
         if why is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
@@ -97,7 +98,7 @@ def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Repla
 def _switches(
     job: TrainingJob, observed: Observed, prepared: Prepared, each: Sequence[Decided]
 ) -> Iterator[SetSuspend]:
-    """Yield what makes the Jobs as suspended as the spec; none is resumed while something is closed to it."""
+    """Yield a change for each Job whose `suspend` is not as in the spec; a hold prevents a resumption."""
     for seen, it in zip(observed.replicas, each, strict=True):
         held = prepared.closed is not None and to_resume(job, seen.job)
         going_on = it.status.phase not in TERMINAL and not held
@@ -112,9 +113,9 @@ def _switches(
 
 
 def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
-    """Yield the deletion of each Job that is stopped and suspended, once the status says that it ended.
+    """Yield the deletion of each stopped and suspended Job, once the status says that its replica ended.
 
-    Its deadline does not run while it is suspended, so nothing else would ever end it.
+    The deadline of a suspended Job does not run, so nothing else would ever end it.
     """
     ended = {each.index for each in job.status.replicas if each.phase in TERMINAL}
     for seen in observed.replicas:

@@ -17,7 +17,7 @@ from palaestra.observe.views import JobView, PodView
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode, Termination
 
-BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # what a deletion may lead to
+BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # possible results of a deletion
 GONE = "its pod is gone; no last word"
 TAKEN, AGAIN = ", which took it back", "; it goes on from the last checkpoint"
 _HUNG = "SimulatorHung"  # how a last word begins
@@ -31,8 +31,8 @@ class Attempt:
         it: the replica.
         number: from 1.
         name: of its pod.
-        pod: None: it is gone.
-        code: exit code of its trainer; None: nobody knows.
+        pod: None if it is gone.
+        code: exit code of its trainer; None if unknown.
     """
 
     it: Situation
@@ -43,12 +43,12 @@ class Attempt:
 
     @property
     def word(self) -> Termination | None:
-        """Return the trainer's last word."""
+        """Return the trainer's termination message, its last word."""
         return self.it.seen.terminations.get(self.pod.uid) if self.pod is not None else None
 
     @property
     def words(self) -> str:
-        """Return why it ended, in the best words that there are."""
+        """Return why it ended, in the best words that are known."""
         if self.word is not None:
             return self.word.reason
         return how_it_failed(self.it, self.pod) if self.pod is not None else GONE
@@ -58,7 +58,7 @@ EndCheck = Callable[[Attempt], Told | None]
 
 
 def of_pod(it: Situation, pod: PodView, number: int) -> Attempt:
-    """Return the attempt of a pod that is still there."""
+    """Return the attempt of a pod that still exists."""
     return Attempt(it=it, number=number, name=pod.name, pod=pod, code=exit_code(pod))
 
 
@@ -68,17 +68,17 @@ def completed(attempt: Attempt) -> Told | None:
 
 
 def evicted_for_storage(attempt: Attempt) -> Told | None:
-    """The pod wrote more than it may."""
+    """The pod was evicted because it wrote more than its limit."""
     return None if attempt.pod is None else storage_eviction(attempt.pod)
 
 
 def replaced(attempt: Attempt) -> Told | None:
-    """The operator took the pod, since no kubelet heals it."""
+    """The operator replaced the pod, because no kubelet repairs it."""
     return None if attempt.pod is None else mark_of(attempt.it, attempt.pod)
 
 
 def disrupted(attempt: Attempt) -> Told | None:
-    """The cluster took the pod, by its own word."""
+    """The cluster interrupted the pod, by a condition of the pod."""
     if attempt.pod is None or not attempt.pod.disruption:
         return None
     return told(Reason.DISRUPTED, pod=attempt.name, words=attempt.pod.disruption)
@@ -108,7 +108,7 @@ def deleted(attempt: Attempt) -> Told | None:
         return stop
     if job is not None and (job.suspended or ended_by_suspension(attempt.it.seen, pod)):
         return paused(attempt.it)
-    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # as the Job counts it
+    if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # the Job counts it so
         how = f"{how_it_failed(attempt.it, pod)}; its pod was deleted, and it did not save in time"
         return told(Reason.TRAINER_FAILED, how=how)
     return told(Reason.DISRUPTED, pod=attempt.name, words="it was deleted")
@@ -165,11 +165,11 @@ def stalled(attempt: Attempt) -> Told | None:
 
 
 def storage_full(attempt: Attempt) -> Told | None:
-    """The volume takes no more."""
+    """The volume is full."""
     return full_volume(attempt.word)
 
 
-# What a pod may come to by itself; it would come to the same again.
+# Ends that a new pod would repeat.
 CAUSES: tuple[EndCheck, ...] = (
     configuration_refused,
     simulator_budget_spent,
@@ -193,17 +193,17 @@ ENDS: tuple[EndCheck, ...] = (
 
 
 def why(attempt: Attempt) -> Told:
-    """Return why an attempt ended, in the words of the first check that knows."""
+    """Return why an attempt ended, by the first check that holds."""
     return first(ENDS, attempt) or told(Reason.TRAINER_FAILED, how=attempt.words)
 
 
 def first(checks: tuple[EndCheck, ...], attempt: Attempt) -> Told | None:
-    """Return what the first check says that knows."""
+    """Return the result of the first check that holds."""
     return next((found for check in checks if (found := check(attempt)) is not None), None)
 
 
 def stop_of(job: JobView) -> Told | None:
-    """Return why we stopped a replica, by the mark on its Job; None: we did not."""
+    """Return why the operator stopped a replica, by the mark on its Job; None if it did not."""
     if job.stopped is None:
         return None
     reason, message = job.stopped
@@ -211,7 +211,7 @@ def stop_of(job: JobView) -> Told | None:
 
 
 def paused(it: Situation, why: str = "") -> Told:
-    """Return why a Job is suspended, and by whom: with a queue that is Kueue's doing, maybe in its words."""
+    """Return why a Job is suspended; if it has a queue, Kueue did it, and `why` is its message."""
     queue = (it.seen.job.queue if it.seen.job else "") or it.job.spec.scheduling.queue_name
     if not queue:
         return told(Reason.SUSPENDED, by=suspended_by(it.job, it.seen))
@@ -220,7 +220,7 @@ def paused(it: Situation, why: str = "") -> Told:
 
 
 def success(word: Termination | None) -> str:
-    """Return how far a training came that is complete."""
+    """Return the result of a complete training."""
     if word is None:
         return "the training is complete"
     rate = f", success rate {word.success_rate:.2f}" if word.success_rate is not None else ""

@@ -1,11 +1,11 @@
 """The conditions of a TrainingJob.
 
-Five are always there, each with a reason whether it holds or not. The subject of a job's reason is the
-condition of its phase; of a job that is Pending, it is Accepted while that does not hold, then Running.
+Five of them always exist, each with a reason, whether it holds or not. The subject of a job's reason is the
+condition of its phase. For a Pending job, the subject is Accepted while that does not hold, then Running.
 
-Two more are there only while they hold; kstatus reads them, the library by which Flux and `helm --wait` wait.
-A job is `Reconciling` while it approaches its spec, and `Stalled` when it needs a person to get there. A job
-with neither matches its spec: it trains, has succeeded, or is suspended.
+Two more exist only while they hold. Flux and `helm --wait` read them through the library kstatus: a job is
+`Reconciling` while it is not yet as its spec asks, and `Stalled` if it needs a person to get there. A job
+with neither is as its spec asks: it trains, has succeeded, or is suspended.
 """
 
 from collections.abc import Mapping
@@ -43,10 +43,10 @@ Claims = Mapping[ConditionType, Claim]
 
 
 def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
-    """Return the claim of each condition of a job that stands in `phase` for the reason `why`.
+    """Return the claim of each condition of a job in `phase` for the reason `why`.
 
-    All have the reason; only its subject has the whole message, or `kubectl describe` would print it
-    four times.
+    All have the reason, but only its subject has the whole message; otherwise `kubectl describe` would print
+    it four times.
     """
     true = _CONDITION_OF.get(phase)
     subject = true or (ConditionType.RUNNING if accepted.holds else ConditionType.ACCEPTED)
@@ -59,10 +59,10 @@ def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
 
 
 def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
-    """Return `Stalled` or `Reconciling` of a job that is not as its spec asks, nothing of one that is.
+    """Return `Stalled` or `Reconciling` if a job is not as its spec asks, else no claim.
 
-    Each has the whole message: it is all that kstatus passes on. A job in a queue waits for its turn,
-    whatever its spec says of a suspension: a queue does not heed that.
+    Each has the whole message, because kstatus shows nothing else. A job in a queue is `Reconciling` even if
+    its spec asks for a suspension, because Kueue ignores that.
 
     Args:
         phase: of the job.
@@ -78,10 +78,10 @@ def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
 
 
 def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
-    """Return the conditions of a job that has ended: those that it has, with `Stalled` if it failed.
+    """Return the conditions of an ended job: those that it has, and `Stalled` if it failed.
 
-    One that failed under an earlier release has no `Stalled`, nor has one whose end was written before the
-    definition in the cluster was known to take it.
+    `Stalled` may be missing: an earlier release wrote the end, or the cluster's definition was not yet known
+    to have this condition.
     """
     failed = condition(ended, ConditionType.FAILED)
     if ended.phase is not Phase.FAILED or failed is None or condition(ended, ConditionType.STALLED):
@@ -90,7 +90,7 @@ def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
 
 
 def conditions(old: Status, current: Claims, generation: int | None, now: datetime) -> tuple[Condition, ...]:
-    """Return the conditions of the current claims; one whose status has not changed keeps its time."""
+    """Return the conditions for the current claims; if a status has not changed, its time stays."""
     before = {each.type: each for each in old.conditions}
     return tuple(
         _condition(kind, claim, before.get(kind), generation, now) for kind, claim in current.items()
@@ -98,7 +98,7 @@ def conditions(old: Status, current: Claims, generation: int | None, now: dateti
 
 
 def condition(status: Status, kind: ConditionType) -> Condition | None:
-    """Return the condition of a type, None where the status has none."""
+    """Return the condition of a type; None if the status has none."""
     return next((each for each in status.conditions if each.type is kind), None)
 
 

@@ -1,20 +1,20 @@
-"""Attempts and restarts of a replica: exact, never falling, and counted from what is, not from what happened.
+"""Exact counts of a replica's attempts and restarts, from the current state instead of from events.
 
-The status is the memory. It names the pod of the current attempt (`pod`), so that every pod made after
-that one is a new attempt, however many came and went since the status was written; the trainers' record
-in the run directory (`attempt` in /status and in the last word) adds those that nobody saw. Whatever was
-replaced has one of four causes, and 1 + trainer + disruption + suspension + operator is the attempt's
-number:
+The status is the memory. It names the pod of the current attempt (`pod`), and every pod created after that
+one is a new attempt. Trainers record their attempts in the run directory, and report the number in /status
+and in the termination message; this adds attempts whose pods the operator never saw.
+Each replaced pod has one of four causes. The attempt's number is 1 + trainer + disruption + suspension +
+operator:
 
-    trainer     the pod failed by itself, by its own evidence or by the Job's count of failures
-    operator    the operator replaced the pod, by the mark on its Job
-    suspension  the operator suspended the Job while the pod lived, by the mark on the Job; if another
-                controller suspended it, the status showed so between the two pods, or the Job's times do
-    disruption  all others: the cluster or a person took the pod, or it exited with 75
+- trainer: the pod failed by itself, by its own evidence or by the Job's count of failures.
+- operator: the operator replaced the pod, by the mark on its Job.
+- suspension: the operator suspended the Job while the pod ran, by the mark on the Job. If another controller
+  suspended it, the status between the two pods shows that, or the times of the Job do.
+- disruption: all others. The cluster or a person deleted the pod, or it exited with 75.
 
-A failed pod that was not replaced yet is no restart. Restarts of simulators are counted within an attempt
-by its trainer; the status holds that count (`simulatorRestarts`) beside the sum, so that only what is new
-is added. All of it is written at once, on the status that was read, so nothing counts twice.
+A failed pod that has no successor yet is no restart. The trainer counts the restarts of simulators within
+its attempt. The status holds that count (`simulatorRestarts`) beside the sum, so that only the difference is
+added. All counts are one write, based on the status that was read, so nothing is counted twice.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,8 +27,9 @@ from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import JobView, PodView, ReplicaObserved
 from palaestra_protocol.pod.status import ExitCode
 
-MOST_UNSEEN = 100  # pods that a trainer's record may have and nobody saw: a record is not to be trusted
-# The Job controller makes the pod first and takes the time of the resumption then; both are whole seconds.
+MOST_UNSEEN = 100  # unseen pods that a trainer's record may add; a pod may report anything
+
+# The Job controller creates the pod first and takes the time of the resumption then, both in whole seconds.
 _DATED_LATE = timedelta(seconds=2)
 
 
@@ -45,7 +46,7 @@ class Counted:
 
 
 def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
-    """Return the counts after what is seen; `old` is what the status said."""
+    """Return the counts after the observation `seen`; `old` is the status so far."""
     newer = newer_pods(old, seen.pods)
     attempt = _attempt(old, seen, newer)
     restarts = _restarts(old, seen, newer, attempt)
@@ -64,10 +65,10 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
 
 
 def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ...]:
-    """Return the pods made after the one that the status names, oldest first.
+    """Return the pods created after the one that the status names, oldest first.
 
-    Times are whole seconds: where the named pod is gone, a pod of the same second came after it. An older one
-    that is still listed had failed, and the Job controller waits seconds before it makes the next.
+    Times are whole seconds. If the named pod is gone, a pod of the same second is newer: an older pod that is
+    still listed has failed, and the Job controller waits for seconds before it creates the next.
     """
     named = old.pod
     if named is None:
@@ -79,13 +80,13 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
 
 
 def failed_by_itself(pod: PodView) -> bool:
-    """Return whether the end of a pod counts against `backoffLimit`, as the podFailurePolicy has it."""
+    """Return whether the end of a pod counts against `backoffLimit`, by the rules of podFailurePolicy."""
     interrupted = pod.trainer is not None and exit_code(pod) == ExitCode.INTERRUPTED
     return pod.phase == "Failed" and not pod.disruption and not interrupted
 
 
 def has_run(pod: PodView) -> bool:
-    """Return whether a pod's trainer has run, or does."""
+    """Return whether a pod's trainer runs or has run."""
     trainer = pod.trainer
     return trainer is not None and (trainer.running_since is not None or trainer.exit is not None)
 
@@ -96,7 +97,7 @@ def lives(pod: PodView) -> bool:
 
 
 def exit_code(pod: PodView) -> int | None:
-    """Return the exit code of a pod's trainer; None: it has not ended, or nobody knows."""
+    """Return the exit code of a pod's trainer; None if it has not ended, or its code is unknown."""
     trainer = pod.trainer
     ended = trainer is not None and trainer.running_since is None and trainer.exit is not None
     return trainer.exit.code if ended and trainer and trainer.exit else None
@@ -128,14 +129,14 @@ def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 
 def _by_evidence(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return how many of the pods that were replaced since failed by themselves."""
+    """Return how many of the pods replaced since the status failed by themselves."""
     named = [each for each in seen.pods if old.pod is not None and each.uid == old.pod.uid]
     chain = [*named, *newer]
     return sum(failed_by_itself(each) for each in chain[:-1])
 
 
 def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return how many of the pods that were replaced since had a trainer that ran, as far as is known."""
+    """Return for how many of the pods replaced since the status a trainer is known to have run."""
     named = [each for each in seen.pods if old.pod is not None and each.uid == old.pod.uid]
     chain = [*named, *newer]
     gone = old.pod is not None and not named and old.phase is Phase.RUNNING
@@ -143,7 +144,7 @@ def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 
 def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
-    """Return how many failures the Job has booked that are not counted yet, but the newest pod's own."""
+    """Return how many failures of older pods the Job has counted that the status has not."""
     if seen.job is None:
         return 0
     last = seen.pod is not None and failed_by_itself(seen.pod)
@@ -151,7 +152,7 @@ def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
 
 
 def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
-    """Return how many pods the operator has replaced that are not counted yet, but the newest."""
+    """Return how many older pods the operator has replaced that are not counted yet."""
     mark = seen.job.replaced if seen.job is not None else None
     if mark is None:
         return 0
@@ -160,7 +161,7 @@ def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
 
 
 def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return 1 if a suspension ended one of the pods that were replaced since."""
+    """Return 1 if a suspension ended one of the pods replaced since the status."""
     if not newer or seen.job is None:
         return 0
     replaced = {old.pod.uid if old.pod is not None else "", *(each.uid for each in newer[:-1])}
@@ -173,7 +174,7 @@ def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVie
 
 
 def _ended_otherwise(old: ReplicaStatus) -> bool:
-    """Return whether the current pod of a suspended replica had ended before, for a reason of its own."""
+    """Return whether the current pod of a suspended replica had already ended for another reason."""
     last = old.last_attempt
     if last is None or last.attempt != old.attempt:
         return False
@@ -181,7 +182,7 @@ def _ended_otherwise(old: ReplicaStatus) -> bool:
 
 
 def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodView]) -> int:
-    """Return 1 if the Job was suspended after the named pod was made, and resumed for the newest."""
+    """Return 1 if the Job was suspended after the named pod was created, and resumed for the newest."""
     if old.pod is None:
         return 0
     named, newest = old.pod.created, newer[-1].created

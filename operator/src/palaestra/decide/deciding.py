@@ -1,4 +1,4 @@
-"""The decision: each replica by itself, then the job as a whole, then what is to be done."""
+"""The decision: each replica by itself, then the job as a whole, then the actions."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,10 +37,10 @@ EPHEMERAL = "; the run is ephemeral and goes with its pod"
 
 
 def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Times) -> Decision:
-    """Return the status of a job and what is to be done about it.
+    """Return the status of a job and the actions for it.
 
-    Deciding again on the status and the record that came out, with nothing else changed, gives the same
-    status, no event of a change, and no action but those that have not shown an effect yet.
+    A second decision on the resulting status and record, with the same observation, gives the same status and
+    no event of a change. Its actions are only those without an effect so far.
     """
     now = whole(times.now)
     times = replace(times, now=now)
@@ -70,7 +70,7 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
 
 
 def _record(job: TrainingJob, each: Sequence[Decided], status: Status, times: Times) -> Record:
-    """Return what this look leaves to the next: the waits that go on, their troubles, and the active time."""
+    """Return the record for the next reconcile: open waits, their troubles, and the active time."""
     return Record(
         waits={
             (it.status.index, *wait.key): times.since_s(it.status.index, wait)
@@ -102,13 +102,13 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
 
 
 def _kept(job: TrainingJob, each: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
-    """Return the replicas of a job that has ended; one that it never had is not made up."""
+    """Return the replicas of an ended job; only those that its status has."""
     had = {it.index for it in job.status.replicas}
     return tuple(it.status for it in each if it.status.index in had)
 
 
 def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Told | None:
-    """Return why to stop a replica that failed while its Job goes on, as one that was made meanwhile."""
+    """Return why to stop a failed replica whose Job still runs, for example because it was just created."""
     going_on = seen.job is not None and seen.job.end is None and seen.job.stopped is None
     if not going_on or old.phase is not Phase.FAILED:
         return None
@@ -116,7 +116,7 @@ def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Told | None:
 
 
 def _active_left_s(job: TrainingJob, times: Times) -> float | None:
-    """Return how much of its active time a job has left; None: it is suspended, or there is no bound."""
+    """Return how much of its active time a job has left; None if it is suspended or has no deadline."""
     bound, spent_s = job.spec.active_deadline_seconds, times.active_s(job.status.active_seconds)
     if bound is None or (job.status.active_since is None and spent_s < bound):
         return None
@@ -152,19 +152,19 @@ def _status(
 
 
 def _reconciliation(job: TrainingJob, where: Verdict, replicas: Sequence[ReplicaStatus]) -> Claims:
-    """Return how far the job is from its spec; a replica says why it trains though `suspend` is set."""
+    """Return the claims `Stalled` and `Reconciling`; a replica that ignores `suspend` gives the reason."""
     unheeded = where.phase is Phase.RUNNING and job.spec.suspend
     why = as_first(replicas, Phase.RUNNING).told if unheeded else where.told
     return reconciliation(where.phase, why, suspend=job.spec.suspend)
 
 
 def _waits(observed: Observed, prepared: Prepared) -> bool:
-    """Return whether a hold keeps all of a job from being planned, so that none of its time passes."""
+    """Return whether a hold prevents the plan of all replicas, so that no active time passes."""
     return prepared.hold is not None and all(each.job is None for each in observed.replicas)
 
 
 def _accepted(job: TrainingJob, prepared: Prepared) -> Claim:
-    """Return whether the job is accepted; once it was, it stays so."""
+    """Return whether the job is accepted; an accepted job stays accepted."""
     if prepared.hold is not None and job.status.release is None:
         return Claim(holds=False, told=prepared.hold.told)
     note = EPHEMERAL if job.spec.storage.ephemeral else ""

@@ -1,4 +1,4 @@
-"""What `decide` returns: a status, and what is to be done; nothing here does anything."""
+"""The result of `decide`: a status, actions and events, as data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from palaestra.plan.job import suspend_set
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Basis:
-    """What a change of a Job was decided on; one that is different by now is looked at anew.
+    """The versions on which a change of a Job was decided; if they have changed, the change is not made.
 
     Attributes:
         uid, version: of the Job.
@@ -29,10 +29,11 @@ class Basis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Create:
-    """Create `object` in its namespace; it has no `replica` when it belongs to the whole job.
+    """Create `object` in its namespace; `replica` is None if it belongs to the whole job.
 
-    AlreadyExists is no error for a ConfigMap, claim or NetworkPolicy: their names say what they are. A
-    Job that exists belongs among `Objects.jobs`, whoever owns it; `observe` tells whose it is.
+    AlreadyExists is no error for a ConfigMap, claim or NetworkPolicy, because their names determine their
+    content. A Job that exists is added to `Objects.jobs`, also if another object owns it; `observe` finds its
+    owner.
     """
 
     object: Mapping[str, Any]
@@ -41,7 +42,7 @@ class Create:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """Stop a replica for good: one patch of its Job, which survives whoever wrote it."""
+    """Stop a replica for good, by one patch of its Job; it stays stopped if the operator restarts."""
 
     job: str
     replica: int
@@ -60,13 +61,13 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replace:
-    """Replace the pod of a replica: first the patch of its Job, then an eviction of the pod with this uid.
+    """Replace the pod of a replica: first patch its Job, then evict the pod with this uid.
 
-    In this order it can be done again after either: a mark at a pod that lives is an eviction to be done.
+    In this order both steps can be repeated: if the marked pod still runs, the eviction has to be done.
 
     Attributes:
-        times: pods of the replica that were replaced so, this one among them.
-        marked: the Job carries the mark already.
+        times: pods of the replica that were replaced this way, including this one.
+        marked: whether the Job has the mark already.
     """
 
     job: str
@@ -88,10 +89,10 @@ class Replace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetSuspend:
-    """Suspend or resume the Job of a replica. Never given for a job with a queue: Kueue owns that.
+    """Suspend or resume the Job of a replica; never for a job with a queue, which Kueue suspends.
 
     Attributes:
-        mark: of the pod that the suspension ends, or ended; None: the Job's mark stays as it is.
+        mark: the pod that the suspension ends or ended; None leaves the Job's mark unchanged.
     """
 
     job: str
@@ -111,10 +112,10 @@ class SetSuspend:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Discard:
-    """Delete the suspended Job of a replica that has ended, before a queue admits it and takes others' place.
+    """Delete the suspended Job of an ended replica; otherwise a queue would admit it and preempt others.
 
-    Only once the Job is marked as stopped and the status calls the replica ended, so that the operator that
-    follows one killed in between reads both.
+    The Job is marked as stopped, and the status says that the replica has ended, before the deletion. So an
+    operator that restarts in between reads both.
     """
 
     job: str
@@ -124,7 +125,7 @@ class Discard:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delete:
-    """Delete the TrainingJob with this `uid`, in the background: it has ended `after_s` seconds ago."""
+    """Delete the TrainingJob with this `uid`, in the background; it ended `after_s` seconds ago."""
 
     name: str
     uid: str
@@ -144,9 +145,9 @@ class HappeningType(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Happening:
-    """An event about the TrainingJob, to be written after the status was.
+    """An event about the TrainingJob, to be written after the status.
 
-    With `once` it says how things are, at each look, and is written for the first only.
+    With `once` it describes a state: each reconcile yields it, and only the first one is written.
     """
 
     type: HappeningType
@@ -158,14 +159,14 @@ class Happening:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What follows from what was seen.
+    """The decision on one observation.
 
     Attributes:
-        status: the whole status; `write_in_s` says when to write it. None: leave it alone.
-        actions: in the order in which they are to be done.
-        events: to be written once the status is.
-        wake_after_s: seconds until time alone may change something; None: nothing will.
-        record: for the next look of this process.
+        status: the whole status; `write_in_s` returns when to write it. None leaves the status unchanged.
+        actions: in the order in which to do them.
+        events: to be written after the status.
+        wake_after_s: seconds until the decision may change by time alone; None: never.
+        record: for the next reconcile of this process.
     """
 
     status: Status | None

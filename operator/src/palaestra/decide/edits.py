@@ -1,4 +1,4 @@
-"""What others changed in objects of ours: it is reported once for each edit, and nothing is put back."""
+"""Changes by others in the operator's objects: each is reported once, and none is undone."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from palaestra.observe.views import JobView, Observed
 
 
 def edits(job: TrainingJob, observed: Observed) -> Iterator[Happening]:
-    """Yield an event for each edit that stands; its words are other ones for each, by which it is known."""
+    """Yield an event for each edit that is still there; its message is unique, so it is written once."""
     for name, generation in observed.edited:
         fact = f"spec, generation {generation}; delete it and it is made again as planned"
         yield _event(f"NetworkPolicy {name}", fact, None)
@@ -19,7 +19,7 @@ def edits(job: TrainingJob, observed: Observed) -> Iterator[Happening]:
 
 
 def _changed(job: TrainingJob, seen: JobView) -> str:
-    """Return the settings of a Job that are not as it was made; "": all are."""
+    """Return the settings of a Job that differ from the plan; "" if none does."""
     planned = {
         "parallelism": 1,
         "backoffLimit": job.spec.backoff_limit,

@@ -1,4 +1,4 @@
-"""What ends a replica for good, whatever it does: its author's own bounds, and what cannot come right."""
+"""Checks that stop a replica for good: the limits that its author set, and causes that no retry removes."""
 
 from palaestra.api.reasons import Reason
 from palaestra.decide.counting import failed_by_itself, has_run
@@ -14,7 +14,7 @@ def active_deadline(it: Situation) -> Finding | None:
 
 
 def cannot_be_planned(it: Situation) -> Finding | None:
-    """What keeps its objects from being made is in the spec, which does not change."""
+    """No objects can be created from its spec, and a spec does not change."""
     if it.seen.job is not None or it.hold is None or not it.hold.final:
         return None
     return Finding(told=it.hold.told)
@@ -27,7 +27,7 @@ def image_name_is_invalid(it: Situation) -> Finding | None:
 
 
 def no_progress(it: Situation) -> Finding | None:
-    """Pods that are taken again and again count against no limit of Kubernetes."""
+    """Its pods are interrupted again and again without progress; Kubernetes has no limit for that."""
     limit = it.job.spec.most_fruitless
     pods = it.counted.fruitless + _taken_and_not_replaced(it)
     if limit == 0 or pods < limit:
@@ -38,7 +38,7 @@ def no_progress(it: Situation) -> Finding | None:
 
 
 def _taken_and_not_replaced(it: Situation) -> bool:
-    """Return whether the newest pod was taken: Kubernetes doubles the wait for the next each time."""
+    """Return whether the newest pod was interrupted; Kubernetes doubles the wait for the next each time."""
     pod = it.seen.pod
     if pod is None or not it.counted.furthest_step or mark_of(it, pod) is not None:
         return False

@@ -1,9 +1,9 @@
-"""A status within the bytes that its object may have: what people miss least goes first.
+"""Cut a status to the size that its object may have, beginning with the least important details.
 
-etcd refuses an object of more than 1.5 MiB, and the operator would send it again for ever. Each field of a
-status has a bound of its own, but a hundred replicas of 32 simulators are larger together, and the author's
-spec comes on top. What is left out here is only shown to people: no decision depends on it, and no event, or
-each look would emit it again.
+etcd refuses an object of more than 1.5 MiB, and the operator would send it again forever. Each field of a
+status has a limit of its own, but the status of a hundred replicas with 32 simulators each exceeds that size,
+and the author's spec adds to it. The removed details are only for people. No decision depends on them, and no
+event does; otherwise each reconcile would emit the event again.
 """
 
 import json
@@ -25,10 +25,10 @@ _OF_KILL = ("container", "times", "last")
 
 
 def fitted(job: Mapping[str, Any], status: Data) -> Data:
-    """Return a status as `as_data` gives it, without the details for which its job has no room.
+    """Return a status from `as_data`, without the details for which its job has no room.
 
-    The same status gives the same result, and a result is not cut again. A spec that leaves less than 450,000
-    bytes may leave too little.
+    The same status gives the same result, and a second call changes nothing. If a spec leaves less than
+    450,000 bytes, the result may still be too large.
     """
     room = MOST_BYTES - _taken(job)
     for cut in CUTS:
@@ -39,17 +39,17 @@ def fitted(job: Mapping[str, Any], status: Data) -> Data:
 
 
 def _size(data: Any) -> int:
-    return len(json.dumps(data))  # in ASCII, as requests are
+    return len(json.dumps(data))  # in ASCII, like requests
 
 
 def _taken(job: Mapping[str, Any]) -> int:
-    """Return the bytes of a job without its status, or the most that a small one may have."""
+    """Return the bytes of a job without its status; for a small job, the upper limit of a small one."""
     told = text(part(job, "metadata", "annotations"), SIZE)
     return int(told) if told.isdecimal() else SMALL
 
 
 def _of_replicas(cut: Cut, *, healthy: bool | None = None) -> Cut:
-    """Return what cuts all replicas, or those that are healthy, or those that are not."""
+    """Return a cut of all replicas, or only of the healthy or the unhealthy ones."""
 
     def cuts(replica: Data) -> bool:
         return healthy is None or (replica.get("phase") in _HEALTHY) is healthy
@@ -77,7 +77,7 @@ def _messages(replica: Data) -> Data:
 
 
 def _memory_kills(replica: Data) -> Data:
-    """Return a replica whose kills are counted, and known again by their time."""
+    """Return a replica with only the count and the time of each kill, by which a kill is recognized."""
     kills = [{name: each[name] for name in _OF_KILL} for each in replica.get("memoryKills", ())]
     return {**replica, "memoryKills": kills}
 
@@ -86,7 +86,7 @@ def _conditions(status: Data) -> Data:
     return {**status, "conditions": [_shortened(each) for each in status.get("conditions", ())]}
 
 
-# In this order, until the rest fits.
+# Applied in this order until the status fits.
 CUTS: tuple[Cut, ...] = (
     _of_replicas(_simulators, healthy=True),
     _of_replicas(_faults, healthy=True),

@@ -1,4 +1,4 @@
-"""Events: what changed between two statuses, and what is done about it."""
+"""Events for the changes between two statuses, and for the actions."""
 
 from collections.abc import Iterator, Sequence
 
@@ -21,17 +21,17 @@ from palaestra.plan.replica import TRAINER
 
 _ENDS = (ConditionType.SUCCEEDED, ConditionType.FAILED)
 _BY_ACTION = {Reason.PLANNED, Reason.RESUMED, Reason.EXPIRED}
-_BY_ATTEMPT = {Reason.DISRUPTED}  # one event an attempt, whatever was seen of the time between two
+_BY_ATTEMPT = {Reason.DISRUPTED}  # one event for each attempt, even if no reconcile saw it end
 
 
 def happening(reason: Reason, message: str, replica: int | None = None) -> Happening:
-    """Return the event of a reason, of the type that docs/operations.md gives it."""
+    """Return the event for a reason, of the type in docs/operations.md."""
     kind = HappeningType.WARNING if ROWS[reason].warning else HappeningType.NORMAL
     return Happening(type=kind, reason=reason, message=message, replica=replica)
 
 
 def of_change(old: Status, new: Status) -> Iterator[Happening]:
-    """Yield an event for each change of a condition or replica that somebody may wait for."""
+    """Yield an event for each change of a condition or replica for which a person or program may wait."""
     yield from _of_condition(old, new, ConditionType.ACCEPTED)
     before = {each.index: each for each in old.replicas}
     for each in new.replicas:
@@ -43,7 +43,7 @@ def of_change(old: Status, new: Status) -> Iterator[Happening]:
 
 
 def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
-    """Yield an event for everything that is done; the objects of a replica are one."""
+    """Yield an event for each action; the objects of a replica have one together."""
     created: dict[int | None, list[str]] = {}
     for action in actions:
         match action:
@@ -62,7 +62,7 @@ def of_actions(actions: Sequence[Action]) -> Iterator[Happening]:
 
 
 def _of_condition(old: Status, new: Status, kind: ConditionType) -> Iterator[Happening]:
-    """Yield an event if a condition changed and is worth one; that a job has not ended yet is not."""
+    """Yield an event if a condition changed, except that a job has not ended yet."""
     before, now = condition(old, kind), condition(new, kind)
     silent = now is None or (kind in _ENDS and now.status is ConditionStatus.FALSE)
     if now is None or silent or (before is not None and _same(before, now)):
@@ -84,7 +84,7 @@ def _of_replica(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happe
 
 
 def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
-    """Yield the event of an attempt that was disrupted: its pod may be gone, and the next one there."""
+    """Yield the event of a disrupted attempt; its pod may be gone and the next one running."""
     last, before = new.last_attempt, old.last_attempt if old is not None else None
     if last is None or last.reason not in _BY_ATTEMPT:
         return
@@ -93,7 +93,7 @@ def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happe
 
 
 def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
-    """Yield an event for each container that was killed for its memory, unless the replica tells of it."""
+    """Yield an event for each container that ran out of memory, unless an event of the replica reports it."""
     before = {each.container: each.times for each in old.memory_kills} if old is not None else {}
     told = {each.message for each in _of_replica(old, new)}
     for each in new.memory_kills:

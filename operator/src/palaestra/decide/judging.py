@@ -1,13 +1,13 @@
-"""The order in which a replica is judged that has not ended: one list, and what each row does.
+"""The ordered list of checks by which a replica that has not ended is judged.
 
-docs/judging.md shows the same list. Every check is asked at each look, so that it may say how long it still
-waits; what holds is taken in order:
+docs/judging.md shows the same list. Each reconcile runs all checks, because a check may also return how long
+it still waits. The class of a check that holds decides what follows:
 
-    ended    the first one that holds is how the replica ended; nothing else is asked
-    final    the first one that holds stops the replica for good, by a mark on its Job
-    counted  the pod is replaced by a new one, at most backoffLimit times
-    waiting  its reason is shown; nothing is ended, nothing is counted
-    shown    where the replica stands
+- ended: the first one that holds is how the replica ended, and the others are ignored.
+- final: the first one that holds stops the replica for good, by a mark on its Job.
+- counted: the operator replaces the pod, at most `backoffLimit` times.
+- waiting: the status shows its reason; nothing is ended or counted.
+- shown: the status shows the state of the replica.
 """
 
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ from palaestra.decide.conditions import Told
 from palaestra.decide.situation import STARTING, Check, Finding, Situation, Verdict, after
 from palaestra.decide.times import Trouble, Wait
 
-FIRST_STEP = ("first step",)  # the key of the wait for it
-MOMENT_S = 60  # in which a kubelet that was restarted, or tries again, shows a reason anew
+FIRST_STEP = ("first step",)  # the key of the wait for the first step
+MOMENT_S = 60  # within which a kubelet that restarted, or tries again, reports a reason again
 
 
 class Kind(StrEnum):
-    """What follows from a check that holds."""
+    """The class of a check: what follows if it holds."""
 
     ENDED = "ended"
     FINAL = "final"
@@ -38,15 +38,15 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """What follows for a replica, beside where it stands.
+    """The actions and waits that follow for a replica.
 
     Attributes:
-        stop: why to stop it for good; None: it goes on.
-        replace: why its pod is replaced; None: it is not.
-        left_s: seconds after which time alone may change something.
-        waits: what is waited for, to be remembered until the next look.
-        trouble: what keeps it from its first step, to be remembered too; None: nothing that has a name, or it
-            was made.
+        stop: why to stop it for good; None: it continues.
+        replace: why to replace its pod; None: the pod stays.
+        left_s: seconds after which the verdict may change by time alone.
+        waits: the open waits, kept until the next reconcile.
+        trouble: the cause that delays its first step, kept too; None if there is none with a name, or if the
+            first step was done.
     """
 
     stop: Told | None = None
@@ -57,7 +57,7 @@ class Course:
 
 
 def judge(it: Situation) -> tuple[Verdict, Course]:
-    """Return where a replica stands and what follows, by the first checks of the list that hold."""
+    """Return the verdict on a replica and what follows, by the first checks of the list that hold."""
     asked = [(kind, finding) for kind, check in JUDGED if (finding := check(it)) is not None]
     left_s = tuple(finding.left_s for _, finding in asked if finding.left_s > 0)
     waits = tuple(finding.wait for _, finding in asked if finding.wait is not None)
@@ -65,7 +65,7 @@ def judge(it: Situation) -> tuple[Verdict, Course]:
     if (end := _first(holding, Kind.ENDED)) is not None:
         return _verdict(it, end), Course(waits=waits)
     stop = _first(holding, Kind.FINAL)
-    if stop is not None and it.seen.job is None:  # there is nothing to stop, and nothing will be made
+    if stop is not None and it.seen.job is None:  # there is no Job to stop, and none will be created
         return Verdict(phase=Phase.FAILED, told=stop.told), Course()
     kind, shown = next((kind, each) for kind, each in holding if kind not in {Kind.ENDED, Kind.FINAL})
     replaced = kind is Kind.COUNTED and stop is None
@@ -80,7 +80,7 @@ def judge(it: Situation) -> tuple[Verdict, Course]:
 
 
 def start_timeout(it: Situation) -> Finding | None:
-    """It waits for its first step longer than `startTimeoutSeconds`; what it waits for is the reason."""
+    """Its first step has not come within `startTimeoutSeconds`; the reason is the cause of that wait."""
     if it.suspended or it.hold is not None or it.counted.furthest_step or _is_past_its_start(it):
         return None
     seconds = it.job.spec.start_timeout_s
@@ -97,7 +97,7 @@ def start_timeout(it: Situation) -> Finding | None:
 
 
 def _trouble(it: Situation, shown: Told) -> Trouble | None:
-    """Return what keeps a replica from its first step; a kubelet may show nothing of it for a moment."""
+    """Return the cause that delays the first step, also if the kubelet does not report it for a moment."""
     if shown.reason not in _NO_TROUBLE:
         return Trouble(told=shown)
     last, now_s = it.times.record.troubles.get(it.seen.index), it.times.clock_s
@@ -108,7 +108,7 @@ def _trouble(it: Situation, shown: Told) -> Trouble | None:
 
 
 def _is_past_its_start(it: Situation) -> bool:
-    """Return whether the trainer runs and does not say that its simulators are still on their way."""
+    """Return whether the trainer runs and does not report that its simulators still start."""
     polled = it.seen.polled
     return standing.runs(it) and (polled is None or polled.status.phase != STARTING)
 
@@ -118,7 +118,7 @@ def _first(holding: Sequence[tuple[Kind, Finding]], kind: Kind) -> Finding | Non
 
 
 def _refused(it: Situation, shown: Finding) -> Finding:
-    """Return why a pod is replaced, and why the API server does not yet do so."""
+    """Return why a pod has to be replaced, and why the API server refuses to evict it."""
     if not it.seen.denied:
         return shown
     words = one_line(f"{shown.told.message}; it is not replaced yet: {it.seen.denied}", LONGEST_MESSAGE)
@@ -131,7 +131,7 @@ def _verdict(it: Situation, finding: Finding) -> Verdict:
 
 
 _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})
-SHOWN = frozenset({Kind.COUNTED, Kind.WAITING, Kind.SHOWN})  # what the status shows of one that goes on
+SHOWN = frozenset({Kind.COUNTED, Kind.WAITING, Kind.SHOWN})  # sets the reason of a replica that continues
 
 JUDGED: tuple[tuple[Kind, Check], ...] = (
     (Kind.ENDED, outcomes.job_is_complete),

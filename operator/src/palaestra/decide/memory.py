@@ -1,7 +1,7 @@
 """Containers that were killed because they ran out of memory: which, how often, and at which limit.
 
-On cgroup v2 the kernel kills a container as a whole, its sidecar with it, and the kubelet starts it anew
-within a second. Then nothing but its last end tells a simulator that needed too much from one that crashed.
+On cgroup v2 the kernel kills a whole container, including the sidecar process, and the kubelet restarts it
+within a second. Then only the last termination of the container shows that the simulator ran out of memory.
 """
 
 from datetime import datetime
@@ -13,19 +13,19 @@ from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import ContainerView, PodView
 
 OUT_OF_MEMORY = "OOMKilled"
-MOST_CONTAINERS = 64  # as the status holds
+MOST_CONTAINERS = 64  # the limit of the status field
 
 
 def killed_for_memory(container: ContainerView) -> bool:
-    """Return whether a container's last end was the kernel's, for its memory."""
+    """Return whether the kernel ended a container because it ran out of memory."""
     return container.exit is not None and container.exit.reason == OUT_OF_MEMORY
 
 
 def memory_kills(it: Situation) -> tuple[MemoryKills, ...]:
-    """Return the kills by container, those that are seen for the first time added.
+    """Return the kills by container, including those that are new in this observation.
 
-    A kill differs from another by its pod and the container's run in it. Of the pods before the one that
-    the status names all is known.
+    A kill is identified by its pod and the container's run in it. All kills in pods before the one that the
+    status names are counted already.
     """
     kills = {each.container: each for each in it.old.memory_kills}
     named = [pod for pod in it.seen.pods if it.old.pod is not None and pod.uid == it.old.pod.uid]
@@ -40,8 +40,8 @@ def memory_kills(it: Situation) -> tuple[MemoryKills, ...]:
 def _known(before: MemoryKills | None, pod: PodView, container: ContainerView) -> bool:
     """Return whether a kill was counted.
 
-    What an older release has counted, or a definition without the fields has kept, is known by the time of
-    the kill: two times of one node's clock, or of two.
+    A kill that an older release counted, or that a definition without the new fields stored, is recognized by
+    its time. The two times may come from the clocks of two nodes.
     """
     if before is None:
         return False
@@ -66,7 +66,7 @@ def _one_more(
 
 
 def kills_of(it: Situation, container: str) -> int:
-    """Return how often a container was killed for its memory, as far as it was seen."""
+    """Return how often a container was seen to be killed because it ran out of memory."""
     return next((each.times for each in memory_kills(it) if each.container == container), 1)
 
 

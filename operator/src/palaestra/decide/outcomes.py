@@ -1,7 +1,7 @@
 """How a replica ended, by its Job.
 
-`palaestra.decide.judging` has the order: a stop mark comes first, because it is why everything else
-happened; then what the trainer's exit code and last word say; then the Job's own words.
+`palaestra.decide.judging` has the order: first a stop mark, because it caused everything after it; then the
+trainer's exit code and termination message; then the Job's own message.
 """
 
 import re
@@ -17,8 +17,8 @@ from palaestra.decide.times import Wait
 from palaestra.decide.troubles import how_it_failed
 from palaestra.observe.views import JobEnd, JobView, PodView
 
-LAST_WORD_S = 30  # after its Job has ended, in which a pod's end is seen too
-_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's words, when the pod is gone
+LAST_WORD_S = 30  # after the end of a Job, to wait until the end of its pod is seen too
+_EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
 
 
 def job_is_complete(it: Situation) -> Finding | None:
@@ -31,7 +31,7 @@ def job_is_complete(it: Situation) -> Finding | None:
 
 
 def stopped(it: Situation) -> Finding | None:
-    """The operator stopped it; the mark on the Job says why."""
+    """The operator stopped it; the mark on the Job has the reason."""
     job = it.seen.job
     why = stop_of(job) if job is not None else None
     return None if job is None or why is None else _ended(it, job, why)
@@ -58,7 +58,7 @@ def backoff_limit_spent(it: Situation) -> Finding | None:
 
 
 def job_failed(it: Situation) -> Finding | None:
-    """The Job has failed; its own words are the last resort."""
+    """The Job has failed for another cause; the reason has the Job's own message."""
     job = it.seen.job
     if job is None or job.end is None:
         return None
@@ -67,9 +67,10 @@ def job_failed(it: Situation) -> Finding | None:
 
 
 def _ended(it: Situation, job: JobView, why: Told) -> Finding:
-    """Return an end, once the end of the pod was seen too, or was waited for.
+    """Return an end, after the end of the pod was seen too or `LAST_WORD_S` passed.
 
-    Two watches have two ages: the Job's end may be seen before the pod's, and with it the last word.
+    Two watches have different delays, so the Job's end may be seen before that of the pod, which has the
+    termination message.
     """
     if job.stopped is not None or it.pod is None:
         return Finding(told=why, phase=Phase.FAILED)

@@ -1,7 +1,7 @@
-"""Plan what is missing, or say what keeps the job from being planned.
+"""Plan the missing objects, or return what keeps the job from being planned.
 
-A replica whose objects are all there is not planned at all: what its ConfigMaps of worlds say by now does
-not matter to it any more, nor does a newer release.
+A replica with all its objects is not planned at all, so a later change of its worlds' ConfigMaps, or a newer
+release, has no effect on it.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -22,7 +22,7 @@ from palaestra_sim.errors import WorldError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """What keeps a job from being planned; `final`: nothing that anybody does can end it."""
+    """A cause that keeps a job from being planned; if it is `final`, nothing can remove it."""
 
     told: Told
     final: bool = False
@@ -30,9 +30,9 @@ class Hold:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Prepared:
-    """The plan and the images that are in it, or why there is none; neither where nothing is missing.
+    """The plan with its images, or the hold that prevents it; neither if no object is missing.
 
-    `closed` keeps Jobs that there are from being resumed: something that they use is not for jobs any more.
+    `closed` keeps existing Jobs from being resumed: an object that they use is no longer for jobs.
     """
 
     plan: Plan | None = None
@@ -41,7 +41,7 @@ class Prepared:
     closed: Hold | None = None
 
     def hold_of(self, job: TrainingJob, seen: ReplicaObserved) -> Hold | None:
-        """Return what keeps a replica from being planned or resumed."""
+        """Return the hold that keeps a replica from being planned or resumed."""
         if seen.job is None:
             return self.hold
         return self.closed if to_resume(job, seen.job) else None
@@ -59,7 +59,7 @@ _MISSING = {SourceKind.SECRET: Reason.SECRET_MISSING, SourceKind.CLAIM: Reason.C
 
 
 def prepare(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Prepared:
-    """Return the plan of a job of which something is missing, with the images that it was accepted with."""
+    """Return the plan of a job with missing objects; its images are those of its acceptance."""
     closed = sources_are_still_for_jobs(job, observed) if resuming(job, observed) else None
     if complete(job, observed):
         return Prepared(closed=closed)
@@ -81,17 +81,17 @@ def _planned(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Pre
 
 
 def _held(job: TrainingJob, observed: Observed, layout: ClusterLayout) -> Hold | None:
-    """Return the first hold; what the pods carry is judged before acceptance only."""
+    """Return the first hold; pod labels and annotations are checked before acceptance only."""
     if job.status.release is None and (hold := pod_metadata_is_allowed(job, layout)) is not None:
         return hold
     return next((found for check in HOLDS if (found := check(job, observed))), None)
 
 
 def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lacks: Lacking | None) -> bool:
-    """Return whether more of a job has to be read before it is prepared, as it is planned next.
+    """Return whether the whole job has to be read before it is prepared, because it is planned next.
 
-    `lacks` is what it lacks of the object in the API server. While it waits for something else, its
-    worlds are not read.
+    `lacks` is the part of the API server's object that `job` lacks. While a hold remains, the worlds are not
+    read.
     """
     if lacks is Lacking.FIELDS and resuming(job, observed):
         return True
@@ -101,7 +101,7 @@ def wants_whole(job: TrainingJob, observed: Observed, layout: ClusterLayout, lac
 
 
 def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, ...]:
-    """Return the replicas that the status does not call ended; none of a job that has ended as a whole."""
+    """Return the replicas that have not ended by the status; none if the job has ended."""
     if job.status.phase in TERMINAL:
         return ()
     ended = {each.index for each in job.status.replicas if each.phase in TERMINAL}
@@ -109,7 +109,7 @@ def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, .
 
 
 def pod_metadata_is_allowed(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
-    """Other controllers obey labels and annotations of pods, and an author may not be let make pods."""
+    """Other controllers act on labels and annotations of pods, so the installation has to allow them."""
     scheduling = job.spec.scheduling
     for field, value, keys, allowed in (
         ("podLabels", "allowedPodLabels", scheduling.pod_labels, layout.allowed_pod_labels),
@@ -150,7 +150,7 @@ def sources_are_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
 
 
 def sources_are_still_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A pod of a resumed Job is a new one; of a world there is a copy, so its ConfigMap may be gone."""
+    """A resumed Job creates a new pod, so its sources must still be for jobs; worlds were copied."""
     for source in references(job):
         if (found := _missing(source, observed)) is not None:
             if source.kind is not SourceKind.CONFIG_MAP:
@@ -175,7 +175,7 @@ def _closed(source: Source, observed: Observed) -> Hold | None:
 
 
 def worlds_have_their_keys(job: TrainingJob, observed: Observed) -> Hold | None:
-    """A ConfigMap without the key is as good as none."""
+    """Each ConfigMap of a world has the key that the spec names."""
     for field, name, key in _world_keys(job):
         if _world(observed, name, key) is None:
             fact = f"ConfigMap {name} has no key {key}"
@@ -196,14 +196,14 @@ def _hold(reason: Reason, *, final: bool = False, **facts: object) -> Hold:
 
 
 def complete(job: TrainingJob, observed: Observed) -> bool:
-    """Return whether every replica that goes on has its Job, and what the Job's pods mount is there."""
+    """Return whether every replica that has not ended has its Job and the volumes of the Job's pods."""
     policy = any(kind == "NetworkPolicy" for kind, _ in observed.present)
     accepted = job.status.release is not None
     return not unfinished(job, observed) or (policy and accepted and not _lacking(job, observed))
 
 
 def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str]]:
-    """Return the replicas that go on and lack an object, each with the volumes that its Job mounts."""
+    """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts."""
     there = {name for _, name in observed.present} | {job.spec.storage.existing_claim}
     return {
         each.index: each.job.volumes if each.job is not None else frozenset()

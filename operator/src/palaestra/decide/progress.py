@@ -1,6 +1,6 @@
-"""What the trainer reported last, as the status has it, and since when it stands still.
+"""The trainer's last report as fields of the status, and since when it makes no progress.
 
-What it does not tell any more stays as it was: unknown is neither zero nor stalled.
+If the trainer no longer reports a value, the last one stays: unknown is neither zero nor stalled.
 """
 
 from datetime import datetime
@@ -23,15 +23,15 @@ from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra_protocol.pod import status as protocol
 from palaestra_protocol.pod.status import Cause, CheckpointStatus, Termination, TrainerStatus
 
-EVALUATING = "evaluating"  # the trainer's phase while nothing is learned from
-LONGEST_NAME = 63  # of a simulator; those of our plan have 23 characters at most
+EVALUATING = "evaluating"  # the trainer's phase in which it does not learn
+LONGEST_NAME = 63  # of a simulator; those in a plan have 23 characters at most
 LONGEST_FAULT = 200
 
 
 def progress(it: Situation, phase: Phase) -> dict[str, object]:
-    """Return the fields of a replica's status that its trainer knows, those of which it told.
+    """Return the fields of a replica's status that its trainer has reported.
 
-    One that has not looked into its run directory yet says step 0, whatever was learned before.
+    A trainer that has not read its run directory yet reports step 0, whatever was learned before.
     """
     polled = it.seen.polled.status if it.seen.polled and phase not in TERMINAL else None
     ended_with = it.seen.termination
@@ -56,8 +56,8 @@ def progress(it: Situation, phase: Phase) -> dict[str, object]:
 def last_progress(it: Situation) -> datetime | None:
     """Return when the step count of the current attempt last moved, or an evaluation did.
 
-    None: it has not begun to train, as far as is known. That an environment steps is no progress by
-    itself: nothing may be learned from it.
+    None if it is not known to have begun to train. A step of an environment alone is no progress, because the
+    trainer may learn nothing from it.
     """
     same_attempt = it.old.pod is not None and it.counted.pod == it.old.pod
     known = it.old.last_progress if same_attempt else None
@@ -73,11 +73,10 @@ def last_progress(it: Situation) -> datetime | None:
 
 
 def standstill(it: Situation) -> Wait | None:
-    """Return the wait for the next step, or for the next one of an evaluation; None: it does not train.
+    """Return the wait for the next step, of learning or of an evaluation; None if it does not train.
 
-    Where the trainer reports how long ago an environment stepped, the wait began then. A trainer of an older
-    release reports only when, by its own clock: that is compared with what it reported before, and with
-    no time of ours.
+    If the trainer reports how long ago an environment stepped, the wait began then. A trainer of an older
+    release reports the time by its own clock, which is compared only with its earlier reports.
     """
     polled = it.seen.polled
     if polled is None or not it.trains or it.pod is None:
@@ -90,12 +89,12 @@ def standstill(it: Situation) -> Wait | None:
 
 
 def _step(told: TrainerStatus | Termination) -> int | None:
-    """Return how far a run is; None: its trainer does not know yet."""
+    """Return the step of a run; None if its trainer does not know it yet."""
     return None if told.attempt is None and told.step == 0 else min(told.step, MOST_COUNT)
 
 
 def _spent(it: Situation, polled: TrainerStatus) -> dict[str, object]:
-    """Return what the run cost so far; a trainer of an older release does not tell."""
+    """Return what the run has spent so far; {} if the trainer's release does not report it."""
     if not polled.goodput:
         return {}
     before = it.old.goodput or Goodput()
@@ -136,7 +135,7 @@ def _checkpoint(checkpoint: CheckpointStatus | None) -> LastCheckpoint | None:
 
 
 def _figure(new: float | None, old: float | None) -> float | None:
-    """Return a figure as people read it, to the fourth decimal; the old one where there is no new one."""
+    """Return the new figure, rounded to four decimals; the old one if there is no new one."""
     return old if new is None else round(new, 4)
 
 

@@ -1,7 +1,7 @@
-"""What is kept of the newest attempt that has ended: a pod's logs die with it, a status does not.
+"""The record of the newest ended attempt in the status, because a pod's logs are deleted with the pod.
 
-It is written down as soon as the trainer has ended and stays when the pod is gone. A pod that nobody saw
-end is remembered once another has taken its place.
+The record is written as soon as the trainer has ended, and stays after the pod is gone. If no reconcile saw
+the end of a pod, the record is written once the next pod exists.
 """
 
 from palaestra.api.history import Fault, LastAttempt
@@ -20,9 +20,9 @@ from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, Fa
 
 
 def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | None:
-    """Return what is kept of the newest attempt that has ended; None: none has.
+    """Return the record of the newest ended attempt; None if no attempt has ended.
 
-    `end` is the replica's, if it has ended: it tells of a pod that is gone.
+    `end` is the verdict on the replica, if it has ended; it describes the attempt whose pod is gone.
     """
     known, newest = it.old.last_attempt, it.seen.pod
     attempt = of_pod(it, newest, it.counted.attempt) if newest and has_ended(newest) else _replaced(it)
@@ -35,10 +35,10 @@ def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | Non
 
 
 def late_word(it: Situation) -> LastAttempt | None:
-    """Return what is kept of the last attempt of a replica that was called ended before its pod had.
+    """Return the record of the last attempt of a replica whose end was seen before that of its pod.
 
-    Where the pod goes without a word, that is what the replica's end was: the caches of Jobs and pods follow
-    each other in any order, and what is kept must not depend on it.
+    If the pod disappears without a termination message, the record has the replica's own end. The caches of
+    Jobs and pods are updated in any order, and the record must not depend on it.
     """
     known, newest, named = it.old.last_attempt, it.seen.pod, it.old.pod
     if named is None or _knows(known, it.old.attempt):
@@ -54,7 +54,7 @@ def late_word(it: Situation) -> LastAttempt | None:
 
 
 def has_ended(pod: PodView) -> bool:
-    """Return whether a pod's trainer has ended, or nothing of the pod runs any more."""
+    """Return whether a pod's trainer has ended, or the whole pod."""
     return pod.ended or exit_code(pod) is not None
 
 
@@ -94,7 +94,7 @@ def _record(attempt: Attempt, told: Told) -> LastAttempt:
 
 
 def _counted_restarts(attempt: Attempt) -> int:
-    """Return the restarts of simulators that were counted in an attempt, whose trainer says nothing."""
+    """Return the counted restarts of simulators in an attempt whose trainer does not report them."""
     now, before = attempt.it.counted, attempt.it.old
     for counts in (now, before):
         if counts.pod is not None and counts.pod.name == attempt.name:
@@ -103,7 +103,7 @@ def _counted_restarts(attempt: Attempt) -> int:
 
 
 def _log(attempt: Attempt) -> tuple[str, ...]:
-    """Return the last lines of a trainer's log: its last word has some, and Kubernetes does otherwise."""
+    """Return the last lines of a trainer's log, from its termination message or else from Kubernetes."""
     lines: tuple[str, ...] = ()
     if attempt.word is not None:
         lines = attempt.word.log
@@ -114,7 +114,7 @@ def _log(attempt: Attempt) -> tuple[str, ...]:
 
 
 def _faults(records: tuple[FaultRecord, ...]) -> list[Fault]:
-    """Return the last faults; one whose time is in no calendar of ours is none."""
+    """Return the last faults, without those whose time is not a valid date."""
     timed = [(each, at) for each in records if (at := as_time(each.time)) is not None]
     return [
         Fault(

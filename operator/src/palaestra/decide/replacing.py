@@ -1,8 +1,8 @@
-"""What no kubelet heals: the pod is replaced by a new one, through an eviction, and counted.
+"""Checks for pods that no kubelet repairs: the operator replaces them through an eviction, and counts that.
 
-An eviction gives the pod the condition DisruptionTarget, so that its Job counts no failure. The operator
-counts it instead, by an annotation of the Job that is written first: killed between the two writes, it
-finds the mark at a pod that lives, and evicts again.
+An eviction gives the pod the condition DisruptionTarget, so its Job counts no failure. The operator counts it
+in an annotation of the Job, the mark, before it evicts. If it is killed between the two writes, it finds the
+mark of a running pod after its restart, and evicts again.
 """
 
 from dataclasses import replace
@@ -14,12 +14,12 @@ from palaestra.decide.times import Wait
 from palaestra.decide.troubles import mark_of
 from palaestra.observe.pods import dropped
 
-STALL_GRACE_S = 120  # in which the trainer's own watchdog has ended it
-FORGOTTEN_S = 300  # a node needs seconds to start the trainer; its image is the ROS master's
+STALL_GRACE_S = 120  # time for the trainer's own watchdog to end it
+FORGOTTEN_S = 300  # a node needs seconds to start the trainer: its image is already there, for the ROS master
 
 
 def marked(it: Situation) -> Finding | None:
-    """The pod is marked to be replaced, and still lives."""
+    """The pod is marked for replacement and still runs."""
     if it.pod is None or it.pod.gone_by is not None:
         return None
     mark = mark_of(it, it.pod)
@@ -36,7 +36,7 @@ def restart_policy_dropped(it: Situation) -> Finding | None:
 
 
 def trainer_never_started(it: Situation) -> Finding | None:
-    """All sidecars run, and the node forgot the trainer."""
+    """All sidecars run, but the node does not start the trainer."""
     pod = it.pod
     if pod is None or pod.trainer is None or not pod.sidecars or pod.gone_by is not None:
         return None
@@ -58,7 +58,7 @@ def stalled(it: Situation) -> Finding | None:
 
 
 def replaced_too_often(it: Situation) -> Finding | None:
-    """A pod is to be replaced, and as many were as `backoffLimit` allows."""
+    """A pod has to be replaced, but as many were replaced as `backoffLimit` allows."""
     job = it.seen.job
     times = job.replaced.times if job is not None and job.replaced is not None else 0
     if it.suspended or marked(it) is not None or times < it.job.spec.backoff_limit:

@@ -1,4 +1,4 @@
-"""One replica: from what its status said and what is seen to its status now, and what is done about it."""
+"""One replica: its new status and the actions for it, from its old status and the observation."""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,4 @@
-"""What a check about one replica looks at, and what it may say."""
+"""The input and the result of a check on one replica."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ class Situation:
     """One replica that has not ended.
 
     Attributes:
-        old: what the status said of it.
-        seen: what the cluster shows.
+        old: its status so far.
+        seen: the observation.
         counted: its attempts and restarts by now.
-        times: the clocks; the wall's in UTC and whole seconds.
-        active_left_s: seconds of the job's active time that are left; None: it has no bound, or its time
-            does not pass now.
-        hold: what keeps its objects from being made; None: nothing does.
+        times: the clocks; the wall clock in UTC and whole seconds.
+        active_left_s: seconds of the job's active time that are left; None: it has no deadline, or its
+            active time does not run now.
+        hold: the cause that keeps its objects from being created; None: there is none.
     """
 
     job: TrainingJob
@@ -56,7 +56,7 @@ class Situation:
         return wait.seconds - self.waited_s(wait)
 
     def start_deadline_s(self, container: str) -> int:
-        """Return how long a container may take to come up, the trainer and the master the longest."""
+        """Return how long a container may take to start; for trainer and master, the longest of all."""
         deadlines = {_container(group, i): group.start_deadline_seconds for group, i in _members(self.job)}
         return deadlines.get(container, max(deadlines.values()))
 
@@ -68,30 +68,30 @@ class Situation:
 
     @property
     def suspended(self) -> bool:
-        """Return whether the replica is kept from running by `spec.suspend` or by a queue."""
+        """Return whether `spec.suspend` or a queue keeps the replica from running."""
         job = self.seen.job
         return self.job.spec.suspend if job is None else job.suspended
 
     @property
     def trains(self) -> bool:
-        """Return whether the trainer is known to be past the start of its simulators."""
+        """Return whether the trainer has reported that its simulators are up."""
         polled = self.seen.polled
         return polled is not None and polled.status.phase != STARTING
 
 
-FRESH_S = 45  # an older answer is no word of what is now
+FRESH_S = 45  # an older answer does not describe the current state
 STARTING = "starting"  # the trainer's phase until all its simulators are up
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What a check has found.
+    """The result of a check.
 
     Attributes:
         told: the reason and its message.
-        left_s: seconds until it holds; 0 or less: it does.
-        wait: what is to be remembered until the next look; None: nothing is.
-        phase: where the replica stands by it; None: as its trainer's container does.
+        left_s: seconds until it holds; 0 or less: it holds now.
+        wait: the wait to keep until the next reconcile; None: there is none.
+        phase: the phase of the replica; None: by the state of its trainer's container.
     """
 
     told: Told
@@ -102,7 +102,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """Where a replica stands, and why."""
+    """The phase of a replica, and the reason."""
 
     phase: Phase
     told: Told
@@ -117,12 +117,12 @@ def told(reason: Reason, **facts: object) -> Told:
 
 
 def found(reason: Reason, **facts: object) -> Finding:
-    """Return what holds at once."""
+    """Return a finding that holds at once."""
     return Finding(told=told(reason, **facts))
 
 
 def after(it: Situation, wait: Wait, why: Told) -> Finding:
-    """Return what holds once a wait is over."""
+    """Return a finding that holds once a wait is over."""
     return Finding(told=why, left_s=it.left_s(wait), wait=wait)
 
 

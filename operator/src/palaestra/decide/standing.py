@@ -1,4 +1,4 @@
-"""Where a replica stands that goes on, and of which nothing is wrong."""
+"""Checks for a replica that continues and has no trouble: its state."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ DESCRIBE_WORKLOAD = "; `kubectl describe workload` shows it"  # no other object 
 
 
 def held(it: Situation) -> Finding | None:
-    """Something that the job names is not there, or not for jobs, so that nothing is made or resumed."""
+    """An object that the job names does not exist or is not for jobs, so nothing is created or resumed."""
     if it.hold is None:
         return None
     return Finding(told=it.hold.told, phase=Phase.PENDING if it.seen.job is None else Phase.SUSPENDED)
@@ -39,7 +39,7 @@ def suspended(it: Situation) -> Finding | None:
 
 
 def _with_words(it: Situation, why: Told) -> str:
-    """Return the message of `why`; an operator that was restarted keeps Kueue's words until it has asked."""
+    """Return the message of `why`; after a restart the operator keeps Kueue's words until it has asked."""
     if it.seen.unasked:
         return why.message + UNASKED + (DESCRIBE_WORKLOAD if why.reason == Reason.QUEUED else DESCRIBE)
     before, plain = it.old.message or "", why.message.removesuffix(AGAIN)
@@ -48,7 +48,7 @@ def _with_words(it: Situation, why: Told) -> str:
 
 
 def trainer_has_ended(it: Situation) -> Finding | None:
-    """The trainer has ended, and its pod not yet."""
+    """The trainer has ended, but its pod has not."""
     pod = it.seen.pod if it.seen.job is not None else None
     if pod is None or pod.trainer is None or pod.trainer.exit is None:
         return None
@@ -66,7 +66,7 @@ def trains(it: Situation) -> Finding | None:
 
 
 def starts(it: Situation) -> Finding | None:
-    """Its objects are about to be made, or its containers start."""
+    """Its objects are about to be created, or its containers start."""
     there = [*it.seen.in_the_way, *([it.pod.name] if it.pod is not None else [])]
     if it.seen.job is None:
         waits = f"waits for pod {there[0]} to end" if there else "is about to be created"

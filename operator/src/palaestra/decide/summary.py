@@ -14,7 +14,7 @@ from palaestra.observe.views import Observed
 
 
 def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
-    """Return where the job stands."""
+    """Return the phase of the job, and the reason."""
     phases = Counter(each.phase for each in replicas)
     if all(each.phase in TERMINAL for each in replicas):
         return _ended(replicas)
@@ -27,13 +27,13 @@ def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
 
 
 def active(phase: Phase, replicas: Sequence[ReplicaStatus]) -> bool:
-    """Return whether a job is active: it goes on, and not all of it is suspended."""
+    """Return whether a job is active: it has not ended, and not all of its replicas are suspended."""
     suspended = all(each.phase in TERMINAL | {Phase.SUSPENDED} for each in replicas)
     return phase not in TERMINAL and not suspended
 
 
 def started(old: Status, observed: Observed) -> datetime | None:
-    """Return when the first pod of all was started, by its node's clock."""
+    """Return when the job's first pod was started, by its node's clock."""
     if old.start_time is not None:
         return old.start_time
     begun = [pod for each in observed.replicas for pod in each.pods if pod.started is not None]
@@ -42,7 +42,7 @@ def started(old: Status, observed: Observed) -> datetime | None:
 
 
 def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:
-    """Return the figures of `kubectl get tj`: of the replica that is furthest behind, and of the worst."""
+    """Return the columns of `kubectl get tj`, from the replica with the fewest steps and from the worst."""
     up = sum(each.phase in {Phase.RUNNING, Phase.SUCCEEDED} for each in replicas)
     steps = [each.step for each in replicas if each.step is not None]
     rates = [each.success_rate for each in replicas if each.success_rate is not None]
@@ -74,7 +74,7 @@ def _ended(replicas: Sequence[ReplicaStatus]) -> Verdict:
 
 
 def as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> Verdict:
-    """Return the word of the first replica that stands so."""
+    """Return the reason of the first replica in this phase."""
     first = next(each for each in replicas if each.phase is phase)
     of = f"replica {first.index}: " if len(replicas) > 1 else ""
     told = Told(reason=Reason(first.reason or Reason.STARTING), message=f"{of}{first.message or ''}")

@@ -1,4 +1,4 @@
-"""What suspended or resumed a Job: the operator, a queue, or another field manager."""
+"""Find out which client suspended or resumed a Job: the operator, a queue, or another field manager."""
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import PodReference
@@ -12,8 +12,8 @@ SOMEBODY = "somebody else"  # where no field manager is known
 def set_last(job: TrainingJob, seen: JobView) -> bool:
     """Return the `spec.suspend` that the operator set last on a Job of its own, by the Job's annotation.
 
-    A Job of an earlier release has no annotation and is taken as it stands: that release kept it as the spec
-    was, so a difference is somebody else's doing, unless the spec changed since the last status write.
+    A Job of an earlier release has no annotation, but that release kept the Job as the spec was. So a
+    difference comes from another client, unless the spec changed since the last status write.
     """
     if seen.suspend_set is not None:
         return seen.suspend_set
@@ -22,10 +22,10 @@ def set_last(job: TrainingJob, seen: JobView) -> bool:
 
 
 def to_set(job: TrainingJob, seen: JobView | None) -> bool:
-    """Return whether the operator has to suspend or resume a Job; with a queue that is Kueue's.
+    """Return whether the operator has to suspend or resume a Job; if it has a queue, Kueue does.
 
-    A Job is compared with what the operator set last, not with what it is: what anybody else makes of it
-    since is theirs, or the two would undo each other's writes for ever.
+    The spec is compared with the value that the operator set last, not with the current one. Otherwise the
+    operator and another client would undo each other's writes forever.
     """
     if seen is None or job.spec.scheduling.queue_name is not None or seen.queue or seen.end is not None:
         return False
@@ -33,10 +33,10 @@ def to_set(job: TrainingJob, seen: JobView | None) -> bool:
 
 
 def seen_generation(job: TrainingJob, observed: Observed) -> int | None:
-    """Return the generation of the spec that the status has heard of.
+    """Return the `observedGeneration` for the status.
 
-    It stays behind while a Job without the annotation waits to be as the spec says: a patch that is refused,
-    or held back, would otherwise be taken for done.
+    It stays at the old value while a Job without the annotation is not yet as the spec asks; otherwise a
+    patch that was refused or held back would look done.
     """
     jobs = (each.job for each in observed.replicas if each.job is not None and each.job.stopped is None)
     waits = any(each.suspend_set is None and to_set(job, each) for each in jobs)
@@ -44,35 +44,35 @@ def seen_generation(job: TrainingJob, observed: Observed) -> int | None:
 
 
 def to_resume(job: TrainingJob, seen: JobView | None) -> bool:
-    """Return whether the operator has to resume a Job: its next pod would be a new one."""
+    """Return whether the operator has to resume a Job, which then creates a new pod."""
     return not job.spec.suspend and to_set(job, seen)
 
 
 def mark(seen: ReplicaObserved, current: PodReference | None, *, suspend: bool) -> Suspended | None:
-    """Return what the patch that suspends or resumes a Job writes of the current pod; None: nothing.
+    """Return the mark about the current pod for the patch that suspends or resumes a Job; None: no mark.
 
-    A pod may be made before the suspension and seen after it. The patch that resumes names such a pod: a
-    suspended Job makes none.
+    A pod may be created before the suspension and seen after it. The patch that resumes the Job names such a
+    pod, because a suspended Job creates none.
     """
     job = seen.job
     if job is None or current is None or job.suspended == suspend:
         return None
     named = job.suspension is not None and job.suspension.pod == current.uid
     lived = seen.pod is not None and lives(seen.pod)
-    if suspend:  # again, before the next pod is made: the mark that is there is right
+    if suspend:  # again, before the next pod is created: the existing mark is right
         return None if named and not lived else Suspended(pod=current.uid, lived=lived)
     late = job.suspend_set is True and not named
     return Suspended(pod=current.uid, lived=True) if late else None
 
 
 def ended_by_suspension(seen: ReplicaObserved, pod: PodView) -> bool:
-    """Return whether a pod was deleted because the operator suspended its Job; it may be resumed by now."""
+    """Return whether a pod was deleted because the operator suspended its Job, even if resumed since."""
     mark = seen.job.suspension if seen.job is not None else None
     return mark is not None and mark.lived and mark.pod == pod.uid and pod.gone_by is not None
 
 
 def overruled(job: TrainingJob, seen: JobView) -> bool:
-    """Return whether somebody else has suspended or resumed a Job since the operator set it."""
+    """Return whether another client has suspended or resumed a Job since the operator set it."""
     queued = job.spec.scheduling.queue_name is not None or seen.queue
     return not queued and seen.end is None and seen.suspended != set_last(job, seen)
 
@@ -85,7 +85,7 @@ def suspended_by(job: TrainingJob, seen: ReplicaObserved) -> str:
 
 
 def unheeded(job: TrainingJob, seen: ReplicaObserved) -> str:
-    """Return what to say of a suspension that has no effect; "": there is none."""
+    """Return the words for a suspension that has no effect; "" if there is none."""
     if seen.job is None or not job.spec.suspend or seen.job.suspended:
         return ""
     if seen.job.queue:

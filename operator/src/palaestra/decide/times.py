@@ -1,9 +1,9 @@
-"""The clocks of one look at a job, and what this process found when it looked before.
+"""The clocks of one reconcile, and the record of the reconcile before it in this process.
 
-No two clocks agree: a node's may be minutes off, and an operator's own may be set. So a wait is counted on
-this process's monotonic clock, from the look that first found it. A restart or a new leader begins every
-wait anew: it gets longer, never shorter. The wall clock stamps a status; only the time to live is read
-from it, by a stamp of the operator's own.
+Clocks differ: a node's may be minutes off, and the operator's own may be set. So a wait is measured on this
+process's monotonic clock, from the reconcile that first found it. After a restart or with a new leader every
+wait begins again, so it gets longer, never shorter. The wall clock is for the times in a status. Only the
+time to live is measured by it, from a time that the operator wrote.
 """
 
 from collections.abc import Mapping
@@ -12,17 +12,17 @@ from datetime import datetime
 
 from palaestra.decide.conditions import Told
 
-WaitKey = tuple[int | str, ...]  # the replica, what is waited for, and what would make it another wait
+WaitKey = tuple[int | str, ...]  # the replica, then `Wait.key`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wait:
-    """Something that may take so long.
+    """A wait with a deadline.
 
     Attributes:
-        key: what is waited for, within a replica; a wait of another key begins anew.
-        seconds: that it may take.
-        begun_s: when it began, on the monotonic clock, where something says; None: at its first sight.
+        key: identifies the wait within a replica; a wait with another key begins again.
+        seconds: the deadline.
+        begun_s: when it began, on the monotonic clock; None: when the operator first found it.
     """
 
     key: tuple[str, ...]
@@ -32,11 +32,11 @@ class Wait:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble:
-    """What keeps a replica from its first step.
+    """A cause that delays a replica's first step.
 
     Attributes:
         told: the reason and its message.
-        gone_s: the first look that did not find it any more, on the monotonic clock; None: it is there.
+        gone_s: when a reconcile first did not find it, on the monotonic clock; None: it is still there.
     """
 
     told: Told
@@ -45,13 +45,13 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """What one look leaves to the next one of the same process; nobody needs it to go on.
+    """The record that one reconcile leaves to the next in the same process; a restart may lose it.
 
     Attributes:
-        waits: when each wait that goes on was first found, on the monotonic clock.
+        waits: when each open wait was first found, on the monotonic clock.
         troubles: by replica, while it waits for its first step.
-        active_s: seconds that the job was active, as far as this process knows.
-        active_at_s: until when they are counted; None: the job is not active.
+        active_s: seconds for which the job was active, as far as this process knows.
+        active_at_s: the moment up to which they are counted; None: the job is not active.
     """
 
     waits: Mapping[WaitKey, float] = field(default_factory=dict)
@@ -62,12 +62,12 @@ class Record:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Times:
-    """The clocks at one look.
+    """The clocks at one reconcile.
 
     Attributes:
         now: the wall clock, with a time zone.
         clock_s: the monotonic clock of this process.
-        record: what the last look left.
+        record: of the reconcile before.
     """
 
     now: datetime
@@ -75,12 +75,12 @@ class Times:
     record: Record = field(default_factory=Record)
 
     def since_s(self, replica: int, wait: Wait) -> float:
-        """Return since when a wait of a replica goes on."""
+        """Return when a wait of a replica began."""
         begun_s = self.clock_s if wait.begun_s is None else min(wait.begun_s, self.clock_s)
         return self.record.waits.get((replica, *wait.key), begun_s)
 
     def active_s(self, written_s: int) -> float:
-        """Return how long the job was active; `written_s`: as its status has it."""
+        """Return how long the job was active; `written_s` is the value in its status."""
         record = self.record
         elapsed_s = 0.0 if record.active_at_s is None else self.clock_s - record.active_at_s
         return max(float(written_s), record.active_s + elapsed_s)

@@ -1,7 +1,7 @@
-"""What a replica waits for: shown with its reason, ended or counted by nobody.
+"""Checks for a waiting replica: the status shows the reason, and nothing is ended or counted.
 
-The API server, the scheduler and the kubelet try again by themselves. `palaestra.decide.judging` has the
-order of these checks.
+The API server, the scheduler and the kubelet retry by themselves. `palaestra.decide.judging` has the order of
+these checks.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from palaestra.observe.views import ContainerKind, ContainerView, PodView
 from palaestra.plan.job import GIVEN_UP
 from palaestra_protocol.pod.status import SimulatorStatus, Termination
 
-LOST_AFTER_S = 30  # past the moment at which a deleted pod was to be gone
+LOST_AFTER_S = 30  # after the end of a deleted pod's grace period
 CRASHES = 3  # of one sidecar, before they are called a loop
 PULLING = frozenset(
     {"ErrImagePull", "ImagePullBackOff", "InvalidImageName", "ErrImageNeverPull", "ImageInspectError",
@@ -28,7 +28,7 @@ MAKING = frozenset(
     {"CreateContainerConfigError", "CreateContainerError", "RunContainerError", "PreStartHookError",
      "PostStartHookError"}
 )  # fmt: skip
-FULL = ("StorageFull", "DiskFull")  # how a last word begins; the second in older releases
+FULL = ("StorageFull", "DiskFull")  # beginnings of a termination message; the second in older releases
 
 
 def objects_refused(it: Situation) -> Finding | None:
@@ -58,14 +58,14 @@ def old_pod_holds_claim(it: Situation) -> Finding | None:
 
 
 def pods_refused(it: Situation) -> Finding | None:
-    """The API server makes no pod; only the Job's events say why."""
+    """The API server refuses to create the pod; only the Job's events have the reason."""
     refused = it.seen.refused
     words = it.seen.denied or (refused.message if refused is not None else "")
     return None if it.pod is not None or not words else found(Reason.PODS_REFUSED, words=words)
 
 
 def node_lost(it: Situation) -> Finding | None:
-    """A deleted pod is still there long after its grace."""
+    """A deleted pod still exists long after its grace period."""
     pod = it.pod
     if pod is None or pod.gone_by is None:
         return None
@@ -82,7 +82,7 @@ def unschedulable(it: Situation) -> Finding | None:
 
 
 def volume_not_mounted(it: Situation) -> Finding | None:
-    """A node has taken the pod, and a volume is not mounted; only the pod's events say why."""
+    """The pod is on a node, and a volume is not mounted; only the pod's events have the reason."""
     if it.pod is None or not it.seen.unmounted:
         return None
     return found(Reason.VOLUME_NOT_MOUNTED, pod=it.pod.name, words=it.seen.unmounted)
@@ -95,7 +95,7 @@ def image_does_not_come(it: Situation) -> Finding | None:
 
 
 def container_refused(it: Situation) -> Finding | None:
-    """The node cannot make a container; the kubelet tries again."""
+    """The node cannot create a container; the kubelet tries again."""
     stuck = first_waiting(it.pod, MAKING)
     if stuck is None:
         return None
@@ -116,7 +116,7 @@ def sidecar_crash_loops(it: Situation) -> Finding | None:
 
 
 def simulator_not_up(it: Situation) -> Finding | None:
-    """A simulator takes long to start; its trainer's own budget ends that."""
+    """A simulator takes long to start; the trainer gives it up when its fault budget is spent."""
     polled = it.seen.polled
     if it.pod is None or polled is None or it.trains or not it.fresh:
         return None
@@ -166,20 +166,20 @@ def pod_failed(it: Situation) -> Finding | None:
 
 
 def no_other_comes(it: Situation, pod: PodView) -> bool:
-    """Return whether a pod that failed is the last: the Job is about to say that it failed, and why."""
+    """Return whether a failed pod is the last one, because its Job is about to fail."""
     booked = it.seen.job.failures if it.seen.job is not None else 0
-    failures = max(booked, it.counted.restarts.trainer + 1)  # the newest may not be booked yet
+    failures = max(booked, it.counted.restarts.trainer + 1)  # the Job may not have counted the newest yet
     return failures > it.job.spec.backoff_limit or exit_code(pod) in GIVEN_UP
 
 
 def of_image(stuck: ContainerView) -> Finding:
-    """Return what to say of a container whose image cannot be pulled."""
+    """Return the finding about a container whose image cannot be pulled."""
     words = stuck.waiting_message or stuck.waiting
     return found(Reason.IMAGE_PULL, container=stuck.name, image=stuck.image, words=words)
 
 
 def mark_of(it: Situation, pod: PodView) -> Told | None:
-    """Return why the operator replaces a pod, by the mark on its Job; None: it does not."""
+    """Return why the operator replaces a pod, by the mark on its Job; None if it does not."""
     mark = it.seen.job.replaced if it.seen.job is not None else None
     if mark is None or mark.pod != pod.uid:
         return None
@@ -201,14 +201,14 @@ def crashing(pod: PodView | None) -> tuple[ContainerView, ...]:
 
 
 def storage_eviction(pod: PodView) -> Told | None:
-    """Return what to say of a pod that its node evicted for what it wrote; None: it did not."""
+    """Return the reason if a node evicted the pod because it wrote too much, else None."""
     if pod.reason != "Evicted" or "ephemeral" not in pod.message.lower():
         return None
     return told(Reason.EPHEMERAL_STORAGE, pod=pod.name, words=pod.message)
 
 
 def full_volume(word: Termination | None) -> Told | None:
-    """Return what to say of a trainer that could not write to its volume; None: it could."""
+    """Return the reason if a trainer could not write to its full volume, else None."""
     if word is None or not word.reason.startswith(FULL):
         return None
     fact = word.reason.partition(": ")[2].partition("; ")[0]  # its remedy is ours
@@ -216,7 +216,7 @@ def full_volume(word: Termination | None) -> Told | None:
 
 
 def of_crash(it: Situation, container: ContainerView) -> Told:
-    """Return what to say of a sidecar that crashed."""
+    """Return the reason for a sidecar that crashed."""
     if killed_for_memory(container):
         times, limit = kills_of(it, container.name), limit_of(container.memory_limit)
         return told(Reason.SIMULATOR_OUT_OF_MEMORY, container=container.name, limit=limit, times=times)
@@ -226,7 +226,7 @@ def of_crash(it: Situation, container: ContainerView) -> Told:
 
 
 def how_it_failed(it: Situation, pod: PodView) -> str:
-    """Return how a pod failed, in the best words that there are."""
+    """Return how a pod failed, in the best words that are known."""
     word = it.seen.terminations.get(pod.uid)
     trainer = pod.trainer
     if trainer is not None and killed_for_memory(trainer):
@@ -242,13 +242,13 @@ def how_it_failed(it: Situation, pod: PodView) -> str:
 
 
 def _failed_before(pod: PodView) -> ContainerView | None:
-    """Return the container that failed and has to end well before the others start; None: none has."""
+    """Return the failed container among those that must succeed before the others start, if any."""
     init = (each for each in pod.containers if each.kind is ContainerKind.INIT)
     return next((each for each in init if each.exit is not None and each.exit.code), None)
 
 
 def left_by(pod: PodView) -> str:
-    """Return the end of the log of a pod's trainer, or of what kept it from starting; "": nothing is left."""
+    """Return the end of the log of a pod's trainer, or of the container that kept it from starting."""
     failed = _failed_before(pod)
     trainer = pod.trainer
     ends = [each.exit for each in (trainer, failed) if each is not None and each.exit is not None]
@@ -256,6 +256,6 @@ def left_by(pod: PodView) -> str:
 
 
 def _last_line(container: ContainerView | None) -> str:
-    """Return the last line of what a container left."""
+    """Return the last line of a container's termination message."""
     log = container.exit.message if container is not None and container.exit is not None else ""
     return next(iter(log.strip().splitlines()[-1:]), "")

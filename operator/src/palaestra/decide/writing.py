@@ -1,6 +1,6 @@
-"""When a status is worth a write: what people wait for at once, progress every half minute but its first.
+"""When to write a status: changes that people wait for and first progress at once, else every half minute.
 
-The amounts that Kueue says a job lacks count as progress: other jobs of the queue change them all the time.
+The amounts that a job lacks by Kueue's message count as progress: other jobs in the queue change them often.
 """
 
 import re
@@ -11,9 +11,9 @@ from palaestra.api.reasons import Reason
 from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
-_WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with what else changes, never alone
+_WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with other changes, never alone
 _OF_JOB = frozenset({"step", "successRate"})
-_FIRST = frozenset(  # never absent once they were there
+_FIRST = frozenset(  # once present, always present
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )
 _OF_REPLICA = frozenset(
@@ -27,16 +27,16 @@ _AMOUNT = re.compile(r"\d[\w.]*")  # such as 425m or 1.5Gi
 
 
 def as_data(status: Status) -> dict[str, Any]:
-    """Return the status as the API server holds it: camelCase, nothing that is absent."""
+    """Return the status as in the API server: camelCase, without absent fields."""
     return status.model_dump(mode="json", by_alias=True, exclude_none=True)
 
 
 def write_in_s(old: Mapping[str, Any] | None, new: Mapping[str, Any], since_s: float | None) -> float | None:
-    """Return the seconds after which a status is to be written, 0: now; None: it is not.
+    """Return the seconds after which to write a status; 0: now; None: not at all.
 
     Args:
-        old: as the API server holds it.
-        new: as `as_data` gives it.
+        old: from the API server.
+        new: from `as_data`.
         since_s: seconds since this job's status was last written, on a monotonic clock; None: this process
             has not written it.
     """
@@ -62,7 +62,7 @@ def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_amounts(told: Any) -> Any:
-    """Return a condition or replica; of one that waits in a queue, without the amounts in its message."""
+    """Return a condition or replica; if it waits in a queue, without the amounts in its message."""
     if not isinstance(told, Mapping) or told.get("reason") != Reason.QUEUED:
         return told
     return {**told, "message": _AMOUNT.sub("", str(told.get("message")))}
@@ -72,8 +72,8 @@ def _rest(replica: Any) -> Any:
     if not isinstance(replica, Mapping):
         return replica
     kept = {name: value for name, value in _without_amounts(replica).items() if name not in _OF_REPLICA}
-    kept |= dict.fromkeys(_FIRST & replica.keys())  # that there is one is news; how large it is, is not
+    kept |= dict.fromkeys(_FIRST & replica.keys())  # only the first value is news
     restarts = kept.get("restarts")
-    if isinstance(restarts, Mapping):  # those of simulators are as frequent as faults are
+    if isinstance(restarts, Mapping):  # restarts of simulators are as frequent as faults
         kept["restarts"] = {name: value for name, value in restarts.items() if name != "simulator"}
     return kept

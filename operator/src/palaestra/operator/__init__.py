@@ -1,16 +1,17 @@
-"""The running operator: the loop, and what it needs to see and to act.
+"""The running operator: the control loop, its observations and its writes.
 
-    controller   read, plan, create what is missing, observe, decide, act, one status write, events
-    reading      what the caches hold of one TrainingJob
-    sources      what a job refers to, fetched on demand
-    poller       the trainers' own word, over the pod network
-    schedule     which trainer is asked next, so that silent pods cost nobody else a turn
-    trainers     which pods are asked
-    writing      every write to the cluster; none while another operator leads
-    workers      threads that take keys from the queue
-    families     every metric by name, as data
-    metrics, health, logs, run
+- `controller`: one reconcile: observe, plan, decide, act, one status write, events
+- `looking`: everything that the operator observes of one TrainingJob
+- `caches`, `following`: the watched objects
+- `asking`, `admissions`, `refusals`, `switchers`, `strangers`: facts that no watch reports, read on demand
+- `poller`: the trainers' own reports, over the pod network
+- `schedule`: which trainer to poll next, so that silent pods delay no others
+- `trainers`: the pods to poll
+- `acting`, `telling`, `writing`: every write to the cluster; none while another operator leads
+- `workers`: threads that take keys from the queue
+- `families`: every metric by name, as data; `metrics`: their values
+- `health`, `logs`, `options`, `run`: the process
 
-What is wanted and what it means is decided elsewhere, in `palaestra.plan` and `palaestra.decide`,
-which are pure; how a cluster is spoken to, in `palaestra.cluster`.
+`palaestra.plan` and `palaestra.decide`, which are pure, make the decisions; `palaestra.cluster` connects to
+the API server.
 """

@@ -1,7 +1,7 @@
-"""Do what was decided: create what is missing, stop, replace, suspend, resume, delete.
+"""Carry out actions: create missing objects, stop, replace, suspend, resume, delete.
 
-Names make it safe to do anything twice: what is there already is refused by the API server. One action
-that fails keeps no other replica from its own.
+An action can be repeated safely: names are deterministic, so the API server refuses a second object of the
+same name. If an action fails, those of other replicas are still done.
 """
 
 from collections.abc import Mapping
@@ -29,10 +29,10 @@ class Acting:
     """Carries out actions.
 
     Args:
-        api: to read what no cache may be believed about.
-        writer: to write.
-        strangers: remembers Jobs whose names are taken.
-        denials: remembers what could not be created.
+        api: for reads that must not come from a cache.
+        writer: for writes.
+        strangers: remembers Jobs of other owners that have our names.
+        denials: remembers refused creations.
     """
 
     def __init__(self, api: Api, writer: Writer, strangers: Strangers, denials: Denials) -> None:
@@ -42,7 +42,7 @@ class Acting:
         self._denials = denials
 
     def carry_out(self, raw: Object, actions: tuple[Action, ...], *, confirmed: bool = False) -> Denied:
-        """Do `actions` for a TrainingJob, in order, and return what was refused; empty if all was done.
+        """Do `actions` for a TrainingJob, in order, and return the refusals; empty if all were done.
 
         `confirmed`: they follow from what was just written, so no read has to confirm them.
 
@@ -114,10 +114,10 @@ class Acting:
         log.info("applied", job=key, kind=kind, name=name)
 
     def _see_owner(self, key: Key, uid: str, obj: Object) -> None:
-        """See that a Job that is there is the TrainingJob's own, of which the cache has not heard yet.
+        """Check that an existing Job is owned by the TrainingJob; the cache has not received it yet.
 
         Raises:
-            AlreadyExists: it is not, or is gone by now.
+            AlreadyExists: another object owns it, or it is gone by now.
         """
         name = obj["metadata"]["name"]
         found = self._strangers.meet(key, uid, name)
@@ -126,10 +126,10 @@ class Acting:
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _see_config_map(self, namespace: str, obj: Object) -> None:
-        """See that a ConfigMap that is there is the TrainingJob's own, and can never hold anything else.
+        """Check that an existing ConfigMap is the TrainingJob's own, has the planned content, is immutable.
 
         Raises:
-            AlreadyExists: it is not; pods would train whatever it says.
+            AlreadyExists: it is not; pods would train with its content.
         """
         name = obj["metadata"]["name"]
         found = self._api.get(CONFIG_MAPS, namespace, name)
@@ -139,7 +139,7 @@ class Acting:
             raise AlreadyExists(HTTPStatus.CONFLICT, "AlreadyExists", words)
 
     def _patch(self, key: Key, action: Stop | Replace | SetSuspend) -> None:
-        """Change a Job, if it still is the one that was decided about, and as it was."""
+        """Patch a Job, if its uid and version are those of the decision."""
         metadata = {**action.patch.get("metadata", {}), "uid": action.basis.uid}
         patch = {**action.patch, "metadata": metadata}
         self._writer.merge(JOBS, key[0], action.job, patch, action.basis.version)
@@ -157,7 +157,7 @@ class Acting:
 
 
 def _wrong_with(found: Object, planned: Object) -> str:
-    """Return what a ConfigMap that is there has that the planned one has not; "": nothing."""
+    """Return how an existing ConfigMap differs from the planned one; "" if it does not."""
     if found.get("data") != planned["data"]:
         return "with other content"
     if not owners(found) & owners(planned):

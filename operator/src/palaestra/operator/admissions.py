@@ -1,8 +1,8 @@
-"""Why Kueue has not admitted a Job: the words of its Workload, which authors of jobs may not be able to read.
+"""Why Kueue has not admitted a Job: the message of its Workload, which authors of jobs may be unable to read.
 
-A Workload is as large as a pod's template, and Kueue changes it often. The operator watches none; it lists
-the Workload of a Job that waits (`palaestra.operator.asking`). Thousands of Jobs may wait for days, so their
-requests and their memory are apart from those for Jobs whose pods are refused.
+A Workload is as large as a pod's template, and Kueue changes it often. So the operator does not watch
+Workloads; it lists that of a waiting Job (`palaestra.operator.asking`). Thousands of Jobs may wait for days,
+so their requests and their memory are separate from those for Jobs whose pods are refused.
 """
 
 import time
@@ -23,11 +23,11 @@ Object = dict[str, Any]
 
 
 class Admissions(Asking[str, str]):
-    """What the Workload of each Job that waits in a queue says, by the Job's uid.
+    """The message of the Workload of each Job that waits in a queue, by the Job's uid.
 
     Args:
         api: the cluster.
-        clock: seconds that never go back.
+        clock: a monotonic clock, in seconds.
     """
 
     def __init__(self, api: Api, clock: Callable[[], float] = time.monotonic) -> None:
@@ -35,7 +35,7 @@ class Admissions(Asking[str, str]):
         self._api = api
 
     def of(self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]) -> Answers[str, str]:
-        """Return what is known about those of a TrainingJob's `jobs` that wait in a queue.
+        """Return the answers about those of a TrainingJob's `jobs` that wait in a queue.
 
         Raises:
             ApiError: a Workload had to be read, and there was no answer.

@@ -1,8 +1,8 @@
-"""Ask the API server about objects that lack something: seldom, in turns, and of a bounded number.
+"""Ask the API server about objects that lack something: rarely, in turns, and about a limited number.
 
-A watch would be expensive, and the answers are rarely needed. An object is asked about when it has lacked
-something for some seconds, and then at growing pauses. All objects of one `Asking` share a few requests a
-second and a bounded memory, so that a namespace with thousands of them takes nothing from the others.
+A watch would be expensive, and the answers are rarely needed. The first request about an object is sent after
+it has lacked something for some seconds, the next ones at growing pauses. All objects of one `Asking` share a
+few requests a second and a limited memory, so that thousands of them in a namespace delay no others.
 """
 
 import threading
@@ -14,10 +14,10 @@ from typing import Generic, TypeVar
 from palaestra.operator.memory import Item, Memory
 from palaestra.operator.poller import Key
 
-PATIENCE_S = 5.0  # that an object may lack something
+PATIENCE_S = 5.0  # before the first request about an object
 RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the one before
 LONGEST_PAUSE_S = 300.0
-RATE = 4.0  # requests a second, about all objects together; with the one that is saved up, 5 in any second
+RATE = 4.0  # requests a second for all objects together; with one saved token, at most 5 in any second
 
 Fact = TypeVar("Fact")
 Ask = Callable[[str, Item], Fact | None]
@@ -25,12 +25,12 @@ Ask = Callable[[str, Item], Fact | None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answers(Generic[Item, Fact]):
-    """What is known of objects that lack something.
+    """The answers about objects that lack something.
 
     Attributes:
         facts: the last answer about each; an object without one is absent.
         unasked: objects for which there is no room; the operator sends no request about them.
-        again_s: when to look again; None: nothing is lacking.
+        again_s: seconds until the next reconcile has to ask again; None: nothing is lacking.
     """
 
     facts: Mapping[Item, Fact]
@@ -40,7 +40,7 @@ class Answers(Generic[Item, Fact]):
 
 @dataclass(slots=True)
 class _Lack(Generic[Fact]):
-    """What an object lacks: when to ask (again), and the last answer."""
+    """An object that lacks something: when to ask next, and the last answer."""
 
     due: float
     pause_s: float = RECHECK_S
@@ -53,7 +53,7 @@ class Asking(Memory[Item, _Lack[Fact]]):
 
     Args:
         ask: returns the answer about an object of a namespace; None: there is none.
-        clock: seconds that never go back.
+        clock: a monotonic clock, in seconds.
     """
 
     def __init__(self, ask: Ask[Item, Fact], clock: Callable[[], float] = time.monotonic) -> None:
@@ -63,10 +63,10 @@ class Asking(Memory[Item, _Lack[Fact]]):
         self._turns = _Turns(clock())
 
     def about(self, key: Key, uid: str, lacking: Collection[Item]) -> Answers[Item, Fact]:
-        """Return what is known about those objects of a TrainingJob that lack something.
+        """Return the answers about those objects of a TrainingJob that lack something.
 
         Raises:
-            ApiError: an object had to be asked about, and there was no answer; the next try is after a pause.
+            ApiError: a request got no answer; the next one follows after a pause.
         """
         known = self.known(key, uid)
         due = self._clock() + PATIENCE_S
@@ -83,7 +83,7 @@ class Asking(Memory[Item, _Lack[Fact]]):
         )
 
     def _is_due(self, lack: _Lack[Fact]) -> bool:
-        """Return whether to ask now; if so, the pause after that has begun."""
+        """Return whether to ask now; if so, start the pause after that."""
         now = self._clock()
         if now < lack.due:
             return False
@@ -104,7 +104,7 @@ class _Turns:
         self._end = now  # of the queue
 
     def wait_s(self, now: float, *, queued: bool) -> float:
-        """Return the seconds after which to come again; 0: this is the turn."""
+        """Return the seconds to wait for a turn; 0: the turn is now."""
         with self._lock:
             self._tokens = min(self._tokens + (now - self._filled) * RATE, 1.0)
             self._filled = now

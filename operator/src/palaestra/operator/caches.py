@@ -1,7 +1,7 @@
-"""What the operator knows of the cluster: a cache for each kind of object, trimmed.
+"""The operator's caches, one for each kind of object, with trimmed objects.
 
-TrainingJobs, and of everything else only what carries the label palaestra.dev/job: the operator's
-memory does not grow with what others run in the cluster.
+They hold TrainingJobs, and of other kinds only objects with the label palaestra.dev/job. So the operator's
+memory does not grow with other workloads of the cluster.
 """
 
 import time
@@ -38,8 +38,8 @@ class Caches:
 
     Args:
         api: the cluster.
-        namespaces: those that are looked at; none: all of them.
-        changed: is told the key of each TrainingJob that changed, or of which a child did.
+        namespaces: the watched ones; empty: all of them.
+        changed: called with the key of each TrainingJob that changed, or whose child changed.
     """
 
     def __init__(self, api: Api, namespaces: Sequence[str], changed: Changed) -> None:
@@ -63,12 +63,12 @@ class Caches:
         }
 
     def start(self) -> None:
-        """Begin to follow the cluster."""
+        """Start all watches."""
         for each in self._all():
             each.start()
 
     def stop(self, deadline_s: float) -> None:
-        """Follow no longer; a watch that does not end until `deadline_s` ends with the process."""
+        """Stop all watches; one that does not stop within `deadline_s` ends with the process."""
         for each in self._all():
             each.stop(0.0)
         self._jobs.stop(deadline_s)
@@ -92,7 +92,7 @@ class Caches:
         return None if found is None or "deletionTimestamp" in found["metadata"] else found
 
     def children(self, resource: Resource, key: Key) -> list[Object]:
-        """Return the objects of a kind that carry the label of a TrainingJob."""
+        """Return the objects of a kind with the label of a TrainingJob."""
         namespace, name = key
         return self._children[resource.plural].select(namespace, {JOB_LABEL: name})
 

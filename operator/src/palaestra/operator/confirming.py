@@ -1,7 +1,7 @@
-"""See that the cluster is as it was when something was decided: a cache may lag, a read does not.
+"""Confirm by reads that the cluster is still as it was at the decision, because a cache may lag.
 
-What was decided on something else is not done: the next look decides anew. What may change between this and
-the write is held by preconditions: the uid and the resourceVersion of the object that is written.
+If it has changed, the actions are not done, and the next reconcile decides again. A change between the read
+and the write fails on a precondition of the write: the uid and the resourceVersion of the object.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,17 +19,17 @@ Object = Mapping[str, Any]
 
 
 class Outdated(PalaestraError):
-    """The cluster is not as it was when this was decided, so it was not done; look again."""
+    """The cluster has changed since the decision, so the action was not done; reconcile again."""
 
 
 def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
-    """See that the TrainingJob is as decided on, and so are the pods before a Job is created or stopped.
+    """Check that the TrainingJob is unchanged, and before a Job is created or stopped its pods too.
 
-    A replica that has ended is never trained again, none ever has two pods, and none that has come up since
-    is stopped, or its pod replaced, for what kept it from coming up.
+    So an ended replica is never trained again, and no replica has two pods. A replica that has started since
+    is not stopped, nor is its pod replaced, for a cause that has passed.
 
     Raises:
-        Outdated: it is not.
+        Outdated: one of them has changed.
     """
     if not actions:
         return
@@ -53,9 +53,9 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
 
 
 def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
-    """Return whether a pod may still write to the volume of one of these Jobs, which are by replica.
+    """Return whether a pod may still write to the volume of one of these Jobs, given by replica.
 
-    A pod of an earlier TrainingJob of the name can do so only on a claim that both mount.
+    A pod of an earlier TrainingJob of the same name can do so only if both mount the same claim.
     """
     labels = pod["metadata"]["labels"]
     job = jobs.get(labels.get(REPLICA_LABEL))
@@ -66,10 +66,10 @@ def _occupies(pod: Object, jobs: Mapping[str, Object]) -> bool:
 
 
 def _is_news(pod: Object, stop: Stop | Replace, raw: Object) -> bool:
-    """Return whether a pod of the replica to be stopped is new, or another than it was.
+    """Return whether a pod of the replica to be stopped is new or has changed.
 
-    One whose labels somebody has changed is no pod of the replica any more, as `observe` has it: else it
-    would keep the replica from being stopped for ever.
+    A pod whose labels were edited no longer belongs to the replica, as in `observe`. Otherwise it would
+    prevent the stop of the replica forever.
     """
     uid, known, labels = pod["metadata"]["uid"], dict(stop.basis.pods), pod["metadata"]["labels"]
     if (labels.get(UID_LABEL), labels.get(REPLICA_LABEL)) != (raw["metadata"]["uid"], str(stop.replica)):

@@ -1,8 +1,8 @@
-"""The loop: compare what is with what should be, and bring it a step closer.
+"""The control loop: compare the cluster with the job, and bring it one step closer.
 
-Level-triggered: it is told that something about a job changed, never what. Everything that it goes by
-is read from the cluster, so that it can be killed between any two writes and started again. What is
-wanted and what is to be said is decided in `palaestra.decide`, which is pure; nothing is built here.
+Level-triggered: a reconcile gets the key of a job, not the change. It reads everything from the cluster, so
+the operator can be killed between any two writes and restarted. `palaestra.decide`, which is pure, decides on
+actions and status; no object is built here.
 """
 
 import time
@@ -44,7 +44,7 @@ Object = Mapping[str, Any]
 
 
 def now(record: Record) -> Times:
-    """Return the clocks as they are; `record` is what the last look left."""
+    """Return the current time by both clocks; `record` is that of the last reconcile."""
     return Times(now=datetime.now(UTC), clock_s=time.monotonic(), record=record)
 
 
@@ -52,12 +52,12 @@ class Controller:
     """Reconciles TrainingJobs, each by one worker at a time.
 
     Args:
-        caches: what is watched.
-        looking: what there is of a job.
-        acting: does what was decided.
+        caches: the watched objects.
+        looking: observes a job.
+        acting: carries out actions.
         telling: writes status and events.
         layout: of this release in this cluster.
-        times: the clocks at a look, by what the last one left.
+        times: returns the clocks at a reconcile, for the record of the last one.
     """
 
     def __init__(
@@ -76,18 +76,18 @@ class Controller:
         self._layout = layout
         self._times = times
         self._records = Records()
-        self._terminating: set[Key] = set()  # of which it was logged
+        self._terminating: set[Key] = set()  # jobs for which this was logged
 
     def begin_anew(self) -> None:
-        """Forget since when anything is waited for: another operator may have led meanwhile."""
+        """Begin every wait again, because another operator may have led meanwhile."""
         self._records.clear()
 
     def reconcile(self, key: Key) -> float | None:
-        """Look at one TrainingJob and do what is to be done; return seconds until time may change that.
+        """Reconcile one TrainingJob; return the seconds after which the decision may change by time alone.
 
         Raises:
-            ApiError: it is to be tried again later; what was done stays done. In a namespace that is being
-                deleted nothing is tried again: each change in it is a look anyway.
+            ApiError: retry later; actions that were done stay done. In a namespace that is being deleted
+                nothing is retried, because each change in it triggers a reconcile anyway.
             Outdated: the cache is behind.
             NotLeading: another operator may lead.
         """
@@ -107,7 +107,7 @@ class Controller:
             return None
 
     def _bring_closer(self, key: Key, raw: Object) -> float | None:
-        """Look, decide and act; once more if that has just accepted the job."""
+        """Observe, decide and act; decide and act once more if the status has just accepted the job."""
         times = self._times(self._records.of(key, raw["metadata"]["uid"]))
         look = self._look(raw, times)
         written = self._carry_out(raw, look, times)
@@ -117,7 +117,7 @@ class Controller:
         return earliest(look.decision.wake_after_s, look.again_s, written.again_s)
 
     def _look(self, raw: Object, times: Times) -> "_Look":
-        """Return what there is of a job, and what follows."""
+        """Return the observation of a job, and the decision on it."""
         try:
             job, seen = self._observe(raw)
         except Refused as refused:
@@ -127,14 +127,14 @@ class Controller:
         return _Look(decision=decision, seen=seen, prepared=prepared)
 
     def _decide_anew(self, stored: Object, look: "_Look", times: Times) -> "_Look":
-        """Return what follows now that the status accepts the job; there is nothing of it yet to look at."""
+        """Return the decision after the status has accepted the job, which has no objects to observe yet."""
         if look.seen is None or look.prepared is None:
             raise AssertionError("unreachable: a refused job is not accepted")
         decision = decide(accept(stored), look.seen.observed, look.prepared, times)
         return replace(look, decision=decision, just_accepted=True)
 
     def _carry_out(self, raw: Object, look: "_Look", times: Times) -> StatusWrite:
-        """Do what was decided, then write it."""
+        """Carry out the actions, then write the status and the events."""
         key, decision = (raw["metadata"]["namespace"], raw["metadata"]["name"]), look.decision
         self._records.keep(key, raw["metadata"]["uid"], decision.record)
         denied = self._acting.carry_out(raw, decision.actions, confirmed=look.just_accepted)
@@ -144,10 +144,10 @@ class Controller:
         return written
 
     def _observe(self, raw: Object) -> tuple[TrainingJob, Seen]:
-        """Return a job with what there is of it, read whole if it is to be planned.
+        """Return a job and its observation; the whole job is read if it has to be planned.
 
         Raises:
-            Refused: it cannot be looked after as it stands.
+            Refused: the operator cannot run the job as it is.
         """
         job = accept(raw)
         seen = self._looking.look(job)
@@ -159,9 +159,9 @@ class Controller:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Look:
-    """What there is of a job and what follows; of a refused one there is only the latter.
+    """The observation of a job and the decision; a refused job has only a decision.
 
-    `just_accepted`: this look has written the status that accepts the job.
+    `just_accepted`: this reconcile has written the status that accepts the job.
     """
 
     decision: Decision
@@ -171,15 +171,15 @@ class _Look:
 
     @property
     def again_s(self) -> float | None:
-        """Seconds until something has to be asked for anew."""
+        """Return the seconds until a fact that no watch reports has to be read again."""
         return None if self.seen is None else self.seen.again_s
 
 
 def _just_accepted(before: Object, stored: Object) -> bool:
-    """Return whether a status that was written accepts its job, so that all of it can be created at once.
+    """Return whether the written status accepts its job, so that all its objects can be created at once.
 
-    A job that was not accepted has never had a pod, so no read has to confirm it. On a claim of somebody else
-    a pod of an earlier job may still write: that needs the reads of the next look.
+    A job that was not accepted has never had a pod, so no read has to confirm that. With an `existingClaim`,
+    a pod of an earlier job may still write there, so that job needs the reads of the next reconcile.
     """
     accepted = part(stored, "status").get("release") and not part(before, "status").get("release")
     return bool(accepted) and part(stored, "spec", "storage").get("existingClaim") is None

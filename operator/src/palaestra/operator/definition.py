@@ -1,14 +1,14 @@
-"""Whether the cluster's definition of TrainingJobs has all that this release writes.
+"""Compare the cluster's definition of TrainingJobs with the fields that this release writes.
 
-With `crds.install: false` an administrator applies the definition, and may forget to. Then the API
-server drops new fields of a status without an error. No decision depends on them, but people miss them.
-It refuses a status with a condition of a new type, so such conditions are left out until the definition is
-known to take them; those that a status has already stay.
+With `crds.install: false` an administrator applies the definition, and may forget to. Then the API server
+drops new fields of a status without an error. No decision depends on them, but people miss them. It refuses a
+status with a condition of a new type. So the operator leaves out such conditions until it has read that the
+definition has them; those that a status has already stay.
 
-Columns and selectable fields are not compared: without them nothing that is written is lost.
+Columns and selectable fields are not compared, because no written value is lost without them.
 
-The definition is compared through the OpenAPI document, which every account may read: the operator has
-no right to read CustomResourceDefinitions. It does its work also where the document cannot be read.
+The operator has no right to read CustomResourceDefinitions, so it reads the OpenAPI document, which every
+account may read. If that fails, the operator still works.
 """
 
 import threading
@@ -37,7 +37,7 @@ class Definition:
 
     Args:
         api: the cluster.
-        changed: is called when the definition begins to take more of a status.
+        changed: called when the definition accepts more fields of a status than before.
 
     Attributes:
         outdated: whether it lacks something; None: it could not be read yet.
@@ -51,14 +51,14 @@ class Definition:
         self.outdated: bool | None = None
 
     def follow(self, stopping: threading.Event, every_s: float) -> None:
-        """Compare at once, then in a thread of its own until nothing is lacking; then ask no more."""
+        """Compare at once, then in a thread of its own until nothing is lacking."""
         self._try_look()
         threading.Thread(
             target=self._follow, args=(stopping, every_s), name="definition", daemon=True
         ).start()
 
     def look(self) -> None:
-        """Compare once, and log what is lacking if it is not the same as before."""
+        """Compare once, and log the missing fields if they have changed."""
         try:
             served = self._api.schema(API_VERSION, KIND)
         except ApiError as error:
@@ -78,9 +78,9 @@ class Definition:
             )
 
     def accepted(self, stored: Any, status: dict[str, Any]) -> dict[str, Any]:
-        """Return a status as the definition takes it: a condition of an unknown type is left out.
+        """Return a status without conditions whose type the definition does not have.
 
-        While the definition could not be read, it takes the types that the `stored` status has.
+        Until the definition was read, the types are those in the `stored` status.
         """
         if self._knows_new:
             return status
@@ -108,6 +108,6 @@ def _lacking(served: Mapping[str, Any]) -> list[str]:
 
 
 def _condition_types(served: Mapping[str, Any]) -> frozenset[str]:
-    """Return the types of conditions that a served schema takes."""
+    """Return the types of conditions that a served schema allows."""
     way = ("status", "properties", "conditions", "items", "properties", "type")
     return frozenset(part(served, "properties", *way).get("enum", ()))

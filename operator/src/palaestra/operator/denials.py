@@ -1,7 +1,7 @@
-"""What the API server said when it last refused an object of a TrainingJob: a quota, a webhook, a right.
+"""The API server's last refusal of an object of a TrainingJob, by a quota, a webhook or RBAC.
 
-Nothing in the cluster reports an object that could not be made, so the operator remembers it until the
-object is made or no longer wanted. An operator that has just started tries, and is refused anew.
+No object in the cluster reports a refused creation, so the operator remembers it until the object is created
+or no longer needed. After a restart the operator tries again, and is refused again.
 """
 
 from collections.abc import Mapping
@@ -14,17 +14,17 @@ from palaestra.operator.poller import Key
 
 Denied = Mapping[int | None, ApiError]  # by replica; None: of the whole job
 
-_BY_A_WEBHOOK = "webhook"  # that does not answer: the API server calls it an error of its own
-_BY_A_BUDGET = "disruption budget"  # of somebody who wants the pod to stay; the API server calls it busy
+_BY_A_WEBHOOK = "webhook"  # one that does not answer; the API server reports it as an internal error
+_BY_A_BUDGET = "disruption budget"  # one that keeps the pod; the API server answers 429, as if it were busy
 
 
 class Denials(Memory[int | None, str]):
-    """The API server's words by TrainingJob and replica; None: about an object of the whole job."""
+    """The API server's messages by TrainingJob and replica; None: about an object of the whole job."""
 
     def learn(self, key: Key, uid: str, refused: Denied) -> None:
-        """Take what was refused of all that is missing; whatever is not among it was made.
+        """Record the refusals of one reconcile; objects without one were created.
 
-        What passes by itself, as an API server that is busy, changes nothing.
+        A refusal that passes by itself, such as that of a busy API server, changes nothing.
         """
         before = self.known(key, uid)
         words = {

@@ -1,7 +1,7 @@
 """Every metric of the operator, by name; `palaestra.operator.metrics` has their values.
 
-Labels are bounded: no job's name, which would outlive the job. What a training does is told by its own
-pods.
+Labels are bounded: no label has the name of a job, because its series would outlive the job. The pods of a
+job export the metrics of its training.
 """
 
 from palaestra.api.reasons import ROWS, WAITING, Reason
@@ -12,14 +12,14 @@ SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
 # From a node that has all images to a queue that takes the night.
 WAITS = (1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0, 14_400.0)
 RESULTS = ("done", "conflict", "error")
-# Why a replica may end: it has succeeded, or something is told of as a warning.
+# The reasons with which a replica may end: success, and every reason that is a warning.
 ENDS = tuple(reason for reason in Reason if reason is Reason.SUCCEEDED or ROWS[reason].warning)
 
 VERB = Label(name="verb", values=("get", "list", "watch", "create", "patch", "apply", "delete"))
 
 JOBS = gauge(
     "palaestra_jobs",
-    "TrainingJobs by the namespace that they are in, and phase; told by the operator that leads.",
+    "TrainingJobs by namespace and phase; exported by the leading operator.",
     Label(name="job_namespace", bound="namespace with jobs"),
     Label(name="phase", values=tuple(Phase)),
 )
@@ -36,17 +36,17 @@ TIME_TO_RUNNING = histogram(
 )
 RESTARTS = counter(
     "palaestra_replica_restarts_total",
-    "What was started again in replicas: pods by why they were replaced, and simulators.",
+    "Restarts in replicas: of pods by the cause of their replacement, and of simulators.",
     Label(name="cause", values=tuple(Restarts.model_fields)),
 )
 REPLICA_ENDS = counter(
     "palaestra_replica_ends_total",
-    "Replicas that ended, by the reason that their status gives.",
+    "Replicas that ended, by the reason in their status.",
     Label(name="reason", values=ENDS),
 )
 RECONCILED = histogram(
     "palaestra_operator_reconcile_duration_seconds",
-    "Time that one look at a TrainingJob took; conflict is harmless, error is not.",
+    "Time that one reconcile of a TrainingJob took; conflict is harmless, error is not.",
     SECONDS,
     Label(name="result", values=RESULTS),
 )
@@ -70,11 +70,11 @@ REQUEST_DURATION = histogram(
 LEADER = gauge("palaestra_operator_leader", "1 while this operator leads.")
 CRD_OUTDATED = gauge(
     "palaestra_operator_crd_outdated",
-    "1 while the cluster's CustomResourceDefinition lacks something of this release's; absent: not read yet.",
+    "1 while the cluster's CustomResourceDefinition lacks a field of this release; absent: not read yet.",
 )
 BUILD = gauge(
     "palaestra_operator_build_info",
-    "Always 1; the label tells the release.",
+    "Always 1; the label is the release.",
     Label(name="version", bound="release"),
 )
 

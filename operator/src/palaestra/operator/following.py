@@ -1,6 +1,6 @@
-"""One kind of objects, followed in some namespaces or in all of them.
+"""One kind of objects, watched in some namespaces or in all of them.
 
-Where the operator may look at a few namespaces only, no list spans them: each has a reflector of its own.
+If the operator watches only some namespaces, each has a reflector of its own, because no list spans several.
 """
 
 import time
@@ -19,11 +19,11 @@ class Followed:
 
     Args:
         api: the cluster.
-        resource: which kind of objects.
-        namespaces: those that are looked at; none: all of them.
+        resource: the kind.
+        namespaces: the watched ones; empty: all of them.
         labels: a label selector.
-        keep: returns the part of an object that is cached.
-        changed: is told what was kept of each object that changed.
+        keep: returns the part of an object to cache.
+        changed: called with the cached part of each object that changed.
     """
 
     def __init__(
@@ -44,11 +44,11 @@ class Followed:
 
     @property
     def synced(self) -> bool:
-        """Whether a whole list of each namespace was read, at least once."""
+        """Return whether a whole list of each namespace was read, at least once."""
         return all(each.synced for each in self._reflectors)
 
     def start(self) -> None:
-        """Begin to follow; once."""
+        """Start the watches; once."""
         for each in self._reflectors:
             each.start()
 
@@ -75,7 +75,7 @@ class Followed:
         return any(each.store.holds(namespace, name) for each in self._reflectors)
 
     def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
-        """Return the objects that carry these labels; namespace None: wherever they are."""
+        """Return the objects with these labels; namespace None: in all watched namespaces."""
         return [obj for each in self._reflectors for obj in each.store.select(namespace, labels)]
 
     def keys(self) -> set[Key]:

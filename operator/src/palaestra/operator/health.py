@@ -1,7 +1,7 @@
-"""The operator's own port: does it live, is it ready, what does it count.
+"""The operator's HTTP server: liveness, readiness and metrics.
 
-Everybody who may reach the pod may ask, so it only tells; a connection has a time, and a place among
-a bounded number of others.
+Every client that reaches the pod may send requests, so they only read. Each connection has a deadline, and
+the number of connections is limited.
 """
 
 import threading
@@ -18,7 +18,7 @@ PLAIN = "text/plain; charset=utf-8"
 TIMEOUT_S = 5.0
 MOST_CONNECTIONS = 16
 
-Trouble = Callable[[], str | None]  # what is wrong, in a sentence; None: nothing
+Trouble = Callable[[], str | None]  # returns the problem in a sentence; None: there is none
 
 
 class HealthServer(ThreadingHTTPServer):
@@ -26,9 +26,9 @@ class HealthServer(ThreadingHTTPServer):
 
     Args:
         address: host and port; port 0 takes a free one.
-        healthy: what is wrong so that only a new process helps.
-        ready: what is not there yet.
-        metrics: the text of the metrics.
+        healthy: returns a problem that only a restart solves.
+        ready: returns what the operator still waits for.
+        metrics: returns the text of the metrics.
 
     Raises:
         PalaestraError: the address cannot be listened on.
@@ -63,7 +63,7 @@ class HealthServer(ThreadingHTTPServer):
         return f"{host!s}:{port}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection a thread, or close it when too many are open."""
+        """Answer a connection in a thread, or close it if too many are open."""
         if self._places.acquire(blocking=False):
             super().process_request(request, client_address)
         else:
@@ -77,7 +77,7 @@ class HealthServer(ThreadingHTTPServer):
             self._places.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing: a client that goes away in the middle is no news of ours."""
+        """Log nothing: a client that disconnects early is no error of the operator."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -93,7 +93,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the library's name
-        """Write nothing: probes and scrapes come every few seconds."""
+        """Log nothing: probes and scrapes come every few seconds."""
 
 
 def _told(trouble: str | None) -> tuple[HTTPStatus, str, bytes]:

@@ -1,4 +1,4 @@
-"""How log lines look: one JSON object a line on standard error, a constant message, values as fields."""
+"""The format of the log: one JSON object a line on standard error, a constant message, values as fields."""
 
 import logging
 import sys

@@ -1,8 +1,10 @@
-"""Look at one TrainingJob: what the caches hold of it, and what has to be asked for.
+"""Observe one TrainingJob, from the caches and by requests.
 
-Some things are too rare to be watched by everybody all the time, and are asked for only while a job
-waits for them: what it refers to by name, why its pods cannot be made, why Kueue does not admit it, a Job of
-somebody else that has a name of ours, and whether there is a Kueue.
+Some facts are needed too rarely for a watch. The operator requests them only while a job waits for them:
+
+- the objects to which the job refers by name, and whether the cluster has Kueue;
+- why its pods cannot be created, and why Kueue does not admit it;
+- a Job of another owner that has one of our names.
 """
 
 import time
@@ -33,7 +35,7 @@ from palaestra.operator.switchers import Switchers
 
 RECHECK_S = 10.0  # while something may be missing
 KUEUE = "kueue.x-k8s.io"
-KUEUE_S = 10.0  # for which an answer about Kueue is believed
+KUEUE_S = 10.0  # for which an answer about Kueue is reused
 
 _READ = {
     SourceKind.CONFIG_MAP: CONFIG_MAPS,
@@ -44,21 +46,21 @@ _READ = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seen:
-    """What there is of a TrainingJob; `again_s`: when to look anew at what no watch tells."""
+    """The observation of a TrainingJob; `again_s`: seconds until unwatched facts have to be read again."""
 
     observed: Observed
     again_s: float | None
 
 
 class Looking:
-    """Looks at TrainingJobs.
+    """Observes TrainingJobs.
 
     Args:
         api: the cluster.
-        caches: what is watched.
-        strangers: the Jobs of others that were met.
-        denials: what could not be created.
-        polled: returns what the trainers said, by the pod's uid.
+        caches: the watched objects.
+        strangers: Jobs of other owners that have our names.
+        denials: refused creations.
+        polled: returns the answers of the trainers, by the pod's uid.
     """
 
     def __init__(
@@ -80,10 +82,10 @@ class Looking:
         self._kueue = (-KUEUE_S, False)
 
     def look(self, job: TrainingJob) -> Seen:
-        """Return what there is of a job.
+        """Return the observation of a job.
 
         Raises:
-            ApiError: something had to be asked for, and there was no answer.
+            ApiError: a request was necessary, and got no answer.
         """
         key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
@@ -108,7 +110,7 @@ class Looking:
         return Seen(observed=observed, again_s=earliest(refusals.again_s, admissions.again_s, asked_s, met_s))
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
-        """Return what was seen of a job's copy, with all that the whole job refers to.
+        """Return the observation of a job's copy, completed with all objects to which the whole job refers.
 
         Raises:
             ApiError: there was no answer.
@@ -117,11 +119,11 @@ class Looking:
         return replace(seen, observed=observed, again_s=earliest(seen.again_s, asked_s))
 
     def whole(self, raw: Raw) -> Raw:
-        """Return a TrainingJob of the caches with all that it holds, as the API server has it.
+        """Return the whole TrainingJob of a cached copy, from the API server.
 
         Raises:
             ApiError: there was no answer.
-            Outdated: it is not as it was when this copy was made.
+            Outdated: it has changed since the copy was made.
         """
         metadata = raw["metadata"]
         try:
@@ -138,7 +140,7 @@ class Looking:
             each.forget(key)
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:
-        """Return what was observed with what has to be asked for, and seconds until it is asked anew."""
+        """Return the observation completed by requests, and the seconds until the next ones."""
         if complete(job, observed) and not resuming(job, observed):
             return observed, None
         namespace, queued = job.metadata.namespace, job.spec.scheduling.queue_name is not None
@@ -155,7 +157,7 @@ class Looking:
         except Forbidden:
             if source.kind is not SourceKind.SECRET:
                 raise
-            return {}  # nobody has bound the role for Secrets here: as good as one without the label
+            return {}  # no role for Secrets is bound here: the same as a Secret without the label
 
     def _has_kueue(self) -> bool:
         at, found = self._kueue
@@ -166,5 +168,5 @@ class Looking:
 
 
 def earliest(*seconds: float | None) -> float | None:
-    """Return the least of several waits; None: there is none."""
+    """Return the shortest of several waits; None: there is none."""
     return min((each for each in seconds if each is not None), default=None)

@@ -1,9 +1,9 @@
-"""What no watch reports and the operator has to remember: bounded, and of TrainingJobs that there are.
+"""Bounded memory for facts that no watch reports, by TrainingJob.
 
-One policy for all of it. What a look leaves takes the place of what the one before left, and nothing stays of
-a TrainingJob that is gone, or was made again under its name: so memory holds only what there is. When it is
-full it takes nothing new until something goes. Were the oldest pushed out instead, thousands that are looked
-at in turn would push each other out, and none would be remembered.
+One policy applies to all of them. Each reconcile replaces the values of the one before, and the values of a
+deleted or recreated TrainingJob are dropped, so memory holds only existing things. If it is full, it accepts
+no new value until another one is dropped. Eviction of the oldest would be worse: with thousands of jobs in
+turn, each would evict another one, and no value would stay.
 """
 
 import threading
@@ -27,7 +27,7 @@ class Memory(Generic[Item, Value]):
         self._size = 0
 
     def known(self, key: Key, uid: str) -> Mapping[Item, Value]:
-        """Return what was kept of a TrainingJob."""
+        """Return the values of a TrainingJob."""
         with self._lock:
             known_uid, values = self._values.get(key, (uid, {}))
             if known_uid == uid:
@@ -36,9 +36,9 @@ class Memory(Generic[Item, Value]):
             return {}
 
     def keep(self, key: Key, uid: str, values: Mapping[Item, Value]) -> Mapping[Item, Value]:
-        """Remember `values` of a TrainingJob and nothing else; return those for which there is room.
+        """Replace the values of a TrainingJob by `values`; return those for which there is room.
 
-        An item that was known before has its place.
+        An item that is already there keeps its place.
         """
         with self._lock:
             before = self.known(key, uid)

@@ -1,4 +1,4 @@
-"""What the operator counts about itself and its jobs; the names are in `palaestra.operator.families`."""
+"""The operator's metrics about itself and its jobs; the names are in `palaestra.operator.families`."""
 
 from collections import Counter as Count
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -25,7 +25,7 @@ from palaestra_protocol.metrics import Family, Values
 Object = Mapping[str, Any]
 Counted = TypeVar("Counted", Counter, Histogram)
 
-# Else each counter has a second series, which nobody reads.
+# Otherwise each counter has a second, unused series.
 disable_created_metrics()
 
 
@@ -44,7 +44,7 @@ class Metrics:
         ProcessCollector(registry=self.registry)
 
     def request(self, verb: str, resource: str, code: int, seconds: float) -> None:
-        """Count a request; `code` is 0 when no answer came, `seconds` until the answer's head."""
+        """Count a request; `code` is 0 without an answer, `seconds` is the time until the answer's head."""
         self._requests.labels(verb, resource, str(code)).inc()
         if verb != "watch":
             self._request_seconds.labels(verb).observe(seconds)
@@ -54,9 +54,9 @@ class Metrics:
         self._queued.observe(seconds)
 
     def written(self, job: Object, status: Object) -> None:
-        """Count what happened to a TrainingJob, by the status that it had and the one that was written.
+        """Count the changes between the old status of a TrainingJob and the written one.
 
-        The operator that writes a change counts it, so that no change counts twice.
+        The operator that writes a change counts it, so that no change is counted twice.
         """
         old = job.get("status") or {}
         if status["phase"] == Phase.RUNNING and not _has_run(old):
@@ -75,11 +75,11 @@ class Metrics:
         waits: Callable[[], Iterable[tuple[str, str]]],
         outdated: Callable[[], bool | None],
     ) -> None:
-        """Export queue, leadership, phases, waiting replicas and the definition as they are when asked."""
+        """Export queue, leadership, phases, waiting replicas and the definition, read at each scrape."""
         self.registry.register(_Now(depth, leads, phases, waits, outdated))
 
     def text(self) -> bytes:
-        """Return all of them as Prometheus reads them."""
+        """Return all metrics in the text format of Prometheus."""
         return generate_latest(self.registry)
 
     def _count_replica(self, old: Object, new: Object) -> None:
@@ -102,7 +102,7 @@ class Metrics:
 
 
 class _Now(Collector):
-    """What is read when asked, so that no gauge can be left behind by a deleted job."""
+    """Gauges that are read at each scrape, so that a deleted job leaves none behind."""
 
     def __init__(
         self,
@@ -119,7 +119,7 @@ class _Now(Collector):
         self._outdated = outdated
 
     def collect(self) -> Iterator[Metric]:
-        """Yield one family after the other; jobs are told by the leader only, so that each counts once."""
+        """Yield each family; only the leader exports those of jobs, so that each job is counted once."""
         leads = self._leads()
         yield families.JOBS.metric(_by_phase(self._phases()) if leads else {})
         yield families.REPLICAS_WAITING.metric(dict(Count(self._waits())) if leads else {})
@@ -131,7 +131,7 @@ class _Now(Collector):
 
 
 def _from_zero(made: Counted, family: Family) -> Counted:
-    """Return a metric that has every value of its labels from the start: the first event is an increase."""
+    """Return a metric with all values of its labels set to 0, so that the first event is an increase."""
     for values in family.combinations() if family.labels else ():
         made.labels(*values)
     return made
@@ -145,7 +145,7 @@ def _by_phase(jobs: Iterable[tuple[str, str]]) -> Values:
 
 
 def _has_run(status: Object) -> bool:
-    """Return whether a job was running before, by what its trainers have told and how often they began."""
+    """Return whether a job was running before, by its phase and by the starts of its trainers."""
     begun = (each.get("attempt", 0) > 1 or "target" in each for each in status.get("replicas", ()))
     return status.get("phase") == Phase.RUNNING or any(begun)
 

@@ -1,4 +1,4 @@
-"""How the operator is started."""
+"""The operator's options."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,27 +7,27 @@ from palaestra.errors import PalaestraError
 from palaestra.plan import Images
 
 DEFAULT_NAMESPACE = "palaestra-system"
-NAME = "palaestra-operator"  # of the Lease, and of whatever an installation makes
+NAME = "palaestra-operator"  # of the Lease, and of the objects of an installation
 MOST_PORT = 65_535
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What a person may choose.
+    """The options of the command line.
 
     Attributes:
         images: the release's own, for jobs that name none.
-        operator_namespace: where the operator and its Lease are; its pods may ask trainers.
-        monitoring_namespace: whose pods may scrape trainers and simulators.
-        namespaces: those whose jobs are looked after; none: all of them.
-        workers: jobs that are looked at at once.
-        resync_s: seconds after which every job is looked at again though nothing changed.
+        operator_namespace: the namespace of the operator and its Lease; its pods may connect to trainers.
+        monitoring_namespace: the namespace whose pods may scrape trainers and simulators.
+        namespaces: the namespaces whose jobs this operator runs; empty: all of them.
+        workers: jobs that are reconciled at the same time.
+        resync_s: seconds after which every job is reconciled again, even without a change.
         leader_elect: whether to wait for the Lease.
         metrics_address: host and port of /healthz, /readyz and /metrics.
         node_selector: labels that the nodes of training pods must have.
         allowed_pod_labels: keys, or domains that end in `/`, of labels that jobs may give their pods.
         allowed_pod_annotations: the same of annotations.
-        kubeconfig: the file to connect with; None: as kubectl finds it, or the pod's own account.
+        kubeconfig: the file to connect with; None: the same as kubectl's, or the pod's own account.
         context: of the kubeconfig; None: its current one.
     """
 
@@ -50,7 +50,7 @@ def address(text: str) -> tuple[str, int]:
     """Return host and port of `0.0.0.0:8080`.
 
     Raises:
-        PalaestraError: it is none.
+        PalaestraError: the text is no address.
     """
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or int(port) > MOST_PORT:

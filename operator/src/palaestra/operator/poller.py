@@ -1,9 +1,9 @@
-"""Ask running trainers where they stand, over the pod network, and believe little of it.
+"""Poll the status of running trainers over the pod network, and trust none of the answers.
 
-A pod runs programs that its author chose. So an answer has a deadline as a whole, a largest size, and
-is read strictly; what is no answer is "unknown", never "stalled". Each answer is used as it comes; who is
-asked when is decided in `schedule`. Results live in memory only: an operator that has just started knows
-nothing, and asks.
+A pod runs programs that its author chose. So a whole answer has a deadline and a maximum size, and is parsed
+strictly. A missing or wrong answer means "unknown", never "stalled". Each answer is used as soon as it
+arrives; `schedule` decides which trainer to poll next. The results are in memory only, so a restarted
+operator polls all trainers again.
 """
 
 import asyncio
@@ -21,10 +21,10 @@ from palaestra.operator.schedule import Entry, Schedule, Standing, Target
 from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
 
 PERIOD_S = 10.0
-DEADLINE_S = 3.0  # of one answer, from the connection to its last byte
-PROMPT_SHARE = 1 / 3  # of the deadline; a trainer answers within milliseconds
-FOLLOW_S = 1.0  # between two looks at which trainers there are
-MOST_BYTES = 65_536  # of one answer; 32 simulators with their longest faults fit
+DEADLINE_S = 3.0  # of one whole answer
+PROMPT_SHARE = 1 / 3  # of the deadline; trainers answer in milliseconds
+FOLLOW_S = 1.0  # between updates of the list of trainers
+MOST_BYTES = 65_536  # of one answer, with room for the longest faults of 32 simulators
 MOST_HEAD_BYTES = 8192
 REQUEST = "GET /status HTTP/1.0\r\nHost: {host}\r\nAccept: application/json\r\n\r\n"
 
@@ -34,13 +34,13 @@ Key = tuple[str, str]  # namespace and name of a TrainingJob
 
 
 class Poller:
-    """Asks each target every period, many at once, in one thread of its own.
+    """Polls each target once a period, many at the same time, in one thread.
 
     Args:
         targets: returns the trainers that run now.
-        changed: is told the key of a job of which something else is known than before.
-        period_s: seconds between two questions to a trainer.
-        deadline_s: seconds that one answer may take as a whole; a third of it for a first question.
+        changed: called with the key of a job whose trainer gave another answer than before.
+        period_s: seconds between two requests to a trainer.
+        deadline_s: seconds that one whole answer may take; a third of it for the first request.
     """
 
     def __init__(
@@ -61,20 +61,20 @@ class Poller:
         self._thread = threading.Thread(target=self._run, name="poller", daemon=True)
 
     def start(self) -> None:
-        """Ask from now on, for the first time within a second."""
+        """Start polling; the first requests follow within a second."""
         self._thread.start()
 
     def stop(self, deadline_s: float) -> None:
-        """Ask no more; the thread ends within a second, and is waited for until `deadline_s`."""
+        """Stop polling, and wait at most `deadline_s` for the thread, which ends within a second."""
         self._stopped.set()
         self._thread.join(deadline_s)
 
     def known(self) -> Mapping[str, Polled]:
-        """Return the newest answers by the pod's uid; who did not answer last time is not among them."""
+        """Return the newest answers by the pod's uid; a pod without an answer last time is absent."""
         return MappingProxyType(self._known)
 
     def _run(self) -> None:
-        asyncio.run(self._ask_all())  # what is under way at the end is cancelled
+        asyncio.run(self._ask_all())  # cancels open requests at the end
 
     async def _ask_all(self) -> None:
         under_way: set[asyncio.Task[None]] = set()
@@ -118,10 +118,10 @@ class Poller:
         except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError) as error:
             log.debug("unreachable", job=target.key, pod=target.uid, error=type(error).__name__)
         except ProtocolError as error:
-            if not entry.refused:  # once a pod: one that lies for ever does not fill the log
+            if not entry.refused:  # once for each pod, so that bad answers do not fill the log
                 log.warning("answer refused", job=target.key, pod=target.uid, error=str(error))
             entry.refused = True
-        except Exception:  # what one pod answers must not end the asking of all others
+        except Exception:  # the answer of one pod must not end the polling of all others
             if not entry.refused:
                 log.exception("answer not read", job=target.key, pod=target.uid)
             entry.refused = True
@@ -132,8 +132,8 @@ async def _get_status(target: Target) -> bytes:
     """Return the body of a trainer's answer.
 
     Raises:
-        OSError: it cannot be reached.
-        ProtocolError: what came is no answer, or too long.
+        OSError: the trainer cannot be reached.
+        ProtocolError: the answer is malformed or too long.
     """
     reader, writer = await asyncio.open_connection(target.host, target.port, limit=MOST_HEAD_BYTES)
     try:
@@ -145,7 +145,7 @@ async def _get_status(target: Target) -> bytes:
             raise ProtocolError("head: the answer is not 200 of HTTP")
         return await _read_all(reader)
     finally:
-        writer.transport.abort()  # nothing is left to say, and nobody waits for a pod to close
+        writer.transport.abort()  # no need to wait until the pod closes
 
 
 async def _read_all(reader: asyncio.StreamReader) -> bytes:
@@ -167,5 +167,5 @@ async def _wait(event: asyncio.Event, seconds: float) -> None:
 
 
 def _word(answer: Polled | None) -> TrainerStatus | None:
-    """Return what a trainer says, whenever it said it."""
+    """Return a trainer's status without its age, for comparison."""
     return None if answer is None else replace(answer.status, last_progress_age_s=None)

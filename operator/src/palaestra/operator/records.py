@@ -1,4 +1,4 @@
-"""Since when what is waited for, of each TrainingJob: in memory only, and nobody needs it to go on."""
+"""The records of the last reconcile of each TrainingJob, in memory only; a restart may lose them."""
 
 import threading
 
@@ -7,9 +7,9 @@ from palaestra.operator.poller import Key
 
 
 class Records:
-    """What the last look at each TrainingJob left to the next; safe to use from several threads.
+    """The record of each TrainingJob's last reconcile; safe to use from several threads.
 
-    One that was made again under its name is another job.
+    A TrainingJob that was deleted and created again is another job.
     """
 
     def __init__(self) -> None:
@@ -17,13 +17,13 @@ class Records:
         self._known: dict[Key, tuple[str, Record]] = {}
 
     def of(self, key: Key, uid: str) -> Record:
-        """Return what was kept of the job with this uid; an empty record where nothing was."""
+        """Return the record of the job with this uid; an empty one if there is none."""
         with self._lock:
             known_uid, record = self._known.get(key, (uid, Record()))
         return record if known_uid == uid else Record()
 
     def keep(self, key: Key, uid: str, record: Record) -> None:
-        """Keep what a look has left."""
+        """Keep the record of a reconcile."""
         with self._lock:
             self._known[key] = (uid, record)
 
@@ -33,6 +33,6 @@ class Records:
             self._known.pop(key, None)
 
     def clear(self) -> None:
-        """Forget all of it."""
+        """Forget all records."""
         with self._lock:
             self._known.clear()

@@ -1,7 +1,7 @@
-"""Why the pods of a Job cannot be made, or cannot start: a quota, a webhook, a volume that does not come.
+"""Why the pods of a Job cannot be created or cannot start: a quota, a webhook, a volume that is not mounted.
 
-Only events report it, and a watch over the events of a whole cluster is dear: they are asked for
-(`palaestra.operator.asking`) when a Job that should have a pod has none, or a pod waits for its volumes.
+Only events report this, and a watch of all events in a cluster is expensive. So the operator lists them
+(`palaestra.operator.asking`) if a Job that should have a pod has none, or if a pod waits for its volumes.
 """
 
 import time
@@ -16,7 +16,7 @@ from palaestra.operator.asking import Answers, Asking
 from palaestra.operator.poller import Key
 
 Object = dict[str, Any]
-Lacking = tuple[str, str]  # uid of a Job or pod, and a selector of the events that say why
+Lacking = tuple[str, str]  # uid of a Job or pod, and a selector of the events with the reason
 
 
 class Refusals(Asking[Lacking, Object]):
@@ -24,7 +24,7 @@ class Refusals(Asking[Lacking, Object]):
 
     Args:
         api: the cluster.
-        clock: seconds that never go back.
+        clock: a monotonic clock, in seconds.
     """
 
     def __init__(self, api: Api, clock: Callable[[], float] = time.monotonic) -> None:
@@ -34,7 +34,7 @@ class Refusals(Asking[Lacking, Object]):
     def of(
         self, key: Key, uid: str, jobs: Sequence[Object], pods: Sequence[Object]
     ) -> Answers[Lacking, Object]:
-        """Return what is known about those of a TrainingJob's `jobs` and `pods` that lack something.
+        """Return the answers about those of a TrainingJob's `jobs` and `pods` that lack something.
 
         Raises:
             ApiError: events had to be read, and there was no answer.
@@ -48,7 +48,7 @@ class Refusals(Asking[Lacking, Object]):
 
 
 def podless(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
-    """Yield the Jobs that go on and have no pod that does."""
+    """Yield the unfinished Jobs that have no unfinished pod."""
     served = {owner for pod in pods if _alive(pod) for owner in owners(pod)}
     for job in jobs:
         ended = holds(job, "Complete") or holds(job, "Failed")
@@ -57,7 +57,7 @@ def podless(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:
 
 
 def is_suspended(job: Object) -> bool:
-    """Return whether a Job is suspended, so that it makes no pods."""
+    """Return whether a Job is suspended, so that it creates no pods."""
     return (job.get("spec") or {}).get("suspend") is True
 
 
@@ -71,7 +71,7 @@ def _lacking(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Lacking
 
 
 def _wants_volumes(pod: Object) -> bool:
-    """Return whether a node has taken a pod and not begun with its containers: volumes come before."""
+    """Return whether a pod is on a node that has started no container, so its volumes may be missing."""
     waits = (pod.get("status") or {}).get("phase") == "Pending" and not holds(
         pod, "PodReadyToStartContainers"
     )

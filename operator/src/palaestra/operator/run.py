@@ -1,7 +1,7 @@
-"""Put the operator together, run it until a signal, and end it within two seconds.
+"""Assemble the operator, run it until a signal, and stop it within two seconds.
 
-The only place that knows all the parts. Reflectors follow the cluster from the start, so that a new
-leader begins at once; workers begin when the caches are whole and this operator leads.
+Only this module knows all parts. Reflectors watch the cluster from the start, so that a new leader begins at
+once. Workers begin when the caches are complete and this operator leads.
 """
 
 import signal
@@ -33,10 +33,10 @@ from palaestra.plan import ClusterLayout
 
 log = structlog.get_logger(__name__)
 
-# Of the two seconds in which the operator ends: for what is under way, for the Lease, for the rest.
+# The two seconds in which the operator stops: for work in progress, for the Lease, for the rest.
 FINISH_S, RELEASE_S, STOP_S = 0.6, 0.6, 0.1
 SYNC_S = 1.0
-SETTLES_S = 0.1  # in which what belongs together, as the objects of one job, is all in the caches
+SETTLES_S = 0.1  # until related changes, such as all objects of one job, are in the caches
 FAILED = 1
 
 
@@ -45,8 +45,8 @@ class Operator:
 
     Args:
         api: the cluster.
-        options: how it was started.
-        metrics: what it counts.
+        options: of the command line.
+        metrics: its metrics.
     """
 
     def __init__(self, api: Api, options: Options, metrics: Metrics) -> None:
@@ -87,7 +87,7 @@ class Operator:
         )
 
     def run(self, stopping: threading.Event) -> None:
-        """Look after the jobs until `stopping` is set."""
+        """Reconcile jobs until `stopping` is set."""
         log.info("started", namespaces=self._options.namespaces or "all", address=self._server.shown)
         self._definition.follow(stopping, self._options.resync_s)
         self._caches.start()
@@ -106,7 +106,7 @@ class Operator:
         self._queue.add_after(key, SETTLES_S)
 
     def _stand(self) -> None:
-        """Lead, or stand for election: not before the caches are whole, so that a leader can work."""
+        """Lead, or stand for election; call it after the caches are complete, so that a leader can work."""
         if self._options.leader_elect:
             self._leadership.start(self._lead, self._gate.clear)
         else:
@@ -144,7 +144,7 @@ class Operator:
         return f"not read yet: {', '.join(missing)}" if missing else None
 
     def _end(self) -> None:
-        """End in the order that loses nothing: first the writes, then the Lease, then the rest."""
+        """Stop in the safe order: first the writes, then the Lease, then the rest."""
         self._gate.clear()
         self._workers.stop(FINISH_S)
         self._leadership.stop(RELEASE_S)
@@ -154,7 +154,7 @@ class Operator:
 
 
 def run(options: Options, metrics: Metrics | None = None) -> int:
-    """Run the operator until SIGTERM or SIGINT and return its exit code; 1: a part of it broke.
+    """Run the operator until SIGTERM or SIGINT and return its exit code; 1: a thread failed.
 
     Raises:
         PalaestraError: no API server is named, or the metrics' address is taken.
@@ -164,7 +164,7 @@ def run(options: Options, metrics: Metrics | None = None) -> int:
     broken: list[str] = []
 
     def break_down(failed: threading.ExceptHookArgs) -> None:
-        """End with the first thread that ends by mistake: half an operator is worse than a new one."""
+        """Stop the operator if a thread fails, because a restart is better than half an operator."""
         broken.append(failed.thread.name if failed.thread else "")
         log.critical("thread failed", thread=broken[-1], exc_info=failed.exc_value)
         stopping.set()

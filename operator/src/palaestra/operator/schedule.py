@@ -1,9 +1,8 @@
-"""Which trainer is asked next, and when: no clock, no sockets.
+"""Decide which trainer to poll next, and when; no clock, no sockets.
 
-Each trainer has its own next time, so nobody waits for the slowest of all. What a pod can take from others
-is a place among the questions under way, and that is bounded twice: trainers that answer at once, trainers
-that were not asked before, and trainers that held their last question up have places of their own; and among
-those that wait for a place, each namespace has its turn.
+Each trainer has its own next time, so no trainer waits for the slowest one. The open requests share a limited
+number of places, and two rules keep a pod from taking those of others. Prompt trainers, new trainers and slow
+trainers have separate places. Among the trainers that wait for a place, the namespaces take turns.
 """
 
 import heapq
@@ -12,16 +11,16 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
-FIRST_S = 1.0  # within which trainers that were just found are asked, so that they are soon known
+FIRST_S = 1.0  # within which a new trainer is polled for the first time
 
 Key = tuple[str, str]  # namespace and name of a TrainingJob
 
 
 class Standing(Enum):
-    """How the last question to a trainer went."""
+    """The result of the last request to a trainer."""
 
-    PROMPT = "prompt"  # it was over soon, with whatever result: a refused connection holds nobody up
-    NEW = "new"  # there was none
+    PROMPT = "prompt"  # it ended soon, with any result: a refused connection delays no other
+    NEW = "new"  # there was no request yet
     SLOW = "slow"
 
 
@@ -30,7 +29,7 @@ PLACES = {Standing.PROMPT: 40, Standing.NEW: 16, Standing.SLOW: 8}  # 64 answers
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """A trainer to ask: the pod's uid and address, and the job that it belongs to."""
+    """A trainer to poll: the pod's uid and address, and the key of its job."""
 
     key: Key
     uid: str
@@ -40,7 +39,7 @@ class Target:
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Entry:
-    """What is known of a target: how and when it was asked last, and whether an answer was ever refused."""
+    """The state of a target: the time and result of its last request, and whether an answer was refused."""
 
     target: Target
     standing: Standing = Standing.NEW
@@ -63,17 +62,17 @@ class _Turns:
         namespace, entries = self.waiting.popitem(last=False)
         entry = entries.popleft()
         if entries:
-            self.waiting[namespace] = entries  # behind all others
+            self.waiting[namespace] = entries  # after all others
         return entry
 
 
 class Schedule:
-    """Decides which targets are asked now. Times are seconds of a monotonic clock.
+    """Decides which targets to poll now. Times are seconds of a monotonic clock.
 
     Args:
-        period_s: seconds between two questions to a trainer, at most, while there are places.
-        prompt_s: seconds after which a question has held its place up.
-        spread: returns a random number from 0 to 1, so that a thousand trainers are not asked in one moment.
+        period_s: at most so many seconds between two requests to a trainer, while there are free places.
+        prompt_s: seconds after which a request counts as slow.
+        spread: returns a random number from 0 to 1, so that a thousand trainers are not polled at once.
     """
 
     def __init__(self, period_s: float, prompt_s: float, spread: Callable[[], float]) -> None:
@@ -82,12 +81,12 @@ class Schedule:
         self._spread = spread
         self._entries: dict[str, Entry] = {}
         self._times: list[tuple[float, int, Entry]] = []
-        self._numbered = 0  # entries of one time are compared by number
+        self._numbered = 0  # orders entries of the same time
         self._waiting = {standing: _Turns() for standing in Standing}
         self._free = dict(PLACES)
 
     def follow(self, targets: Collection[Target], now_s: float) -> list[Target]:
-        """Ask these from now on, and return those that are not asked any more."""
+        """Poll these targets from now on; return those that are dropped."""
         wanted = {each.uid: each for each in targets}
         gone = [each.target for uid, each in self._entries.items() if wanted.get(uid) != each.target]
         for target in gone:
@@ -99,7 +98,7 @@ class Schedule:
         return gone
 
     def due(self, now_s: float) -> Iterator[Entry]:
-        """Yield the targets to ask now; each takes a place until `done`."""
+        """Yield the targets to poll now; each occupies a place until `done`."""
         while self._times and self._times[0][0] <= now_s:
             entry = heapq.heappop(self._times)[-1]
             if self.follows(entry):
@@ -112,22 +111,22 @@ class Schedule:
                     yield found
 
     def done(self, entry: Entry, now_s: float) -> bool:
-        """Give the place of a question back; return whether its pod is still there: else forget it."""
+        """Free the place of a request; return whether its target is still to be polled."""
         self._free[entry.standing] += 1
         if not self.follows(entry):
             return False
         first = entry.standing is Standing.NEW
         entry.standing = Standing.PROMPT if now_s - entry.asked_s < self._prompt_s else Standing.SLOW
-        least = 0.2 if first else 0.8  # those that were found together come apart at once
+        least = 0.2 if first else 0.8  # separates targets that were found together
         self._at(entry, now_s + self._period_s * (least + (1.0 - least) * self._spread()))
         return True
 
     def follows(self, entry: Entry) -> bool:
-        """Return whether a target is still to be asked."""
+        """Return whether a target is still to be polled."""
         return self._entries.get(entry.target.uid) is entry
 
     def next_s(self) -> float | None:
-        """Return when the next target is due; None: there is none. A place may become free before."""
+        """Return when the next target is due; None: there is none. A place may become free earlier."""
         return self._times[0][0] if self._times else None
 
     def _at(self, entry: Entry, due_s: float) -> None:

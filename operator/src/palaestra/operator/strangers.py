@@ -1,7 +1,7 @@
-"""Jobs that have a name of ours and are not ours: of an earlier TrainingJob, or of somebody else.
+"""Strangers: Jobs with one of our names that belong to an earlier TrainingJob or to another owner.
 
-No cache holds them, as they need not carry our label. One is met when a Job cannot be created because
-its name is taken, and is looked at again, now and then, until it is gone.
+No cache has them, because they need not have our label. The operator finds one if a Job cannot be created
+because its name is taken. It reads that Job again every few seconds until it is gone.
 """
 
 import time
@@ -20,11 +20,11 @@ Object = dict[str, Any]
 
 
 class Strangers(Memory[str, tuple[float, Object]]):
-    """When a stranger was met last, and what it was, by TrainingJob and name.
+    """The time of the last read and the object of each stranger, by TrainingJob and name.
 
     Args:
         api: the cluster.
-        clock: seconds that never go back.
+        clock: a monotonic clock, in seconds.
     """
 
     def __init__(self, api: Api, clock: Callable[[], float] = time.monotonic) -> None:
@@ -33,7 +33,7 @@ class Strangers(Memory[str, tuple[float, Object]]):
         self._clock = clock
 
     def meet(self, key: Key, uid: str, name: str) -> Object | None:
-        """Return the Job that has a name which a TrainingJob needs, and remember it; None: it is gone."""
+        """Return and remember the Job whose name a TrainingJob needs; None: it is gone."""
         others = {each: met for each, met in self.known(key, uid).items() if each != name}
         try:
             found = trimmed(self._api.get(JOBS, key[0], name))
@@ -44,9 +44,9 @@ class Strangers(Memory[str, tuple[float, Object]]):
         return found
 
     def among(self, key: Key, uid: str, cached: Collection[str]) -> list[Object]:
-        """Return the strangers in the way of a TrainingJob, as they were ten seconds ago at most.
+        """Return the strangers whose names a TrainingJob needs, as of ten seconds ago at most.
 
-        `cached` are the names of the Jobs that are in the cache: those are no strangers any more.
+        `cached` are the names of the Jobs in the cache, which are not strangers.
         """
         met = {name: met for name, met in self.known(key, uid).items() if name not in cached}
         self.keep(key, uid, met)

@@ -1,7 +1,7 @@
 """The field manager that suspended or resumed a Job of ours, if it was not the operator.
 
-The caches hold no managedFields, which are half of an object, so a Job that differs from what the operator
-set is read once for each change of its spec.
+The caches have no managedFields, which are half of an object. So a Job whose `suspend` is not as the operator
+set it is read once for each change of its spec.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
-"""Tell people how a job stands: one status write if it changed, and events once that is written.
+"""Report the state of a job: one status write if it changed, then events.
 
-An event for a change that was lost would be a lie, so none is written before the status is. Progress
-alone is written seldom; conditions and phases at once.
+Events are written after the status, because an event about a change that was not written would be wrong.
+Progress alone is written rarely; conditions and phases at once.
 """
 
 import threading
@@ -24,11 +24,11 @@ Accepted = Callable[[Any, dict[str, Any]], dict[str, Any]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatusWrite:
-    """What became of a status.
+    """The result of a status write.
 
     Attributes:
-        stored: the TrainingJob as the API server returned it; None: no status was written.
-        again_s: seconds until progress that was held back is to be written; None: none was.
+        stored: the TrainingJob that the API server returned; None: no status was written.
+        again_s: seconds until delayed progress has to be written; None: no progress was delayed.
     """
 
     stored: Object | None = None
@@ -41,8 +41,8 @@ class Telling:
     Args:
         writer: for the status.
         recorder: for the events.
-        written: is called with each TrainingJob as it was, and with the status that was written.
-        accepted: returns a status as the cluster's definition of TrainingJobs takes it, given the stored one.
+        written: called with each TrainingJob before the write, and with the written status.
+        accepted: returns the part of a status that the cluster's definition has, given the stored one.
     """
 
     def __init__(self, writer: Writer, recorder: Recorder, written: Written, accepted: Accepted) -> None:
@@ -55,14 +55,14 @@ class Telling:
         self._futile: dict[Key, tuple[str, Object]] = {}
 
     def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> StatusWrite:
-        """Write what changed; `clock_s` is the monotonic clock: nobody sets it.
+        """Write the status if it changed, then the events; `clock_s` is the monotonic clock.
 
-        What was refused was not planned; the next look writes why into the status.
+        Refused creations emit no `Planned` event; the next reconcile sets the reason in the status.
 
         Raises:
-            Conflict: the job is not as it was when this was decided.
+            Conflict: the job has changed since the decision.
             Outdated: the job is gone.
-            NamespaceTerminating: no event can be written any more; the status was.
+            NamespaceTerminating: the status was written, but no event can be written any more.
             NotLeading: another operator may lead.
         """
         key = (raw["metadata"]["namespace"], raw["metadata"]["name"])
@@ -99,7 +99,7 @@ class Telling:
             self._count(raw, status)
         with self._lock:
             self._written[key] = clock_s
-            # An older definition prunes fields that are new: the same patch would change nothing again.
+            # An older definition prunes new fields, so the same patch would change nothing again.
             self._futile.pop(key, None)
             if not changed:
                 self._futile[key] = (version, patch)

@@ -1,7 +1,7 @@
-"""Which pods are trainers to ask, kept from event to event, so that nobody reads all pods at once.
+"""The trainers to poll, updated by each event, so that no caller has to read all pods.
 
-A pod is no trainer by its labels: its Job has to be known, of the same TrainingJob, and owned by it. All
-that is kept of a pod are its address and its owners.
+Labels alone do not make a pod a trainer: its Job must be known, and be owned by the same TrainingJob. Only
+the address and the owners of a pod are kept.
 """
 
 import ipaddress
@@ -25,7 +25,7 @@ class _Job:
 
 
 class Trainers:
-    """The trainers that run, as far as the caches reported it; safe to read from any thread."""
+    """The running trainers by the events of the caches; safe to read from any thread."""
 
     def __init__(self) -> None:
         self._training_jobs: dict[Key, str] = {}
@@ -33,7 +33,7 @@ class Trainers:
         self._pods: dict[Key, tuple[Target, frozenset[str]]] = {}
 
     def training_job(self, obj: Object, *, exists: bool) -> None:
-        """Take the newest state of a TrainingJob, or the last one of a deleted one."""
+        """Record the newest state of a TrainingJob, or the last one of a deleted TrainingJob."""
         name = _name(obj)
         if exists:
             self._training_jobs[name] = text(part(obj, "metadata"), "uid")
@@ -41,7 +41,7 @@ class Trainers:
             self._training_jobs.pop(name, None)
 
     def job(self, obj: Object, *, exists: bool) -> None:
-        """Take the newest state of a batch/v1 Job, or the last one of a deleted one."""
+        """Record the newest state of a batch/v1 Job, or the last one of a deleted Job."""
         name, uid = _name(obj), text(part(obj, "metadata"), "uid")
         if exists:
             self._jobs[name] = _Job(key=_key(obj), uid=uid, owners=owners(obj))
@@ -49,7 +49,7 @@ class Trainers:
             self._jobs.pop(name, None)
 
     def pod(self, obj: Object, *, exists: bool) -> None:
-        """Take the newest state of a pod, or the last one of a deleted one."""
+        """Record the newest state of a pod, or the last one of a deleted pod."""
         name, host = _name(obj), _address(obj)
         if exists and host is not None and _trains(obj):
             uid = text(part(obj, "metadata"), "uid")
@@ -58,7 +58,7 @@ class Trainers:
             self._pods.pop(name, None)
 
     def targets(self) -> list[Target]:
-        """Return the trainers to ask."""
+        """Return the trainers to poll."""
         keys = {
             job.uid: job.key
             for job in tuple(self._jobs.values())
@@ -73,7 +73,7 @@ def _name(obj: Object) -> Key:
 
 
 def _key(obj: Object) -> Key:
-    """Return the TrainingJob whose label a child carries."""
+    """Return the key of the TrainingJob in a child's label."""
     return obj["metadata"]["namespace"], obj["metadata"]["labels"][JOB_LABEL]
 
 
@@ -84,7 +84,7 @@ def _trains(pod: Object) -> bool:
 
 
 def _address(pod: Object) -> str | None:
-    """Return a pod's address; None: it has none, or a name, which nobody resolves for it."""
+    """Return a pod's IP address; None: it has none. A name is not resolved."""
     try:
         return str(ipaddress.ip_address(text(part(pod, "status"), "podIP")))
     except ValueError:

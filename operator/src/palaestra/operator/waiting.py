@@ -1,4 +1,4 @@
-"""What the replicas of a TrainingJob wait for, as its status says, so that no typo waits in silence."""
+"""The reasons for which the replicas of a TrainingJob wait, from its status, for a metric."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +11,7 @@ _WORDS = frozenset(reason.value for reason in WAITING)
 
 
 def waits(job: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a reason for each replica that waits and does not run, or runs and has not made a step yet."""
+    """Return the reason of each replica that waits, or that runs without a step so far."""
     return tuple(
         text(each, "reason")
         for each in parts(job, "status", "replicas")

@@ -1,7 +1,7 @@
 """Threads that take keys from the queue and reconcile them, each key in one thread at a time.
 
-One bad object never delays another: what goes wrong is logged with its key, counted, and tried again
-later and later, while the other keys go on.
+One bad object never delays another. An error is logged with its key, counted, and retried at growing pauses,
+while the other keys continue.
 """
 
 import threading
@@ -16,9 +16,9 @@ from palaestra.operator.confirming import Outdated
 from palaestra.operator.poller import Key
 from palaestra.operator.writing import NotLeading
 
-IDLE_S = 1.0  # between two looks at whether to go on
-REPEATS = 4  # conflicts in a row; from there on each power of two is logged
-STUCK_S = 300.0  # on one key: every call has a deadline, so nothing takes so long
+IDLE_S = 1.0  # between two checks whether to stop
+REPEATS = 4  # conflicts in a row before the first log line; then each power of two is logged
+STUCK_S = 300.0  # on one key; every call has a deadline, so no reconcile takes this long
 
 log = structlog.get_logger(__name__)
 
@@ -26,13 +26,13 @@ Reconcile = Callable[[Key], float | None]
 
 
 class Workers:
-    """A number of threads over one queue.
+    """Threads that work on one queue.
 
     Args:
         queue: of keys.
-        reconcile: looks at one job; returns seconds until it is to be looked at again, or None.
-        gate: nothing is begun while it is not set.
-        seconds: where durations are counted, by `result`.
+        reconcile: reconciles one job; returns the seconds until the next reconcile, or None.
+        gate: no work begins while it is not set.
+        seconds: the histogram of durations, by `result`.
         count: how many threads.
     """
 
@@ -55,12 +55,12 @@ class Workers:
         ]
 
     def start(self) -> None:
-        """Begin to work as soon as the gate is set."""
+        """Start the threads; they work while the gate is set."""
         for each in self._threads:
             each.start()
 
     def stop(self, deadline_s: float) -> None:
-        """Close the queue and wait for what is under way, `deadline_s` at most."""
+        """Close the queue and wait at most `deadline_s` for work in progress."""
         self._queue.close()
         ends = time.monotonic() + deadline_s
         for each in self._threads:
@@ -68,7 +68,7 @@ class Workers:
                 each.join(max(0.0, ends - time.monotonic()))
 
     def trouble(self) -> str | None:
-        """Return what is wrong with a thread so that only a new process helps; None: nothing."""
+        """Return the problem of a thread that only a restart solves; None: there is none."""
         now = time.monotonic()
         for each in self._threads:
             if now - self._began.get(each.name, now) > STUCK_S:
@@ -90,18 +90,18 @@ class Workers:
             self._seconds.labels(result).observe(time.monotonic() - began)
 
     def _work(self, key: Key) -> str:
-        """Reconcile one key, and return how that ended."""
+        """Reconcile one key, and return the result."""
         try:
             again_s = self._reconcile(key)
-        except (Conflict, Outdated) as error:  # somebody else wrote; what they wrote is on its way
+        except (Conflict, Outdated) as error:  # another client wrote; the cache receives it soon
             self._retry_conflict(key, error)
             return "conflict"
-        except NotLeading:  # whoever leads looks at all jobs
+        except NotLeading:  # the leader reconciles all jobs
             return "conflict"
         except ApiError as error:
             log.warning("refused", job=key, error=str(error), again_in_s=self._retry(key))
             return "error"
-        except Exception:  # whatever a job may cause, it must not end the worker of all others
+        except Exception:  # an error from one job must not end the worker of all others
             log.exception("not reconciled", job=key, again_in_s=self._retry(key))
             return "error"
         self._queue.forget(key)
@@ -110,7 +110,7 @@ class Workers:
         return "done"
 
     def _retry_conflict(self, key: Key, error: Exception) -> None:
-        """Try again later; one conflict is harmless, and one that repeats is logged less and less often."""
+        """Retry later; a single conflict is not logged, and a repeated one is logged less and less often."""
         again_s = self._retry(key)
         times = self._queue.failures(key)
         if times >= REPEATS and times & (times - 1) == 0:

@@ -1,7 +1,7 @@
-"""Every write to the cluster goes through here, and none does while another operator leads.
+"""Every write to the cluster goes through this module, which refuses it while another operator leads.
 
-Nor does one that was decided in an earlier tenure: a thread that was held up between look and write may find
-that this operator leads again, and that another has led in between.
+It also refuses a write that was decided in an earlier tenure: while a thread was delayed between decision and
+write, another operator may have led.
 """
 
 import threading
@@ -20,13 +20,13 @@ class NotLeading(PalaestraError):
 
 
 class Writer:
-    """Writes to the cluster while it may.
+    """Writes to the cluster while this operator leads.
 
-    Each method raises NotLeading when it may not, and ApiError when the API server refuses.
+    Each method raises NotLeading if it does not lead, and ApiError if the API server refuses.
 
     Args:
         api: the cluster.
-        term: the number of the tenure in which this operator leads; None: it does not.
+        term: returns the number of the tenure in which this operator leads; None: it does not lead.
     """
 
     def __init__(self, api: Api, term: Callable[[], int | None]) -> None:
@@ -35,7 +35,7 @@ class Writer:
         self._look = threading.local()
 
     def begin(self) -> None:
-        """Begin a look: what this thread writes from here on follows from what it reads from here on."""
+        """Begin a reconcile: later writes of this thread must be decided on reads after this call."""
         self._look.term = self._term()
 
     def create(self, obj: Object) -> Object:
@@ -44,27 +44,27 @@ class Writer:
         return self._api.create(of(obj), obj)
 
     def apply(self, obj: Object) -> Object:
-        """Make the fields of an object that is ours alone as given, whether it is there or not."""
+        """Apply an object that only the operator writes, whether it exists or not."""
         self._check()
         return self._api.apply(obj)
 
     def merge(self, resource: Resource, namespace: str, name: str, patch: Object, version: str) -> Object:
-        """Change the fields in `patch` of an object that still is this version."""
+        """Change the fields in `patch` of an object that still has this version."""
         self._check()
         return self._api.merge(resource, namespace, name, patch, resource_version=version)
 
     def delete(self, resource: Resource, namespace: str, name: str, *, uid: str, version: str) -> None:
-        """Delete the object that has this uid and still is this version, and no later one of its name."""
+        """Delete the object with this uid and version, but no later one of its name."""
         self._check()
         self._api.delete(resource, namespace, name, uid=uid, resource_version=version)
 
     def evict(self, namespace: str, name: str, uid: str) -> None:
-        """Ask for the eviction of the pod that has this uid, and of no later one of its name."""
+        """Evict the pod with this uid, but no later one of its name."""
         self._check()
         self._api.evict(namespace, name, uid=uid)
 
     def status(self, job: Object, patch: Object) -> Object:
-        """Change the status of a TrainingJob, if it still is as `job`, and return it as stored."""
+        """Change the status of a TrainingJob that still has the version of `job`; return it as stored."""
         self._check()
         metadata = job["metadata"]
         return self._api.merge(
