@@ -1,7 +1,7 @@
-"""Try an installation: have a TrainingJob carried out, and take it away again, whatever came of it.
+"""Test an installation: run a TrainingJob, and delete it, whether it succeeds or not.
 
-`helm test` runs this in a pod that may create, read and delete TrainingJobs and nothing else, so what is
-waited for is asked for: no watch.
+`helm test` runs this in a pod that may only create, read and delete TrainingJobs, so it polls instead of
+watching.
 """
 
 import math
@@ -21,7 +21,7 @@ from palaestra.errors import PalaestraError
 
 PERIOD_S = 2.0
 
-# What a trial leaves behind that was killed ends and goes by itself; long after whoever tries has looked.
+# If a trial is killed, the cluster ends and deletes its job by these limits, long after people have looked.
 SLACK_S = 60
 TTL_S = 3600
 
@@ -30,7 +30,7 @@ Tell = Callable[[str], None]
 
 
 class TrialFailed(PalaestraError):
-    """The job did not succeed in time; the message is the newest that its status says."""
+    """The job did not succeed in time; the message is the newest in its status."""
 
 
 def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
@@ -73,9 +73,9 @@ def _passing_storage(storage: Object) -> Object:
 
 
 def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:
-    """Delete the job. Where that cannot be it is told; for good, with `or_fail`, it is an error.
+    """Delete the job. If that fails, report it by `tell`, or with `or_fail` raise an error.
 
-    How a trial went that did not succeed is the news.
+    `or_fail` is for successful trials: the error of a failed trial must stay the one that is shown.
     """
     namespace, name = made["namespace"], made["name"]
     try:

@@ -1,12 +1,12 @@
 """Check a cluster and report why TrainingJobs do not run in it, with the remedy.
 
-    finding         the result of a check
-    examining       all checks in their order
-    platform        the cluster: version, sidecars, storage, the CRD
-    installation    the operator: running, leading, its rights, its metrics
-    rights          the rights of the operator and of users
+- `finding`: the result of a check
+- `examining`: all checks in their order
+- `platform`: the cluster: version, sidecars, storage, the CRD
+- `installation`: the operator: running, leading, its rights, its metrics
+- `rights`: the rights of the operator and of users
 
-Nothing is changed: where a check must try something, it does a dry run.
+Nothing is changed: if a check has to try something, it does a dry run.
 """
 
 from palaestra.doctor.examining import CHECKS, examine

@@ -1,11 +1,11 @@
 """Run the pods of a plan as processes on this machine.
 
-A small kubelet and a small Job controller: the objects are those that a cluster would get, with a
-laptop's layout, and what happens to them is what would happen there: init sidecars one after another,
-each waiting for its startup probe, then the trainer; restarts with back-off; a pod failure policy;
-shutdown in reverse order within one grace period.
+A small kubelet and a small Job controller run the objects that a cluster would get, with a laptop's layout,
+by the rules of a cluster. Init sidecars start one after another, each after the startup probe of the one
+before, then the trainer. Containers restart with back-off, and the pod failure policy applies. The shutdown
+is in reverse order, within one grace period.
 
-What a cluster gives and a laptop does not: that nothing is left behind. A pod's processes are known by
-a marker in their environment, and a watchdog ends them when the runner's end of a pipe closes, so they
-die with the runner even if it is SIGKILLed (`watchdog`).
+As in a cluster, no process is left behind. A marker in the environment identifies a pod's processes. A
+watchdog ends them when the runner's end of a pipe closes, so they end with the runner, even if it is
+SIGKILLed (`watchdog`).
 """

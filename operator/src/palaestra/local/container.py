@@ -1,8 +1,8 @@
 """One container as a process: started, probed, restarted with back-off, stopped within a grace period.
 
-The rules are the kubelet's. SIGTERM goes to the first process only, SIGKILL to everything that the
-container started. A container that ends too often waits longer each time, and the count starts again
-once it has run long enough.
+The rules are the kubelet's. SIGTERM goes to the first process only, SIGKILL to all processes of the
+container. The wait before a restart doubles each time, and begins again after the container has run long
+enough.
 """
 
 import asyncio
@@ -16,13 +16,13 @@ from palaestra.local.output import Log
 from palaestra.local.process import NOT_RUNNABLE, Process, end_marked, marked
 from palaestra.local.spec import Container, Pod
 
-DRAIN_S = 0.5  # for output that is still in the pipe; a pipe open for longer is somebody else's
+DRAIN_S = 0.5  # for output that is still in the pipe; another process may hold the pipe open for longer
 TERMINATED = 128 + signal.SIGTERM
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackOff:
-    """How long a container waits before its next start: a kubelet's rule, shorter for a laptop.
+    """The wait of a container before its next start, by the kubelet's rule with shorter times.
 
     The wait doubles with each end from `first_s` to `most_s`; after a life of `calm_s` it starts again.
     """
@@ -37,7 +37,7 @@ class BackOff:
 
 
 class Running:
-    """One container of a running pod, over all of its lives."""
+    """One container of a running pod, including its restarts."""
 
     def __init__(self, spec: Container, pod: Pod, log: Log, backoff: BackOff) -> None:
         self.spec = spec
@@ -52,7 +52,7 @@ class Running:
         self._process: Process | None = None
 
     async def run_once(self, terminal: int | None = None) -> int:
-        """Run one life of it and return the exit code.
+        """Run the container once and return the exit code.
 
         `terminal` is the descriptor of a terminal that it may draw on.
         """
@@ -72,7 +72,7 @@ class Running:
         return code
 
     async def keep_running(self) -> None:
-        """Run it again and again until it is stopped, as a native sidecar is."""
+        """Run it, and restart it until it is stopped, like a native sidecar."""
         ends_in_a_row = 0
         loop = asyncio.get_running_loop()
         while True:
@@ -88,14 +88,14 @@ class Running:
                 await asyncio.wait_for(self._stopping.wait(), self._backoff.wait_s(ends_in_a_row))
 
     async def until_started(self, tries: int) -> bool:
-        """Return whether it started within that many lives."""
+        """Return whether it started within that many runs."""
         while not self.started and self.ends < tries:
             self._news.clear()
             await self._news.wait()
         return self.started
 
     async def stop(self, grace_s: float) -> None:
-        """Ask it to end and return when it has; it is killed when the grace period is over."""
+        """Send SIGTERM and return when it has ended; kill it when the grace period is over."""
         self._stopping.set()
         if self._process is not None:
             await self._end(self._process, grace_s)

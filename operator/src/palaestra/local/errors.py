@@ -1,4 +1,4 @@
-"""What can go wrong on this machine, each with its remedy.
+"""The errors of a local run, each with its remedy.
 
 LocalError              one line for a person, and the exit code of `palaestra run`
 ├── Refused             exit 2: found before anything was started
@@ -15,7 +15,7 @@ KILLED = 128 + signal.SIGINT  # the exit code after a second Ctrl-C
 
 
 class LocalError(PalaestraError):
-    """Something on this machine stops the run; the message says what and how to go on."""
+    """A cause on this machine stops the run; the message names it and the remedy."""
 
     exit_code = 1
 
@@ -27,7 +27,7 @@ class Refused(LocalError, ValueError):
 
 
 class StartFailed(LocalError, RuntimeError):
-    """A container that others wait for did not come up."""
+    """A container for which others wait did not start."""
 
 
 class StorageFailed(LocalError, OSError):

@@ -1,4 +1,4 @@
-"""Write files so that a reader, or a crash, finds the old content or the new, never half of one."""
+"""Write files atomically: after a crash a file has the old content or the new, never a part of it."""
 
 import os
 import tempfile
@@ -10,10 +10,10 @@ from palaestra.local.errors import StorageFailed
 
 
 def write(path: Path, content: bytes) -> None:
-    """Replace `path`, or make it, with its folders.
+    """Create or replace `path`, with its folders.
 
     Raises:
-        StorageFailed: it cannot be written; what was there is unharmed.
+        StorageFailed: it cannot be written; the old content is unharmed.
     """
     with storage(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -31,10 +31,10 @@ def write(path: Path, content: bytes) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make `path` and its parents where they are missing.
+    """Create `path` and its parents if they do not exist.
 
     Raises:
-        StorageFailed: it cannot be made.
+        StorageFailed: it cannot be created.
     """
     with storage(path):
         path.mkdir(parents=True, exist_ok=True)
@@ -42,7 +42,7 @@ def make_folder(path: Path) -> None:
 
 @contextmanager
 def storage(path: Path) -> Iterator[None]:
-    """Tell what an operating system says about `path` as one clear line.
+    """Turn an OSError about `path` into one clear line.
 
     Raises:
         StorageFailed: the block failed with an OSError.

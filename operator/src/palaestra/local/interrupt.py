@@ -1,4 +1,4 @@
-"""What ends a run early: Ctrl-C, once with a checkpoint and twice at once, and its deadline."""
+"""End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends it too."""
 
 import asyncio
 import signal
@@ -10,7 +10,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Stoppable(Protocol):
-    """What can be asked to end, and ended."""
+    """A target that can be stopped and killed."""
 
     def stop(self) -> None:
         """Begin to end."""
@@ -20,9 +20,9 @@ class Stoppable(Protocol):
 
 
 class Interrupt:
-    """Counts the signals of a run and passes them to what runs now.
+    """Counts the signals of a run and passes them to the current target.
 
-    `expired` claims that the deadline came before any signal.
+    `expired`: the deadline passed before any signal.
     """
 
     def __init__(self) -> None:
@@ -33,18 +33,18 @@ class Interrupt:
 
     @property
     def killed(self) -> bool:
-        """Return whether a person did not want to wait for the end."""
+        """Return whether a second signal came, so that the run was killed."""
         return self.signals > 1
 
     def pass_to(self, target: Stoppable) -> None:
-        """Choose what the next signals are for; one that came before is passed on now."""
+        """Set the target of the next signals; one that came before is passed on now."""
         self._target = target
         if self.asked.is_set():
             target.stop()
 
     @contextmanager
     def listening(self, deadline_s: float | None = None) -> Iterator[None]:
-        """Take SIGINT, SIGTERM and SIGHUP while the block runs, and end it when that takes too long."""
+        """Handle SIGINT, SIGTERM and SIGHUP while the block runs; stop the target at the deadline."""
         loop = asyncio.get_running_loop()
         timer = None if deadline_s is None else loop.call_later(deadline_s, self._expire)
         for number in SIGNALS:

@@ -1,8 +1,8 @@
-"""The Job controller of this machine: what the end of one pod means for its replica.
+"""The Job controller of this machine: decide after the end of a pod whether the replica gets another.
 
-`verdict` reads the planned Job's podFailurePolicy as Kubernetes does: rules in order, the first that
-matches decides, and what matches none is counted against `backoffLimit`. Pods whose failure is ignored
-have no bound in Kubernetes; here, as in the operator, they have one when they make no progress.
+`verdict` applies the planned Job's podFailurePolicy like Kubernetes: the first matching rule decides, and a
+failure that matches none counts against `backoffLimit`. In Kubernetes, ignored failures have no limit; here,
+as in the operator, they have one if the pods make no progress.
 """
 
 from collections.abc import Mapping
@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-IDLE_PODS = 5  # ignored pods in a row that got no further, before a replica is given up
+IDLE_PODS = 5  # ignored pods in a row without progress, after which a replica has failed
 FIRST_WAIT_S = 1.0  # before the next pod; it doubles, as in Kubernetes, where it begins at 10 s
 MOST_WAIT_S = 60.0
 
 
 class Verdict(Enum):
-    """What one pod's end means."""
+    """The meaning of one pod's end."""
 
     COMPLETE = "complete"
     FAIL_JOB = "fail"
@@ -25,7 +25,7 @@ class Verdict(Enum):
 
 
 def verdict(job: Mapping[str, Any], exit_code: int) -> Verdict:
-    """Return what the exit code of the trainer means to `job`, a batch/v1 Job."""
+    """Return the verdict on the trainer's exit code by the rules of `job`, a batch/v1 Job."""
     if exit_code == 0:
         return Verdict.COMPLETE
     for rule in job["spec"].get("podFailurePolicy", {}).get("rules", ()):
@@ -63,5 +63,5 @@ class Tries:
 
     @property
     def wait_s(self) -> float:
-        """Return the seconds before the next pod; it doubles with every pod that got no further."""
+        """Return the seconds before the next pod; it doubles with every pod without progress."""
         return float(min(FIRST_WAIT_S * 2 ** max(self.idle - 1, 0), MOST_WAIT_S))

@@ -1,4 +1,4 @@
-"""How the run of a replica ended, as it is kept in the run directory and told to a person."""
+"""The result of a replica's run, as it is written to the run directory and shown to a person."""
 
 import json
 import shutil
@@ -16,11 +16,11 @@ FILE = "outcome.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """The end of a replica's run; what nobody measured is None.
+    """The result of a replica's run; a value that was not measured is None.
 
-    `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted` claims
-    that a person ended it. `faults` counts those of all simulators and pods. `trained_share` is the part
-    of the wall clock, 0 to 1, that was spent on steps and on learning from them.
+    `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted`: a person
+    ended it. `faults` counts those of all simulators and pods. `trained_share` is the part of the wall clock,
+    0 to 1, that was spent on steps and on learning from them.
     """
 
     exit_code: int
@@ -35,7 +35,7 @@ class Outcome:
 
     @property
     def finished(self) -> bool:
-        """Return whether there is nothing left to train."""
+        """Return whether the training is complete."""
         return self.exit_code == 0
 
     def keep(self, run_directory: Path) -> None:
@@ -48,17 +48,17 @@ class Outcome:
 
     @classmethod
     def of(cls, run_directory: Path) -> Self | None:
-        """Return how the run in this directory ended, or None when it has not, or was cut off."""
+        """Return the result of the run in this directory; None if it has not ended, or was killed."""
         try:
             return cls(**json.loads((run_directory / FILE).read_bytes()))
-        except (OSError, ValueError, TypeError):  # missing, or written by nobody that we know
+        except (OSError, ValueError, TypeError):  # missing, or written by another program
             return None
 
 
 def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
-    """Return the lines that a person reads at the end.
+    """Return the lines to show at the end.
 
-    What nobody measured is left out: a program of the user's own need not measure anything.
+    Values that were not measured are left out: a program of the user's own may measure nothing.
     """
     facts = {
         "success rate": _success(outcome.success_rate, run_directory),
@@ -72,10 +72,10 @@ def summary(outcome: Outcome, run_directory: Path) -> tuple[str, ...]:
 
 
 def uses(run_directory: Path) -> tuple[str, ...]:
-    """Return the lines that say what to do with what a run has written.
+    """Return the commands to use on the results of a run.
 
-    palaestra-eval reads models of the built-in loop, which records its attempts; that of a program of
-    the user's own may be any other.
+    palaestra-eval reads models of the built-in loop, which records its attempts; a program of the user's own
+    may write a model of another kind.
     """
     curves = run_directory / "tensorboard"
     measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))
@@ -87,7 +87,7 @@ def uses(run_directory: Path) -> tuple[str, ...]:
 
 
 def typed(program: str) -> str:
-    """Return how a program of this installation is typed: its path, unless a shell would find it."""
+    """Return the command for a program of this installation: its path, unless the shell finds it."""
     beside = Path(sys.executable).with_name(program)
     if shutil.which(program) or not beside.exists():
         return program
@@ -96,7 +96,7 @@ def typed(program: str) -> str:
 
 
 def _success(rate: float | None, run_directory: Path) -> str:
-    """Return the rate with its interval, which unfinished runs and those of an older release lack."""
+    """Return the rate with its interval, if the run has one; unfinished and older runs have none."""
     try:
         content = json.loads((run_directory / "summary.json").read_bytes())
         interval = SuccessInterval.from_json(content["success_interval"])

@@ -1,6 +1,6 @@
-"""Where the output of containers goes: always to a file, and to the screen when asked.
+"""Write the output of containers to files, and show some of it.
 
-Every line goes to `logs/<container>.log`, and those of some containers to the screen, behind the container's
+Every line goes to `logs/<container>.log`; those of some containers are also shown, after the container's
 name. The trainer may draw on the person's terminal (`terminal`) instead.
 """
 
@@ -16,12 +16,12 @@ from palaestra.local.errors import StorageFailed
 from palaestra.local.terminal import RESTORED, as_seen, open_like, resize
 
 Show = Callable[[str], None]
-KEPT_LINES = 20  # what a person needs to see why a program ended, without opening a file
+KEPT_LINES = 20  # enough to see why a program ended, without opening the file
 CHUNK = 65536
 
 
 class Log:
-    """One container's output, over all of its lives; the file is appended to."""
+    """One container's output, including its restarts, which are appended to the file."""
 
     def __init__(self, name: str, folder: Path, show: Show | None = None) -> None:
         """Open the file.
@@ -42,9 +42,9 @@ class Log:
             raise StorageFailed(f"{self.path}: {error.strerror}; make room for it") from error
 
     def begin(self, terminal: int | None = None) -> int:
-        """Return a descriptor for a program to write to; the caller closes it after the start.
+        """Return a descriptor for the output of a program; the caller closes it after the start.
 
-        With `terminal`, it is a terminal too, and what is written is copied there.
+        With `terminal`, it is a pseudo terminal, and the output is copied to `terminal`.
         """
         reader, writer = os.pipe() if terminal is None else open_like(terminal)
         os.set_blocking(reader, False)
@@ -77,7 +77,7 @@ class Log:
             data = os.read(reader, CHUNK)
         except BlockingIOError:  # nothing to read after all
             return
-        except OSError:  # EIO is how a terminal says that nobody is there any more
+        except OSError:  # EIO: every program has closed its end of the terminal
             data = b""
         if terminal is not None:
             resize(reader, terminal)  # the person may have changed the window since
@@ -85,7 +85,7 @@ class Log:
         *lines, rest = (self._rest + data).split(b"\n")
         if not data and rest:
             lines, rest = [rest], b""
-        self._rest = rest[max(rest.rfind(b"\r"), len(rest) - CHUNK, 0) :]  # what is drawn over is gone
+        self._rest = rest[max(rest.rfind(b"\r"), len(rest) - CHUNK, 0) :]  # drop what was drawn over
         for line in lines:
             self._line(as_seen(line.decode(errors="replace")))
         if not data:
@@ -101,7 +101,7 @@ class Log:
             self._show(self._prefix + line)
 
     def _write(self, line: str) -> None:
-        """Append; a full disk costs lines of the log, not the training, which meets it itself."""
+        """Append; if the disk is full, lines are lost, but the run continues until the trainer fails."""
         try:
             self._file.write(line.encode() + b"\n")
         except OSError as error:

@@ -1,9 +1,9 @@
 """One attempt of a replica: a pod's containers, from the first start to the last end.
 
-Order, as KEP-753 has it: init containers one after another, a sidecar's successor waiting for its
-startup probe; then the main container, whose end is the pod's; then the sidecars in reverse order,
-within what is left of one grace period. `stop` begins the same shutdown early, with the main container
-first, so that a simulator can still be used while the last checkpoint is written.
+The order is that of KEP-753. The init containers start one after another; the successor of a sidecar waits
+for its startup probe. Then the main container runs, whose end is the end of the pod. Then the sidecars stop
+in reverse order, within the rest of one grace period. `stop` begins this shutdown early. The main container
+stops first, so that it can still use its simulators while it writes the last checkpoint.
 """
 
 import asyncio
@@ -19,15 +19,15 @@ from palaestra.local.output import Log, Show
 from palaestra.local.process import Watchdog
 from palaestra.local.spec import Container, Pod
 
-LONG_S = 10.0  # for a container to come up; importing PyTorch takes several seconds
-TRIES = 3  # lives of a sidecar that others wait for, before the pod is given up
+LONG_S = 10.0  # for the start of a container; importing PyTorch takes several seconds
+TRIES = 3  # runs of a sidecar for which others wait, after which the pod has failed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kubelet:
-    """What this machine adds to a pod: where output goes, and how patient it is.
+    """The settings of this machine for a pod: its output, and its patience.
 
-    `show` is called with a line for each container that does not come up within `long_s`.
+    `show` is called with a line for each container that has not started within `long_s`.
     """
 
     logs: Mapping[str, Log]  # by container
@@ -39,7 +39,7 @@ class Kubelet:
 
 
 class _Stopped(Exception):
-    """The pod was told to stop before its main container was started."""
+    """`stop` was called before the main container was started."""
 
 
 class RunningPod:
@@ -65,12 +65,12 @@ class RunningPod:
             self._watchdog.close()
 
     async def run(self) -> int | None:
-        """Return the main container's exit code, or None when it was stopped before that one started.
+        """Return the main container's exit code; None if the pod was stopped before that container started.
 
         No process of the pod is left when this returns, or raises.
 
         Raises:
-            StartFailed: a sidecar that others wait for did not come up.
+            StartFailed: a sidecar for which others wait did not start.
         """
         self._watchdog = Watchdog(self._pod.uid)
         try:
@@ -126,9 +126,9 @@ class RunningPod:
 
     @contextmanager
     def _reported(self, running: Running) -> Iterator[None]:
-        """Show that a container has not come up, and since when, if the block takes long.
+        """If the block takes long, show that a container has not started, and since when.
 
-        A main container is up once it has written a line: it reports itself what it waits for.
+        A main container counts as started once it has written a line; it reports its own waits.
         """
         since = time.strftime("%H:%M:%S")
         main = running.spec is self._pod.main
@@ -159,7 +159,7 @@ class RunningPod:
             await asyncio.gather(task, stop, return_exceptions=True)
 
     def _grace_left_s(self) -> float:
-        """Return what is left of the one grace period, which begins with the first question."""
+        """Return the rest of the grace period, which begins with the first call."""
         now = asyncio.get_running_loop().time()
         if self._end_of_grace is None:
             self._end_of_grace = now + self._pod.grace_s

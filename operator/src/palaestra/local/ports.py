@@ -1,9 +1,8 @@
-"""Free ports, chosen all at once and kept for as long as the run needs them.
+"""Free ports, chosen all at once and held for as long as the run needs them.
 
-A port that is looked up and given back can be taken by anybody before the container listens on it.
-So each one stays bound here, without listening: the kernel gives a bound port neither to a program
-that asks for any port nor to an outgoing connection, while SO_REUSEADDR lets the container, which
-sets it too, bind and listen beside us.
+If a free port were released after the choice, another program could take it before the container listens. So
+each port stays bound here, without listening. The kernel gives a bound port neither to a program that asks
+for any port nor to an outgoing connection. SO_REUSEADDR, which containers set too, lets them listen on it.
 """
 
 import socket
@@ -17,7 +16,7 @@ LOOPBACK = "127.0.0.1"
 
 
 class HeldPorts:
-    """Ports of the loopback interface that nobody else is given until `close`."""
+    """Ports of the loopback interface that no other program gets until `close`."""
 
     def __init__(self) -> None:
         self._sockets = ExitStack()

@@ -1,4 +1,4 @@
-"""What can be known to be wrong before anything is started, each check with its remedy."""
+"""Checks before anything is started, each with its remedy."""
 
 import importlib.util
 import os
@@ -21,7 +21,7 @@ ROS = "install python3-rospy and python3-rosmaster (`make setup` does)"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """What is about to be run, and in which folder its runs lie."""
+    """The job to run, and the folder of its runs."""
 
     job: TrainingJob
     runs: Path
@@ -31,17 +31,17 @@ Check = Callable[[Request], Iterator[str]]
 
 
 def check(request: Request) -> None:
-    """Make every check.
+    """Run every check.
 
     Raises:
-        Refused: with one line for each thing that is wrong.
+        Refused: a check failed; the message has one line for each problem.
     """
     if problems := [problem for each in CHECKS for problem in each(request)]:
         raise Refused("\n".join(problems))
 
 
 def ros_is_installed(request: Request) -> Iterator[str]:
-    """The ROS master is a program, its client a module that the trainer imports."""
+    """The ROS master is an installed program, and its client a module that the trainer can import."""
     del request
     if shutil.which("rosmaster", path=program_path()) is None:
         yield f"rosmaster: is not installed; {ROS}"
@@ -50,13 +50,13 @@ def ros_is_installed(request: Request) -> Iterator[str]:
 
 
 def nothing_is_put_off(request: Request) -> Iterator[str]:
-    """A suspended job waits for its field to be changed, which nobody watches here."""
+    """The job is not suspended, because no operator is here to resume it."""
     if request.job.spec.suspend:
         yield "spec.suspend: is true, which puts the training off; set it to false to train now"
 
 
 def programs_exist(request: Request) -> Iterator[str]:
-    """Every program that a container begins with can be found."""
+    """The program of every container exists."""
     spec = request.job.spec
     own = spec.trainer.command[:1]
     programs = {"palaestra-sidecar": INSTALLATION}
@@ -69,7 +69,7 @@ def programs_exist(request: Request) -> Iterator[str]:
 
 
 def worlds_are_right(request: Request) -> Iterator[str]:
-    """A world that lies in a file is read here too, though its sidecar generates it."""
+    """Each world in a file is correct; it is read here too, although the sidecar generates it."""
     for index, group in enumerate(request.job.spec.simulators):
         if group.world.file is not None:
             field = f"spec.simulators[{index}].world.file"
@@ -77,7 +77,7 @@ def worlds_are_right(request: Request) -> Iterator[str]:
 
 
 def space_is_left(request: Request) -> Iterator[str]:
-    """A disk that is nearly full would end the run in the middle."""
+    """The disk has space for the run."""
     folder = next(each for each in (request.runs, *request.runs.parents) if each.exists())
     if not os.access(folder, os.W_OK):
         yield f"{folder}: cannot be written; choose another folder with --dir"

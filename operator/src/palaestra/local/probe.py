@@ -1,4 +1,4 @@
-"""Ask a container whether it has started, or still lives: by a command, or by HTTP."""
+"""Probe whether a container has started or is alive, by a command or by HTTP."""
 
 import asyncio
 import signal
@@ -10,7 +10,7 @@ from http import HTTPStatus
 from palaestra.local.process import Process
 from palaestra.local.spec import Probe
 
-_DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # loopback, whatever is set
+_DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # no proxy: the address is on loopback
 
 
 async def passes(probe: Probe, env: Mapping[str, str]) -> bool:
@@ -21,7 +21,7 @@ async def passes(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
-    """Try until one succeeds; return False when the threshold of failures is reached first."""
+    """Try until one succeeds; return False if the threshold of failures is reached first."""
     await asyncio.sleep(probe.initial_delay_s)
     for failures in range(probe.failure_threshold):
         if failures:
@@ -32,7 +32,7 @@ async def until_passed(probe: Probe, env: Mapping[str, str]) -> bool:
 
 
 async def until_failed(probe: Probe, env: Mapping[str, str]) -> None:
-    """Return when as many tries in a row as the threshold says have failed."""
+    """Return after as many failed tries in a row as the threshold."""
     await asyncio.sleep(probe.initial_delay_s)
     failures = 0
     while failures < probe.failure_threshold:
@@ -41,7 +41,7 @@ async def until_failed(probe: Probe, env: Mapping[str, str]) -> None:
 
 
 async def _command_succeeds(probe: Probe, env: Mapping[str, str]) -> bool:
-    """Run the command; a try that was given up, or cancelled, leaves no process behind."""
+    """Run the command; after a timeout or a cancellation no process is left."""
     process = Process.start(probe.command, env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         return await process.ended_within(probe.timeout_s) and await process.wait() == 0

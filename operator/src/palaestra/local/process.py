@@ -1,7 +1,7 @@
 """Start programs, each in a session of its own, and wait for them without blocking.
 
-The only module that starts processes. A terminal's Ctrl-C reaches the runner alone, because nothing
-that it starts is in its process group.
+The only module that starts processes. A terminal's Ctrl-C reaches the runner alone, because no process that
+it starts is in its process group.
 """
 
 import asyncio
@@ -48,11 +48,11 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """Return the process id, which is its session's and group's id too."""
+        """Return the process id, which is also the id of its session and group."""
         return self._started.pid
 
     async def wait(self) -> int:
-        """Return the exit code; 128 + n when signal n ended it, as a container runtime reports it."""
+        """Return the exit code; 128 + n if signal n ended it, like a container runtime."""
         return await asyncio.shield(self._ended)
 
     async def ended_within(self, seconds: float) -> bool:
@@ -61,7 +61,7 @@ class Process:
         return self._ended.done()
 
     def send(self, number: signal.Signals) -> None:
-        """Send a signal to the program alone, as a runtime does; nothing happens once it ended."""
+        """Send a signal to the program alone, like a runtime; no effect after its end."""
         if not self._ended.done():
             self._started.send_signal(number)
 
@@ -74,7 +74,7 @@ class Process:
 
 
 class Watchdog:
-    """Ends all processes of a pod when it is closed, or when this process is gone."""
+    """Ends all processes of a pod when it is closed, or when this process ends."""
 
     def __init__(self, pod_uid: str) -> None:
         reader, self._writer = os.pipe()
@@ -89,21 +89,21 @@ class Watchdog:
             os.close(reader)
 
     def close(self) -> None:
-        """Begin the end of everything that is left of the pod; harmless when repeated."""
+        """Begin to kill all remaining processes of the pod; may be called twice."""
         if self._writer >= 0:
             os.close(self._writer)
             self._writer = -1
 
     async def closed(self) -> None:
-        """Return when nothing of the pod is left."""
+        """Return when no process of the pod is left."""
         self.close()
         await asyncio.to_thread(self._process.wait)
 
 
 def marked(env: Mapping[str, str], pod_uid: str, container: str) -> dict[str, str]:
-    """Return the environment of a container: this machine's, `env` over it, and the marker.
+    """Return the environment of a container: this machine's, overridden by `env`, and the marker.
 
-    The programs of this installation come first on the PATH, as they do in an image.
+    The programs of this installation come first on the PATH, as in an image.
     """
     machine = {**os.environ, "PATH": program_path()}
     return {**machine, **env, watchdog.MARKER: f"{pod_uid}/{container}/"}
@@ -115,5 +115,5 @@ def program_path() -> str:
 
 
 async def end_marked(pod_uid: str, container: str) -> None:
-    """Kill what a container has left behind: with its first process all of it ends."""
+    """Kill the remaining processes of a container, because it ends with its first process."""
     await asyncio.to_thread(watchdog.sweep, f"{pod_uid}/{container}/")

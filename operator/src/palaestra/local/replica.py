@@ -1,4 +1,4 @@
-"""One replica on this machine, from its planned Job to its outcome: pod after pod, as the Job says."""
+"""One replica on this machine, from its planned Job to its outcome: pod after pod, by the Job's rules."""
 
 import asyncio
 import contextlib
@@ -27,10 +27,10 @@ DEADLINE_EXCEEDED = "DeadlineExceeded"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """Where a replica runs, and who sees its output.
+    """The folder of a replica, its output, and its deadline.
 
-    `shown` are the containers whose output is shown. `terminal` is the descriptor of a terminal that the
-    trainer may draw on, None without one. `deadline_s` bounds all pods together; None: no bound.
+    `shown` are the containers whose output is shown. `terminal` is the descriptor of a terminal on which the
+    trainer may draw; None without one. `deadline_s` is for all pods together; None: no deadline.
     """
 
     directory: Path
@@ -42,7 +42,7 @@ class Setting:
 
 
 async def run_replica(planned: ReplicaPlan, setting: Setting) -> Outcome:
-    """Run pods until the Job is complete, given up, interrupted or too late; return how it ended.
+    """Run pods until the Job is complete, failed, interrupted or too late; return the outcome.
 
     Raises:
         LocalError: a pod could not be started, or its files could not be written.
@@ -73,7 +73,7 @@ def meaning(exit_code: int) -> str:
 
 
 async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt) -> int | None:
-    """Return the trainer's exit code; None when it was never started."""
+    """Return the trainer's exit code; None if it was never started."""
     if interrupt.asked.is_set():
         return None
     template = planned.job["spec"]["template"]
@@ -104,10 +104,9 @@ def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str,
 
 
 def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
-    """Return the outcome of a run that was not left to its own end; one that was done anyway stays done.
+    """Return the outcome of a run that was ended early; a run that is complete anyway stays complete.
 
-    A trainer that was asked to end says itself, with 75, that it has saved: no other end is made to look
-    like that one.
+    A trainer that was asked to end exits with 75 after it has saved. No other exit code becomes 75.
     """
     if outcome.finished:
         return outcome
@@ -120,7 +119,7 @@ def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
 
 
 def _outcome(directory: Path, code: int | None, pods: int) -> Outcome:
-    """Return what the trainer said of its end: in summary.json, or in its termination message."""
+    """Return the outcome from the trainer's report, in summary.json or in its termination message."""
     word, summary = _json(_termination(directory)), _json(directory / "summary.json")
     said = {**word, **summary}
     return Outcome(
@@ -142,6 +141,6 @@ def _termination(directory: Path) -> Path:
 def _json(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_bytes())
-    except (OSError, ValueError):  # not written, or cut off with its writer
+    except (OSError, ValueError):  # missing, or incomplete because its writer was killed
         return {}
     return content if isinstance(content, dict) else {}

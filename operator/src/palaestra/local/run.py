@@ -1,8 +1,8 @@
 """`palaestra run`: a TrainingJob file becomes a trained policy on this machine.
 
-Nothing is started and no file is written before every check has passed. Replicas run one after
-another, as each takes a whole small machine; `--replica` picks one, and two terminals with one each
-run two at a time.
+Nothing is started and no file is written before every check has passed. Replicas run one after another,
+because each needs a whole small machine. `--replica` selects one, so that two terminals can run two at a
+time.
 """
 
 import asyncio
@@ -22,12 +22,12 @@ from palaestra.plan import Images, LocalLayout, Ports, ReplicaPlan, identified, 
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode
 
-SHOWN_LINES = 5  # of the trainer's log, when it failed without a last word
+SHOWN_LINES = 5  # of the trainer's log, if it failed without a termination message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What a person chose on the command line; `file` is the job's, to be named in advice."""
+    """The options of the command line; `file` is the job's file, for use in messages."""
 
     runs: Path
     version: str
@@ -38,7 +38,7 @@ class Options:
 
 
 def run(job: TrainingJob, options: Options) -> int:
-    """Run a job's replicas and return the exit code: 0, or that of the first that was not done.
+    """Run a job's replicas and return the exit code: 0, or that of the first unfinished replica.
 
     Raises:
         LocalError: it cannot be run here; the message has one line for each reason.
@@ -58,7 +58,7 @@ def run(job: TrainingJob, options: Options) -> int:
 
 
 def check(job: TrainingJob, directory: Path, chosen: range, options: Options) -> None:
-    """Find what can be known to be wrong before anything is written; raises as `run` does."""
+    """Do all checks that need no file to be written; raises the same errors as `run`."""
     planned = plan(job, layout(directory, options, Ports()), mounted=dict.fromkeys(chosen, ()))
     for each in planned.replicas.values():
         read_pod(each.job["spec"]["template"], uid="")
@@ -66,7 +66,7 @@ def check(job: TrainingJob, directory: Path, chosen: range, options: Options) ->
 
 
 def layout(directory: Path, options: Options, ports: Ports) -> LocalLayout:
-    """Return the layout of a job whose runs lie in `directory`."""
+    """Return the layout of a job whose runs are in `directory`."""
     images = Images.of_release(options.version)
     return LocalLayout(images=images, job_directory=str(directory), ports=ports)
 
@@ -132,7 +132,7 @@ def _trained(planned: ReplicaPlan, path: Path, options: Options, deadline_s: flo
 
 
 def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tuple[str, ...]:
-    """Return the containers whose lines are shown: all, or the trainer where it cannot draw."""
+    """Return the containers whose lines are shown: all, or the trainer if it cannot draw."""
     if options.verbose:
         pod = planned.job["spec"]["template"]["spec"]
         return tuple(each["name"] for each in (*pod["initContainers"], *pod["containers"]))

@@ -1,11 +1,11 @@
-"""The run directory of one replica: whose it is, what was asked for, and whether it is finished.
+"""The run directory of one replica: its owner, the record of its job, and its outcome.
 
     <dir>/<job name>/<replica>/     job.yaml, training.yaml, worlds/, logs/, scratch/, outcome.json,
                                     and what the trainer writes: checkpoints/, tensorboard/, ...
     <dir>/<job name>/<replica>.lock held by the runner that uses the directory
     <dir>/<job name>/<replica>.old-<n>/   what --fresh has set aside; no run is ever deleted
 
-A job's uid on a laptop follows from this place: it is the same for every `palaestra run` of one
+The uid of a job on a laptop is derived from this path. So it is the same for every `palaestra run` of one
 directory, and different for two directories, without a file that could be lost.
 """
 
@@ -36,9 +36,9 @@ Record = Mapping[str, Any]
 
 
 def _mutable() -> Iterator[str]:
-    """Yield what may differ between two runs of one directory.
+    """Yield the fields that may differ between two runs of one directory.
 
-    It changes when training ends or stops, or which replicas there are, never what one replica learns.
+    They change when training ends or stops, or the number of replicas, but never what one replica learns.
     """
     yield from ("spec.backoffLimit", "spec.replicas")
     for path, model in walk(TrainingJob):
@@ -48,7 +48,7 @@ def _mutable() -> Iterator[str]:
 
 
 MUTABLE = frozenset(_mutable())
-# Written out in records up to a5276f3, and decided by the plan since.
+# In records up to a5276f3; since then the plan decides these.
 DEFAULTS_UNTIL_A5276F3 = {"spec.simulators.recycle.afterResets": 24}
 
 
@@ -58,13 +58,13 @@ def job_directory(runs: Path, job: str) -> Path:
 
 
 def uid_of(directory: Path) -> str:
-    """Return the uid of the job whose runs lie in `directory`; the same path, the same uid."""
+    """Return the uid of the job whose runs are in `directory`; the same path, the same uid."""
     return str(uuid.uuid5(uuid.NAMESPACE_URL, directory.absolute().as_uri()))
 
 
 @contextmanager
 def locked(directory: Path) -> Iterator[None]:
-    """Hold a run directory for this process alone; the kernel gives it back with our end.
+    """Lock a run directory for this process; the kernel releases the lock when the process ends.
 
     Raises:
         Refused: another runner has it.
@@ -92,15 +92,15 @@ def locked(directory: Path) -> Iterator[None]:
 
 
 def record_of(job: TrainingJob) -> dict[str, Any]:
-    """Return what is written down of a job: all that was asked for, defaults included."""
+    """Return the record of a job: its whole spec, including defaults."""
     return {field: value for field, value in as_data(job).items() if field != "status"}
 
 
 def refuse_another_job(directory: Path, record: Record) -> None:
-    """Compare what is asked for with what the directory's run was started with.
+    """Compare a job with the record of the run in the directory.
 
     Raises:
-        Refused: they differ in what a run cannot change; one line for each field.
+        Refused: they differ in fields that a run cannot change; one line for each field.
     """
     try:
         before = yaml.safe_load((directory / RECORD).read_bytes())
@@ -124,10 +124,10 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
 
 
 def _completed(record: Any) -> Record:
-    """Return the record of an older release with the fields that are new since, at their defaults.
+    """Return the record of an older release, with the defaults of fields that it did not have.
 
-    What was not asked for then is the same job now. A record that this release cannot read, as that of
-    a newer one, is compared as it stands.
+    A job without a newer field is the same job with the field's default. If this release cannot read a
+    record, for example one of a newer release, it compares the record unchanged.
     """
     try:
         return record_of(validate(record))
@@ -136,7 +136,7 @@ def _completed(record: Any) -> Record:
 
 
 def prepare(directory: Path, record: Record) -> None:
-    """Make the directory and write down what is run in it.
+    """Create the directory and write the record of its job.
 
     Raises:
         StorageFailed: it cannot be written.
@@ -145,7 +145,7 @@ def prepare(directory: Path, record: Record) -> None:
 
 
 def set_aside(directory: Path) -> Path | None:
-    """Move a run directory out of the way; return where it is now, or None when there was none.
+    """Move a run directory out of the way; return its new path, or None if there was none.
 
     Raises:
         StorageFailed: it cannot be moved.

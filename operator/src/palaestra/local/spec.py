@@ -1,8 +1,8 @@
-"""Read a planned pod as a kubelet would: containers in order, commands, environment, probes, volumes.
+"""Read a planned pod like a kubelet: containers in order, commands, environment, probes, volumes.
 
-Only what a process on this machine can have is read. Images, resources, security contexts and what is
-asked of a scheduler are the cluster's business and left out. What a program would miss is refused: a value
-that lies in a cluster, and a second main container.
+Only settings that apply to a process on this machine are read; images, resources, security contexts and
+scheduling are ignored. A setting without which a program cannot run is refused: a value from an object of the
+cluster, and a second main container.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ GRACE_S = 30.0  # Kubernetes' default terminationGracePeriodSeconds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Probe:
-    """How to ask a container whether it started, or lives: a command or an address, not both."""
+    """A startup or liveness probe: a command or an address, not both."""
 
     command: tuple[str, ...] = ()
     url: str = ""
@@ -30,8 +30,7 @@ class Probe:
 class Container:
     """One container of a pod.
 
-    `sidecar` claims that it is a native sidecar: an init container that is restarted for as long as
-    the pod lives.
+    `sidecar`: it is a native sidecar, an init container that is restarted for as long as the pod runs.
     """
 
     name: str
@@ -62,7 +61,7 @@ def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
     """Return the pod that a Job's template describes, for its attempt with `uid`.
 
     Raises:
-        Refused: it asks for what only a cluster has.
+        Refused: it needs something that only a cluster has.
     """
     spec = template["spec"]
     main, *others = spec["containers"]
@@ -106,7 +105,7 @@ def _value(container: str, entry: Mapping[str, Any], uid: str) -> str:
 
 
 def _read(text: str) -> str:
-    """Return a text as a kubelet gives it to a container: two $ are one. A plan refers to no variable."""
+    """Return a text as the kubelet passes it to a container: $$ becomes $. Plans use no variables."""
     return text.replace("$$", "$")
 
 

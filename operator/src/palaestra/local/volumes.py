@@ -1,4 +1,4 @@
-"""The volumes of a planned pod as folders: a ConfigMap's files, a claim, empty ones."""
+"""The volumes of a planned pod as folders: the files of a ConfigMap, a claim, empty folders."""
 
 import shutil
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from palaestra.local.spec import Pod
 
 
 def mount(pod: Pod, volumes: list[Mapping[str, Any]], config_map: Mapping[str, Any]) -> None:
-    """Make every volume ready where the pod mounts it; empty ones begin empty with each pod.
+    """Create every volume at the path where the pod mounts it; an emptyDir is emptied for each pod.
 
     Raises:
         StorageFailed: one of them cannot be written.

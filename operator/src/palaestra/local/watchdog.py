@@ -1,12 +1,11 @@
-"""End every process of a pod when the runner is gone, however it went.
+"""End every process of a pod when the runner ends, for whatever reason.
 
-Run as a program of its own, one for each pod, with a pipe as standard input whose other end only the
-runner holds: the end of the pipe is the end of the runner (or of the pod). Signals that a terminal sends
-to everybody are ignored.
+This is a program of its own, one for each pod. Its standard input is a pipe whose other end only the runner
+has, so the pipe closes when the runner ends or closes the pod. It ignores the signals of a terminal.
 
-A pod's processes are found by a marker in their environment, which grandchildren inherit through
-`setsid`, double forks and new process groups, where a parent-death signal or a process group would
-lose them. Between a fork and its exec a child still holds the pipe, so nothing can be missed.
+A marker in their environment identifies a pod's processes. Grandchildren inherit it through `setsid`, double
+forks and new process groups, where a parent-death signal or a process group would miss them. Between a fork
+and its exec a child still holds the pipe, so no process is missed.
 
 Standard library only and no import from this package: it is started as a file, with `python -I -S`.
 """
@@ -20,7 +19,7 @@ import time
 MARKER = "PALAESTRA_LOCAL_CONTAINER"  # environment: <pod uid>/<container>/
 QUIET_ROUNDS = 3  # an exec that ends while /proc is being read shows up in the next round
 ROUND_S = 0.02
-DEADLINE_S = 20.0  # a process that outlives SIGKILL for this long hangs in the kernel
+DEADLINE_S = 20.0  # a process that survives SIGKILL for this long hangs in the kernel
 
 
 def kill_marked(prefix: str) -> int:
@@ -49,7 +48,7 @@ def _kill_if_marked(pid: int, wanted: bytes) -> bool:
 
 
 def sweep(prefix: str) -> None:
-    """Kill what is marked until nothing is found any more, or the deadline has passed."""
+    """Kill marked processes until none is found, or the deadline has passed."""
     deadline = time.monotonic() + DEADLINE_S
     quiet = 0
     while quiet < QUIET_ROUNDS and time.monotonic() < deadline:

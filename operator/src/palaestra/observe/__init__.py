@@ -1,7 +1,7 @@
-"""What the cluster shows of a TrainingJob: raw JSON in, checked values out.
+"""The observation of a TrainingJob in a cluster: raw JSON in, checked values out.
 
-Pure, and total: whatever an API server or a pod answers, there is an `Observed` and no exception. What
-cannot be read is as if it were not there.
+Pure and total: for any answer of an API server or a pod it returns an `Observed` and raises nothing. A value
+that cannot be read counts as absent.
 
     observed = observe(job, Objects(jobs=..., pods=..., ...))
     if not complete(job, observed):  # of palaestra.decide

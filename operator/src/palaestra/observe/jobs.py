@@ -6,7 +6,7 @@ from palaestra.observe.reading import condition, count, holds, part, parts, text
 from palaestra.observe.views import JobEnd, JobView, Raw, Replaced, Suspended
 from palaestra.plan.job import QUEUE_LABEL, SUSPEND_SET
 
-# What others may change in the spec of a Job of ours, besides `suspend`.
+# The fields of a Job's spec, besides `suspend`, that other clients can change.
 SETTINGS = ("parallelism", "backoffLimit", "activeDeadlineSeconds", "ttlSecondsAfterFinished")
 STOPPED = "palaestra.dev/stopped"  # annotation of a Job: "<reason>: <message>"
 SUSPENDED = "palaestra.dev/suspended"  # annotation of a Job: "<uid of the pod> lived", or "<uid> ended"
@@ -14,7 +14,7 @@ REPLACED = "palaestra.dev/replaced"  # annotation of a Job: "<times> <uid of the
 _REPLACED = re.compile(r"(\d{1,9}) (\S{1,253}) (\w{1,60}): (.{0,1024})")
 _SUSPENDED = re.compile(r"(\S{1,253}) (lived|ended)")
 
-# The outcome is certain before the last pod has ended: a pod on a lost node never does.
+# Set before the last pod has ended; a pod on a lost node never ends.
 _ENDS = (
     ("Complete", JobEnd.COMPLETE),
     ("Failed", JobEnd.FAILED),
@@ -24,7 +24,7 @@ _ENDS = (
 
 
 def job_view(raw: Raw) -> JobView:
-    """Return the Job; what it does not tell is empty."""
+    """Return the Job; an absent value is empty."""
     metadata, status = part(raw, "metadata"), part(raw, "status")
     named, end = next(((kind, end) for kind, end in _ENDS if holds(raw, kind)), ("", None))
     ending = condition(raw, named)
@@ -64,13 +64,13 @@ def _suspend_set(annotations: dict[str, object]) -> bool | None:
 
 
 def _suspension(annotations: dict[str, object]) -> Suspended | None:
-    """Return the mark of the pod that a suspension ended; None: there is none that could be ours."""
+    """Return the mark of the pod that a suspension ended; None if there is no valid mark."""
     mark = _SUSPENDED.fullmatch(text(annotations, SUSPENDED, 300))
     return None if mark is None else Suspended(pod=mark[1], lived=mark[2] == "lived")
 
 
 def _replaced(annotations: dict[str, object]) -> Replaced | None:
-    """Return the mark of the pods that were replaced; None: there is none that could be ours."""
+    """Return the mark of the pods that were replaced; None if there is no valid mark."""
     mark = _REPLACED.fullmatch(text(annotations, REPLACED, 1400))
     if mark is None:
         return None
@@ -78,7 +78,7 @@ def _replaced(annotations: dict[str, object]) -> Replaced | None:
 
 
 def _failures(status: dict[str, object]) -> int:
-    """Return the pods that failed: those that the Job controller has booked and those that it is about to."""
+    """Return the number of failed pods: those that the Job controller has counted, and uncounted ones."""
     uncounted = part(status, "uncountedTerminatedPods").get("failed")
     return count(status, "failed") + (len(uncounted) if isinstance(uncounted, list) else 0)
 

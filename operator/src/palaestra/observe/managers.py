@@ -7,7 +7,7 @@ MOST_NAME = 128  # of a field manager, as the API server bounds it
 
 
 def suspends(raw: Raw) -> str:
-    """Return the field manager that set a Job's `spec.suspend` last; "": the object does not say."""
+    """Return the field manager that set a Job's `spec.suspend` last; "" if the object does not name it."""
     entries = [
         (text(entry, "time"), text(entry, "manager", MOST_NAME))
         for entry in parts(raw, "metadata", "managedFields")

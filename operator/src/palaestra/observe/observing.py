@@ -1,4 +1,4 @@
-"""Sort what was read by replica, and make values of it."""
+"""Sort the objects of a job by replica, and make values of them."""
 
 from collections.abc import Collection, Iterable, Iterator
 from datetime import datetime
@@ -27,7 +27,7 @@ UNMOUNTED = frozenset({"FailedMount", "FailedAttachVolume"})  # a kubelet's even
 
 
 def observe(job: TrainingJob, objects: Objects) -> Observed:
-    """Return what `objects` show of the job; nothing in them is trusted."""
+    """Return the observation of the job from `objects`; their content is not trusted."""
     return Observed(
         replicas=tuple(_replica(job, index, objects) for index in range(job.spec.replicas)),
         present=frozenset(
@@ -45,7 +45,7 @@ def observe(job: TrainingJob, objects: Objects) -> Observed:
 
 
 def _edited(job: TrainingJob, objects: Objects) -> Iterator[tuple[str, int]]:
-    """Yield name and generation of the job's policies that were changed: the API server begins with 1."""
+    """Yield name and generation of the job's policies that were changed; the first generation is 1."""
     for raw in objects.policies:
         metadata = part(raw, "metadata")
         generation = count(metadata, "generation")
@@ -84,10 +84,10 @@ def _obstacle(raw: Raw, name: str) -> Obstacle:
 def _pods(
     job: TrainingJob, index: int, objects: Objects, ours: JobView | None
 ) -> tuple[tuple[PodView, ...], tuple[PodView, ...]]:
-    """Return the pods of a replica, oldest first, and those that are only labelled as if they were.
+    """Return the pods of a replica, oldest first, and other pods with its labels.
 
-    Whoever may make pods may give them our labels; the replica's are made by its Job. Of a Job before the
-    present one nothing is known but the pod that the status names.
+    Every user who can create pods can give them our labels, but only those that its Job owns are the
+    replica's. Of an earlier Job, only the pod that the status names is known.
     """
     known = {each.pod.uid for each in job.status.replicas if each.index == index and each.pod is not None}
     found: dict[str, PodView] = {}
@@ -104,9 +104,9 @@ def _pods(
 
 
 def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]:
-    """Yield the pods of an earlier TrainingJob of this name that may still hold the claim of a replica.
+    """Yield the pods of an earlier TrainingJob of this name that may still write to a replica's claim.
 
-    The earlier job's own claims have its uid in their names, so only a claim that both name is shared.
+    The claims that the earlier job created have its uid in their names, so only an `existingClaim` is shared.
     """
     shared = job.spec.storage.existing_claim
     if shared is None:
@@ -120,7 +120,7 @@ def _former(job: TrainingJob, index: int, objects: Objects) -> Iterator[PodView]
 
 
 def _last_word(pod: PodView) -> Termination | None:
-    """Return the trainer's last word; None for the end of a log, or whatever else a pod may write."""
+    """Return the trainer's last word, its termination message; None if a pod wrote something else."""
     trainer = pod.trainer
     if trainer is None or trainer.exit is None:
         return None
@@ -131,7 +131,7 @@ def _last_word(pod: PodView) -> Termination | None:
 
 
 def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFailure | None:
-    """Return the last refusal of a pod, unless one was made since."""
+    """Return the last refusal of a pod, unless a pod was created since."""
     last = _last_event(objects, job.uid, {"FailedCreate"})
     if last is None or (newest is not None and newest.created >= _when(last)):
         return None
@@ -139,14 +139,14 @@ def _refused(job: JobView, newest: PodView | None, objects: Objects) -> CreateFa
 
 
 def _unmounted(newest: PodView, objects: Objects) -> str:
-    """Return why the volumes of a pod that a node has taken are not there; "": they are, or nobody said."""
+    """Return why the volumes of a pod on a node are not mounted; "" if they are, or no event has a reason."""
     waits = newest.phase == "Pending" and not newest.mounted
     last = _last_event(objects, newest.uid, UNMOUNTED) if waits else None
     return text(last, "message")
 
 
 def last_refusal(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
-    """Return the last event that says what the object with this uid lacks, as far as it is read here."""
+    """Return the last event about what the object with this uid lacks, with only the fields read here."""
     found = (raw for raw in events if text(raw, "reason") in {"FailedCreate", *UNMOUNTED})
     last = max(found, key=_when, default=None)
     if last is None:

@@ -8,14 +8,14 @@ from palaestra.observe.views import ContainerKind, ContainerView, Exit, PodView,
 from palaestra.plan.pod import GRACE_S
 
 MOST_MESSAGE = 4096  # of a termination message: Kubernetes cuts it there
-BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # of what has no readable time
+BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)  # stands for a time that cannot be read
 UNSCHEDULABLE = frozenset({"Unschedulable", "SchedulerError"})
 GRACE = "deletionGracePeriodSeconds"
 SIDECARS = ("sim-", "ros-master")  # names of the containers that have to be restarted
 
 
 def pod_view(raw: Raw) -> PodView:
-    """Return the pod; what it does not tell is empty."""
+    """Return the pod; an absent value is empty."""
     status, metadata = part(raw, "status"), part(raw, "metadata")
     scheduled = condition(raw, "PodScheduled")
     return PodView(
@@ -40,7 +40,7 @@ def pod_view(raw: Raw) -> PodView:
 
 
 def dropped(view: PodView) -> tuple[str, ...]:
-    """Return the containers of a pod that should be sidecars and are plain init containers."""
+    """Return the containers that should be sidecars but are plain init containers."""
     return tuple(
         each.name
         for each in view.containers

@@ -1,4 +1,4 @@
-"""Read raw JSON of which nothing is believed: every value has the asked type and size, or is absent."""
+"""Read untrusted JSON: every value has the expected type and size, or counts as absent."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -12,7 +12,7 @@ MOST_COUNT = 2_000_000_000  # as the status' counts are bounded
 
 
 def part(raw: Any, *path: str) -> dict[str, Any]:
-    """Return the object at `path` below `raw`, empty where there is none."""
+    """Return the object at `path` below `raw`; empty if there is none."""
     for name in path:
         raw = raw.get(name) if isinstance(raw, dict) else None
     return raw if isinstance(raw, dict) else {}
@@ -27,13 +27,13 @@ def parts(raw: Any, *path: str) -> Iterator[dict[str, Any]]:
 
 
 def text(raw: Any, name: str, most: int = MOST_TEXT) -> str:
-    """Return the text of a field on one line, cut to `most` characters; "" where there is none."""
+    """Return the text of a field on one line, cut to `most` characters; "" if there is none."""
     value = raw.get(name) if isinstance(raw, dict) else None
     return one_line(value, most) if isinstance(value, str) else ""
 
 
 def count(raw: Any, name: str) -> int:
-    """Return a whole number from 0 to 2·10⁹; 0 where there is none."""
+    """Return a whole number from 0 to 2·10⁹; 0 if there is none."""
     value = raw.get(name) if isinstance(raw, dict) else None
     if not isinstance(value, int) or isinstance(value, bool):
         return 0
@@ -41,7 +41,7 @@ def count(raw: Any, name: str) -> int:
 
 
 def time(raw: Any, name: str) -> datetime | None:
-    """Return a time in UTC, None where there is none."""
+    """Return a time in UTC; None if there is none."""
     value = raw.get(name) if isinstance(raw, dict) else None
     return as_time(value) if isinstance(value, str) else None
 
@@ -63,7 +63,7 @@ def owners(raw: Any) -> frozenset[str]:
 
 
 def condition(raw: Any, kind: str) -> dict[str, Any]:
-    """Return the condition of this type in the status of `raw`, empty where there is none."""
+    """Return the condition of this type in the status of `raw`; empty if there is none."""
     return next((each for each in parts(raw, "status", "conditions") if each.get("type") == kind), {})
 
 

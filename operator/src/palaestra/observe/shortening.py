@@ -1,8 +1,8 @@
 """A TrainingJob as a cache keeps it: small, whatever its author wrote into it.
 
-What is left out is read by the plan alone, which goes by the object in the API server. A copy that lacks
-something carries an annotation that says what, so that nobody plans from it; the object's own annotations
-are not kept, so nobody else can set this one.
+Only the plan needs the removed parts, and it reads the object from the API server. An annotation on the copy
+names the removed parts, so that no plan is made from the copy. The object's own annotations are not kept, so
+no user can set this one.
 """
 
 import hashlib
@@ -14,10 +14,10 @@ from typing import Any
 from palaestra.observe.reading import part, parts
 
 LACKS = "palaestra.dev/lacks"  # annotation of a cached copy
-LONGEST_TEXT = 256  # characters of an inline world that are kept as they stand
+LONGEST_TEXT = 256  # characters of an inline world that is kept unchanged
 MOST_CHARACTERS = 32_768  # of a cached copy, its status aside; that of a usual job has 4,000
 
-# What may be large: lists and maps of texts, none of which decides anything once the objects are there.
+# Fields that may be large: lists and maps of texts. No decision needs them once the objects exist.
 _LARGE_OF_SPEC = frozenset({"imagePullSecrets"})
 _LARGE_OF_TRAINER = frozenset({"algorithm", "command", "env", "environment", "resources"})
 _LARGE_OF_GROUP = frozenset({"command", "driver", "env", "image", "options", "resources", "world"})
@@ -26,19 +26,19 @@ _LARGE_OF_METADATA = frozenset({"labels", "ownerReferences"})
 
 
 class Lacking(StrEnum):
-    """What a cached copy lacks."""
+    """The parts that a cached copy lacks."""
 
     TEXTS = "texts"
-    """The inline worlds, for which digests stand."""
+    """The inline worlds, replaced by digests."""
 
     FIELDS = "fields"
-    """Every field that may be large, references to other objects included."""
+    """Every field that may be large, including references to other objects."""
 
 
 def shortened(job: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a TrainingJob with digests for its worlds, and if it is large still, without its large fields.
+    """Return a TrainingJob with digests of its worlds, and if it is still large, without its large fields.
 
-    What is returned is a TrainingJob too, valid where the whole is.
+    The result is a TrainingJob too, and valid if the whole one is.
     """
     kept = {**job, "spec": _with_digests(part(job, "spec"))}
     lacking = None if kept["spec"] == job.get("spec") else Lacking.TEXTS
@@ -50,13 +50,13 @@ def shortened(job: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def lacking(job: Mapping[str, Any]) -> Lacking | None:
-    """Return what a copy from a cache lacks; None: it is whole."""
+    """Return the parts that a cached copy lacks; None if it is whole."""
     mark = part(job, "metadata", "annotations").get(LACKS)
     return Lacking(mark) if mark in tuple(Lacking) else None
 
 
 def digest(text: str) -> str:
-    """Return what stands for a long text: its SHA-256 and its length."""
+    """Return the digest of a long text: its SHA-256 and its length."""
     return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}, {len(text)} characters"
 
 

@@ -1,4 +1,4 @@
-"""The objects that a job refers to by name; each must be open to jobs before it is used."""
+"""The objects to which a job refers by name; each must be open to jobs before it is used."""
 
 from collections.abc import Iterator, Mapping
 
@@ -10,12 +10,12 @@ FOR_JOBS = "palaestra.dev/for-jobs"
 
 
 def references(job: TrainingJob) -> tuple[Source, ...]:
-    """Return every object of the job's namespace that its spec refers to, each once."""
+    """Return every object of the job's namespace to which its spec refers, each once."""
     return tuple(dict.fromkeys((*_worlds(job), *_secrets(job), *_claims(job))))
 
 
 def open_to_jobs(raw: object) -> bool:
-    """Return whether an object carries the label that opens it to jobs."""
+    """Return whether an object has the label that opens it to jobs."""
     metadata = raw.get("metadata") if isinstance(raw, Mapping) else None
     labels = metadata.get("labels") if isinstance(metadata, Mapping) else None
     return isinstance(labels, Mapping) and labels.get(FOR_JOBS) == "true"

@@ -1,7 +1,7 @@
-"""What is kept of an object in a cache: what is read of it here, and nothing else.
+"""Trim an object for a cache to the fields that observation reads.
 
-Most of an object is its template and who wrote which field; two hundred jobs with their pods have to
-fit into little memory. Observing what was trimmed shows the same as observing the whole.
+Most of an object is its pod template and its managedFields, but two hundred jobs with their pods have to fit
+into little memory. The observation of trimmed objects equals that of whole ones.
 """
 
 import json
@@ -23,14 +23,14 @@ _POD_STATUS = (
 )  # fmt: skip
 _ANNOTATIONS = (STOPPED, REPLACED, SUSPENDED, SUSPEND_SET)
 
-SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: the bytes of the whole without its status
-SMALL = 65_536  # bytes; one that is not larger is kept without it
+SIZE = "palaestra.dev/size"  # annotation of a cached TrainingJob: bytes of the whole one without its status
+SMALL = 65_536  # bytes, up to which a cached TrainingJob has no such annotation
 
 
 def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an object as far as it is read while nothing of it is planned.
+    """Return the fields of an object that are read while nothing of it is planned.
 
-    Kinds that nobody here reads are returned whole, without the fields about their writers.
+    Objects of other kinds are returned whole, without managedFields.
     """
     kind = raw.get("kind")
     kept = {name: raw[name] for name in ("apiVersion", "kind") if name in raw}
@@ -45,12 +45,12 @@ def trimmed(raw: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def whole(raw: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an object with all that it holds, without the fields about its writers."""
+    """Return an object whole, without managedFields."""
     return {**raw, "metadata": _metadata(raw)}
 
 
 def _measured(job: Mapping[str, Any], kept: dict[str, Any]) -> dict[str, Any]:
-    """Return what is kept of a job; of a large one with its size, everybody's annotations included."""
+    """Return the trimmed job; if the job is large, with its size, all annotations included."""
     metadata = job.get("metadata")
     given = {**metadata, "managedFields": None} if isinstance(metadata, Mapping) else None
     size = len(json.dumps({**job, "metadata": given, "status": None}))

@@ -1,7 +1,7 @@
-"""What is known of a TrainingJob's objects, as values: the seam between reading and deciding.
+"""The observation of a TrainingJob's objects, as values: the interface between reading and deciding.
 
-Everything here was checked when it was read (`palaestra.observe.reading`): a size has a bound, a time
-is a time, and what a pod says of itself is either our protocol or nothing.
+All values were checked when they were read (`palaestra.observe.reading`): sizes are bounded, times are valid,
+and a pod's report is valid by our protocol or absent.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,11 +13,11 @@ from typing import Any
 from palaestra.plan.pod import GRACE_S
 from palaestra_protocol.pod.status import Termination, TrainerStatus
 
-Raw = Mapping[str, Any]  # an object as its JSON, of which nothing is believed
+Raw = Mapping[str, Any]  # an object as untrusted JSON
 
 
 class SourceKind(StrEnum):
-    """The kinds of object that a job may refer to."""
+    """The kinds of objects to which a job may refer."""
 
     CONFIG_MAP = "ConfigMap"
     SECRET = "Secret"
@@ -26,9 +26,9 @@ class SourceKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """An object of the job's namespace that its spec refers to; `field` is the first place that does.
+    """An object of the job's namespace to which its spec refers; `field` is the first such field.
 
-    Two are equal when they name the same object.
+    Two are equal if they name the same object.
     """
 
     kind: SourceKind
@@ -38,7 +38,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Polled:
-    """What a trainer answered, and when on this process's monotonic clock."""
+    """A trainer's answer, and its time on this process's monotonic clock."""
 
     status: TrainerStatus
     at_s: float
@@ -50,15 +50,15 @@ class Objects:
 
     Attributes:
         jobs, pods, claims, config_maps, policies: of its namespace, with its label palaestra.dev/job;
-            a Job that was found to have one of our names belongs among `jobs`, whoever owns it.
+            a Job of another owner that has one of our names is among `jobs` too.
         events: FailedCreate events about those Jobs, and warnings about pods that wait for volumes.
-        unadmitted: by a Job's uid why Kueue has not admitted it, where that was asked for.
+        unadmitted: by a Job's uid, why Kueue has not admitted it; absent if that was not requested.
         unasked: uids of Jobs and pods that lack something, and about which the operator sends no request.
         polled: the last answers of trainers by pod UID; a pod that was not reached is absent.
-        denied: what the API server said when it last refused an object of a replica; None: an object of
-            the whole job. Absent: nothing is refused.
-        switchers: by a Job's uid the field manager that set its `spec.suspend`, where it is not as the
-            operator set it.
+        denied: by replica, the message with which the API server last refused one of its objects; None: an
+            object of the whole job. A replica without a refusal is absent.
+        switchers: by a Job's uid, the field manager that set its `spec.suspend`, if it is not as the operator
+            set it.
     """
 
     jobs: Sequence[Raw] = ()
@@ -75,7 +75,7 @@ class Objects:
 
 
 class ContainerKind(StrEnum):
-    """What a container is in its pod."""
+    """The role of a container in its pod."""
 
     MAIN = "main"
     SIDECAR = "sidecar"
@@ -97,12 +97,12 @@ class ContainerView:
     """One container of a pod.
 
     Attributes:
-        running_since: None: it does not run now.
+        running_since: None if it does not run now.
         started: its startup probe has passed, or it has none and runs.
-        waiting, waiting_message: why it does not run yet, in the kubelet's words; "": it does not wait.
-        exit: how it ended, if it has; of a sidecar that runs again, how it ended before.
+        waiting, waiting_message: why it does not run yet, in the kubelet's words; "" if it does not wait.
+        exit: how it ended, if it has; for a sidecar that runs again, how it ended last.
         restarts: by the kubelet.
-        memory_limit: as its spec has it; "": none.
+        memory_limit: from its spec; "" if there is none.
     """
 
     name: str
@@ -118,7 +118,7 @@ class ContainerView:
 
     @property
     def ended_run(self) -> int:
-        """Return which run of the container `exit` is the end of, from 0."""
+        """Return the number, from 0, of the container's run that `exit` ended."""
         return self.restarts if self.running_since is None else max(self.restarts - 1, 0)
 
 
@@ -128,15 +128,15 @@ class PodView:
 
     Attributes:
         version: its resourceVersion.
-        started: when a kubelet took it.
+        started: when a kubelet accepted it.
         phase: Pending, Running, Succeeded, Failed or Unknown.
-        reason, message: the pod's own, as of an eviction; mostly "".
-        ready: the kubelet's word; False: it is not, or nobody knows.
-        mounted: its volumes are there: it has begun to pull images, or is past that.
-        unschedulable: the scheduler's words; "": it was scheduled.
-        disruption: why the cluster took it (condition DisruptionTarget); "": it did not.
-        gone_by: when it was to be gone, its grace period included; None: nobody deleted it. A time of the
-            API server, so it is compared with no clock of ours.
+        reason, message: the pod's own, for example after an eviction; mostly "".
+        ready: by the kubelet; False if it is not, or unknown.
+        mounted: its volumes are mounted: it has begun to pull images, or is past that.
+        unschedulable: the scheduler's message; "" if it was scheduled.
+        disruption: why the cluster interrupted it (condition DisruptionTarget); "" if it did not.
+        gone_by: the end of its grace period after a deletion; None if it was not deleted. It is a time of the
+            API server, so it is not compared with our clocks.
         grace_s: seconds between its deletion and `gone_by`.
         containers: in the order in which they start, the trainer last.
         claims: names of the PersistentVolumeClaims that it mounts.
@@ -167,7 +167,7 @@ class PodView:
 
     @property
     def trainer(self) -> ContainerView | None:
-        """Return its main container, None where the pod shows none."""
+        """Return its main container; None if the pod has none."""
         return next((each for each in self.containers if each.kind is ContainerKind.MAIN), None)
 
     @property
@@ -188,7 +188,7 @@ class Replaced:
     """The mark on a Job whose pod the operator replaces.
 
     Attributes:
-        times: pods that were replaced so, this one among them.
+        times: pods that were replaced this way, including this one.
         pod: uid of the last one.
         reason, message: why.
     """
@@ -205,7 +205,7 @@ class Suspended:
 
     Attributes:
         pod: uid of the current attempt's pod at that time.
-        lived: the suspension ended it; False: it had ended, or was being deleted, before.
+        lived: the suspension ended it; False if it had ended, or was being deleted, before.
     """
 
     pod: str
@@ -218,20 +218,20 @@ class JobView:
 
     Attributes:
         version: its resourceVersion.
-        suspended: as its spec says.
+        suspended: `spec.suspend`.
         suspend_set: the `spec.suspend` that the operator set last, by its annotation; None: an earlier
-            release made the Job, or the Job has a queue.
+            release created the Job, or the Job has a queue.
         suspension: our mark of the pod that our last suspension ended; None: it has none.
-        paused: since when it is, by its controller's word; None: it is not.
-        resumed: when it last was, by its controller's word; None: it never was suspended or still is.
+        paused: since when it is suspended, by the Job controller; None: it is not.
+        resumed: when it was resumed last, by the Job controller; None: it never was suspended or still is.
         stopped: reason and message of our stop mark; None: it has none.
         replaced: our mark of the pods that we replaced; None: it has none.
         failures: pods that failed and count against backoffLimit.
-        end, end_reason, end_message: what its conditions say; None and "" while it goes on.
+        end, end_reason, end_message: from its conditions; None and "" until it ends.
         settings: fields of its spec that others may change; one that it lacks is absent.
-        deleting: somebody deleted it.
+        deleting: it is being deleted.
         volumes: names of the ConfigMaps and claims that its pods mount.
-        queue: the queue that Kueue knows it by, from the spec or a namespace's default; "": it has none.
+        queue: its Kueue queue, from the spec or a namespace's default; "": it has none.
     """
 
     name: str
@@ -256,7 +256,7 @@ class JobView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
-    """A Job that has our name and is not ours; `deleting`: it will be gone."""
+    """A Job of another owner that has one of our names; `deleting`: it is being deleted."""
 
     name: str
     deleting: bool
@@ -264,7 +264,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CreateFailure:
-    """The last time the API server refused a pod, in its words."""
+    """The API server's last refusal of a pod, with its message."""
 
     message: str
     at: datetime
@@ -272,24 +272,24 @@ class CreateFailure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplicaObserved:
-    """What the cluster shows of one replica.
+    """The observation of one replica.
 
     Attributes:
         pods: those of its Job, and the one that the status names; oldest first.
-        in_the_way: names of all other pods that say they are the replica's and have not ended. What they
-            tell is not believed; they may write to its volume all the same.
-        former: pods of an earlier TrainingJob of the same name that have not ended and mount the existing
-            claim that this replica is to mount.
+        in_the_way: names of all other unfinished pods with the replica's labels. Their reports are ignored,
+            but they may write to its volume.
+        former: unfinished pods of an earlier TrainingJob of the same name that mount the `existingClaim` of
+            this replica.
         polled: the answer of the newest pod's trainer; None: unknown.
-        terminations: last words of trainers by pod UID, those that are of our protocol.
-        refused: why no pod could be made, if that is newer than the newest pod.
-        denied: why an object of the replica could not be made; "": it could.
-        unmounted: why the newest pod's volumes are not there, in the cluster's words; "": they are, or
-            nobody said so.
+        terminations: valid termination messages of trainers, by pod UID.
+        refused: why no pod could be created, if that is newer than the newest pod.
+        denied: why an object of the replica could not be created; "": it could.
+        unmounted: why the newest pod's volumes are not mounted, in the cluster's words; "": they are, or no
+            event has a reason.
         unadmitted: why Kueue has not admitted the Job; "": it has, or gives no reason; None: not asked yet.
         unasked: its pod, the pod's volumes or Kueue's admission are missing, and the operator sends no
             request about it.
-        switcher: the field manager that set the Job's `spec.suspend`, where it is not as the operator set it;
+        switcher: the field manager that set the Job's `spec.suspend`, if it is not as the operator set it;
             "": it is, or the manager is unknown.
     """
 
@@ -315,23 +315,22 @@ class ReplicaObserved:
 
     @property
     def termination(self) -> Termination | None:
-        """Return the last word of the newest pod's trainer."""
+        """Return the termination message of the newest pod's trainer."""
         return self.terminations.get(self.pod.uid) if self.pod else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Observed:
-    """What the cluster shows of a TrainingJob.
+    """The observation of a TrainingJob.
 
-    `sources` and `kueue` are asked for only while something of the job is missing, which `observe` shows:
-    the operator adds them.
+    The operator adds `sources` and `kueue`, which it requests only while objects of the job are missing.
 
     Attributes:
         replicas: one for each replica of the spec, by index.
-        present: kind and name of the ConfigMaps, claims and NetworkPolicies that there are.
-        edited: name and generation of each NetworkPolicy whose spec was changed since it was made.
-        sources: what `references(job)` names; None: there is no such object. Of a Secret the
-            metadata is enough.
+        present: kind and name of the existing ConfigMaps, claims and NetworkPolicies.
+        edited: name and generation of each NetworkPolicy whose spec was changed since its creation.
+        sources: the objects of `references(job)`; None: there is no such object. For a Secret the metadata is
+            enough.
         kueue: whether the cluster has Kueue.
     """
 

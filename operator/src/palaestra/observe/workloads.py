@@ -13,9 +13,9 @@ _READY = "Ready"  # the state of an admission check that lets a Workload pass
 
 
 def why_not_admitted(workloads: Iterable[Raw]) -> str:
-    """Return why Kueue has not admitted a Job, by the Workloads that it has made for it, on one line.
+    """Return why Kueue has not admitted a Job, by the Workloads that Kueue created for it, on one line.
 
-    In Kueue's words where it has any; "": it has admitted the Job, or gives no reason yet.
+    The words are Kueue's if it has any; "" if it has admitted the Job, or gives no reason yet.
     """
     newest = max(workloads, key=lambda raw: text(part(raw, "metadata"), "creationTimestamp"), default=None)
     if newest is None:
@@ -29,7 +29,7 @@ def why_not_admitted(workloads: Iterable[Raw]) -> str:
 
 
 def _checks(workload: Raw) -> Iterator[str]:
-    """Yield what is said of each admission check that has not passed."""
+    """Yield the state and message of each admission check that has not passed."""
     for check in parts(workload, "status", "admissionChecks"):
         name, state = text(check, "name", 316), text(check, "state", 20)
         if state != _READY:

@@ -118,7 +118,7 @@ def install_sidecar(replica: Replica) -> Container | None:
         "name": "install-sidecar",
         "image": replica.layout.images.stub,
         "imagePullPolicy": replica.job.spec.trainer.image_pull_policy.value,
-        # What is in the folder, not the folder: the volume's own times are not ours to set.
+        # The contents of the folder only: cp may not set the times of the volume's own folder.
         "command": ["sh", "-c", f"cp -a /opt/palaestra/* {target}/"],
         "terminationMessagePolicy": "FallbackToLogsOnError",
         "securityContext": SECURITY,
