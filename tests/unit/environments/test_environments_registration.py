@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
+import textwrap
 import threading
 
 import gymnasium
@@ -100,6 +103,27 @@ def test_a_wrong_option_raises_an_error_before_a_simulator_is_requested():
 
     with pytest.raises(ConfigurationError, match="max_steps"):
         make(simulator=never, max_steps=0)
+
+
+def test_an_unknown_role_raises_an_error_that_names_the_roles():
+    """A misspelled role would find no simulator, and the message would be about simulators."""
+    with pytest.raises(ConfigurationError, match=r'^role: "collect" does not exist; choose Collect or'):
+        make(role="collect")
+
+
+def test_an_environment_on_a_fake_robot_needs_no_ros():
+    """So that people develop rewards and algorithms where ROS is not installed."""
+    program = f"""
+        import sys
+        sys.modules["rospy"] = None  # an import of it fails from now on
+        import gymnasium
+        from palaestra_trainer.testing import fake_arena
+        env = gymnasium.make("palaestra_trainer.environments:{NAME}", simulator=fake_arena)
+        env.reset(seed=1)
+        env.step(0)
+    """
+
+    subprocess.run([sys.executable, "-c", textwrap.dedent(program)], check=True, timeout=60)
 
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")

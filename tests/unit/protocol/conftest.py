@@ -9,7 +9,7 @@ from palaestra_protocol.pod.status import (
     CheckpointStatus,
     FaultKind,
     FaultRecord,
-    SimulatorRole,
+    Role,
     SimulatorStatus,
     StandbyState,
     Termination,
@@ -68,7 +68,7 @@ SHAPES = {
             st.builds(
                 SimulatorStatus,
                 name=names,
-                role=st.sampled_from([role.value for role in SimulatorRole]),
+                role=st.sampled_from([role.value for role in Role]),
                 state=st.sampled_from([state.value for state in SidecarState]),
                 restarts=counts,
                 last_fault=st.none() | texts,

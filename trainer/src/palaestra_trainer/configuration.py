@@ -27,6 +27,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic.alias_generators import to_camel
 from pydantic_core import ErrorDetails
 
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.errors import ConfigurationError
 
 log = structlog.get_logger(__name__)
@@ -37,7 +38,6 @@ CONFIG_VARIABLE = "PALAESTRA_CONFIG"
 CONFIRM_EPISODES = 100  # with these, a rate of 95 % is known to within 4 %
 
 Positive = Annotated[int, Field(ge=1)]
-Role = Literal["Collect", "Evaluate"]
 Reward = Literal["Dense", "Sparse"]
 Device = Literal["cpu", "cuda"]
 DEFAULT_REWARD: Reward = "Dense"
@@ -160,7 +160,7 @@ class SimulatorConfiguration(_Section):
         driver: how it is started: stub, webots or command.
         options: its command-line options.
         world: path of its generated world.
-        names_prefix: readable start of the ROS names of its robots.
+        names_prefix: readable start of the ROS names of its robots; not used.
         standby: whether its sidecar has a second simulator that stands by for this one.
         start_deadline_seconds: seconds within which it must answer after its start.
     """
@@ -222,7 +222,7 @@ class Configuration(_Section):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"simulators: the name {twice[0]} is used twice; make names unique")
-        if not self.with_role("Collect"):
+        if not self.with_role(Role.COLLECT):
             raise ValueError("simulators: none has role Collect; give one of them that role")
         return self
 

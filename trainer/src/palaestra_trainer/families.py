@@ -7,7 +7,7 @@ simulators begin at 0 with each attempt. Prometheus adds the labels of job and r
 from __future__ import annotations
 
 from palaestra_protocol.metrics import Family, Label, counter, gauge, histogram
-from palaestra_protocol.pod.status import Cause, FaultKind, SimulatorRole
+from palaestra_protocol.pod.status import Cause, FaultKind, Role
 
 # The scale of returns is not known in advance, and they are often negative. So the buckets are the same on
 # both sides of 0, and each is at most two and a half times as wide as the one before.
@@ -34,7 +34,7 @@ LOSSES = (
 MEASURES = ("exploration_rate", "ent_coef", "std")
 
 SIMULATOR = Label(name="simulator", bound="simulator")
-ROLE = Label(name="role", values=tuple(SimulatorRole))
+ROLE = Label(name="role", values=tuple(Role))
 STATE = Label(name="state", values=("starting", "ready", "failed", GIVEN_UP))
 KIND = Label(name="kind", values=tuple(FaultKind))
 CAUSE = Label(name="cause", values=(*(kind for kind in FaultKind if kind is not FaultKind.SLOW), RECYCLED))

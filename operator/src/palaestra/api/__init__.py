@@ -7,10 +7,11 @@ made from them. Nothing here touches a cluster, a file or a clock.
 from palaestra.api.job import API_VERSION, KIND, Metadata, Spec, TrainingJob
 from palaestra.api.loading import as_data, dump, load, validate
 from palaestra.api.scheduling import Scheduling
-from palaestra.api.simulators import Driver, Role, SimulatorGroup, World
+from palaestra.api.simulators import Driver, SimulatorGroup, World
 from palaestra.api.status import Status
 from palaestra.api.storage import Storage
 from palaestra.api.trainer import AlgorithmName, Reward, Trainer
+from palaestra_protocol.pod.terms import Role
 
 __all__ = [
     "API_VERSION",

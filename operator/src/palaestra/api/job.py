@@ -19,10 +19,11 @@ from palaestra.api.fields import (
 from palaestra.api.model import ApiModel, Rule
 from palaestra.api.network import Network
 from palaestra.api.scheduling import Scheduling
-from palaestra.api.simulators import Role, SimulatorGroup
+from palaestra.api.simulators import SimulatorGroup
 from palaestra.api.status import Status
 from palaestra.api.storage import Storage
 from palaestra.api.trainer import Trainer
+from palaestra_protocol.pod.terms import Role
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
 KIND: Final = "TrainingJob"

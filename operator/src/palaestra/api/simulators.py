@@ -20,13 +20,7 @@ from palaestra.api.fields import (
     Words,
 )
 from palaestra.api.model import ApiModel, Rule
-
-
-class Role(StrEnum):
-    """Use of a simulator's episodes."""
-
-    COLLECT = "Collect"
-    EVALUATE = "Evaluate"
+from palaestra_protocol.pod.terms import Role
 
 
 class Driver(StrEnum):

@@ -17,7 +17,8 @@ from pydantic import Field
 from palaestra.api.fields import KNOWN_ONES, Count, Fraction, Image, Listed, Sentence, Word
 from palaestra.api.history import Faults, Goodput, LastAttempt, MemoryKills
 from palaestra.api.model import Reported
-from palaestra.api.simulators import Role
+from palaestra_protocol.control import SidecarState
+from palaestra_protocol.pod.terms import Role
 
 
 class Phase(StrEnum):
@@ -31,16 +32,6 @@ class Phase(StrEnum):
 
 
 TERMINAL = frozenset({Phase.SUCCEEDED, Phase.FAILED})  # A job or replica never leaves these phases.
-
-
-class SimulatorPhase(StrEnum):
-    """State of a simulator, as its sidecar reports it."""
-
-    IDLE = "idle"
-    STARTING = "starting"
-    READY = "ready"
-    STOPPING = "stopping"
-    FAILED = "failed"
 
 
 class ConditionType(StrEnum):
@@ -141,7 +132,7 @@ class SimulatorStatus(Reported):
     role: Role = Field(strict=False)
     """`Collect` or `Evaluate`."""
 
-    state: SimulatorPhase = Field(strict=False)
+    state: SidecarState = Field(strict=False)
     """`idle`, `starting`, `ready`, `stopping` or `failed`."""
 
     restarts: Count = 0

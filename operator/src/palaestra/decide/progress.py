@@ -12,7 +12,6 @@ from palaestra.api.status import (
     TERMINAL,
     LastCheckpoint,
     Phase,
-    SimulatorPhase,
     SimulatorStatus,
     SuccessInterval,
 )
@@ -20,6 +19,7 @@ from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation
 from palaestra.decide.times import Wait
 from palaestra.observe.reading import MOST_COUNT, as_time
+from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol
 from palaestra_protocol.pod.status import Cause, CheckpointStatus, Termination, TrainerStatus
 
@@ -116,7 +116,7 @@ def _simulators(polled: TrainerStatus) -> tuple[SimulatorStatus, ...]:
         SimulatorStatus(
             name=one_line(each.name, LONGEST_NAME) or "unnamed",
             role=Role(each.role),
-            state=SimulatorPhase(each.state),
+            state=SidecarState(each.state),
             restarts=min(each.restarts, MOST_COUNT),
             last_fault=None if each.last_fault is None else one_line(each.last_fault, LONGEST_FAULT),
             flapping=each.flapping,

@@ -65,6 +65,7 @@ def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes
         "options": list(group.options),
         "control": f"http://{LOOPBACK}:{port}",
         "world": world_path(replica, simulator, files),
+        # No trainer uses it; without it the ConfigMap of an accepted job could not be made again by its name.
         "namesPrefix": name_prefix(simulator.identity),
     }
     if limits := _limits(recycling(group)):

@@ -22,7 +22,7 @@ from palaestra_protocol.fields import (
     decoded,
     known,
 )
-from palaestra_protocol.pod.terms import Cause, ExitCode, FaultKind, SimulatorRole, StandbyState
+from palaestra_protocol.pod.terms import Cause, ExitCode, FaultKind, Role, StandbyState
 
 __all__ = [
     "Cause",
@@ -31,7 +31,7 @@ __all__ = [
     "FaultKind",
     "FaultRecord",
     "ProtocolError",
-    "SimulatorRole",
+    "Role",
     "SimulatorStatus",
     "StandbyState",
     "SuccessInterval",
@@ -154,7 +154,7 @@ class SimulatorStatus:
         fields = Fields(content, path)
         return cls(
             name=fields.text("name", MOST_NAME, least=1),
-            role=fields.choice("role", SimulatorRole).value,
+            role=fields.choice("role", Role).value,
             state=fields.choice("state", SidecarState).value,
             restarts=fields.whole("restarts"),
             last_fault=fields.text("last_fault") if fields.has("last_fault") else None,

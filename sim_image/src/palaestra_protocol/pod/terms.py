@@ -55,7 +55,7 @@ class StandbyState(StrEnum):
     READY = "ready"
 
 
-class SimulatorRole(StrEnum):
+class Role(StrEnum):
     """What a simulator's episodes are for: to learn from, or to measure the policy."""
 
     COLLECT = "Collect"

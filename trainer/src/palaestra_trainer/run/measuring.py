@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.episodes.evaluation import evaluate_on_all
@@ -34,7 +35,7 @@ def measure(
         ConfigurationError: the model is missing or does not fit, or no simulator evaluates.
         FaultBudgetSpent: a simulator broke more often than its budget allows.
     """
-    evaluating = configuration.with_role("Evaluate")
+    evaluating = configuration.with_role(Role.EVALUATE)
     if not evaluating:
         raise ConfigurationError("simulators: none has role Evaluate; give one of them that role")
     if not model.exists():

@@ -8,7 +8,8 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from palaestra_trainer.configuration import Configuration, Role, SimulatorConfiguration
+from palaestra_protocol.pod.terms import Role
+from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.locks import FileLock
 
@@ -54,7 +55,7 @@ def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Pa
 
 
 def _none_left(having_role: int, role: Role, total: int) -> str:
-    other = "Evaluate" if role == "Collect" else "Collect"
+    other = Role.EVALUATE if role is Role.COLLECT else Role.COLLECT
     return (
         f"PALAESTRA_CONFIG: {having_role} of {total} simulators have role {role}, and each has an "
         f"environment; add simulators with that role to the job, close an environment, or create one "

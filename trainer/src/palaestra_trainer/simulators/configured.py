@@ -6,7 +6,8 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, Role, load
+from palaestra_protocol.pod.terms import Role
+from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.simulators.claims import claim
 from palaestra_trainer.simulators.connect import Arena, connect

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from palaestra_trainer.configuration import Role
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.options import parse
 from palaestra_trainer.errors import ConfigurationError
@@ -16,7 +16,7 @@ def make(
     robot: RobotinoAbc | None = None,
     scene: Scene | None = None,
     simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
-    role: Role = "Collect",
+    role: str = Role.COLLECT,
     **options: Any,
 ) -> MoveToTargetEnv:
     """Return the environment for `gymnasium.make("MoveToTargetEnv-v0", ...)`.
@@ -43,5 +43,11 @@ def make(
         return MoveToTargetEnv(*simulator(), chosen)
     from palaestra_trainer.simulators.configured import simulator_for  # noqa: PLC0415 - it needs ROS
 
-    taken = simulator_for(role)
+    taken = simulator_for(_role(role))
     return MoveToTargetEnv(taken.robot, taken.scene, chosen, taken.release)
+
+
+def _role(name: str) -> Role:
+    if name not in set(Role):
+        raise ConfigurationError(f'role: "{name}" does not exist; choose {" or ".join(Role)}')
+    return Role(name)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 import structlog
 
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.background import in_background
@@ -47,8 +48,8 @@ class Fleet:
             wanted.name: Keeper(by_name[wanted.name], care_of(wanted), watcher, group=groups[wanted.group])
             for wanted in configuration.simulators
         }
-        self.collecting = [keepers[wanted.name] for wanted in configuration.with_role("Collect")]
-        self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role("Evaluate")]
+        self.collecting = [keepers[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
+        self.evaluating = [keepers[wanted.name] for wanted in configuration.with_role(Role.EVALUATE)]
         self._all = [*self.collecting, *self.evaluating]
 
     def meters(self) -> dict[str, Meter]:

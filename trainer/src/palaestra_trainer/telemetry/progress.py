@@ -24,7 +24,7 @@ from palaestra_protocol.pod.status import (
     SuccessInterval,
     TrainerStatus,
 )
-from palaestra_trainer.configuration import Role
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.episodes.evaluation import Evaluation
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.telemetry.figures import EPISODES_IN_MEAN, Figures

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from palaestra_protocol.pod.status import MOST_FAULTS, FaultKind, FaultRecord, SimulatorStatus
-from palaestra_trainer.configuration import Role
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.families import RECYCLED
 
 FLAPPING_S = 600.0  # a simulator is steady again this long after the last call of `flaps`
