@@ -8,9 +8,10 @@ from importlib.metadata import version
 import pytest
 
 from palaestra.errors import PalaestraError
-from palaestra.operator.health import HealthServer
+from palaestra.operator.health import serving
 from palaestra.operator.metrics import Metrics
 from palaestra.operator.options import address
+from palaestra_protocol.http import Address
 
 WAIT_S = 10.0
 PHASES = [("robots", "Running"), ("robots", "Running"), ("home", "Failed")]
@@ -31,19 +32,18 @@ def ask(told):
         depth=lambda: 3, leads=lambda: True, phases=lambda: PHASES, waits=list, outdated=lambda: False
     )
     trouble = lambda: told[0] if told else None  # noqa: E731 - both questions get the same answer
-    server = HealthServer(("127.0.0.1", 0), healthy=trouble, ready=trouble, metrics=metrics.text)
+    server = serving(Address("127.0.0.1", 0), healthy=trouble, ready=trouble, metrics=metrics.text)
 
     def get(path):
         try:
-            with urllib.request.urlopen(f"http://{server.shown}{path}", timeout=WAIT_S) as answer:
+            with urllib.request.urlopen(f"http://{server.address}{path}", timeout=WAIT_S) as answer:
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as error:
             with error:
                 return error.code, error.read().decode()
 
     yield get
-    server.shutdown()
-    server.server_close()
+    server.close()
 
 
 @pytest.mark.parametrize("path", ["/healthz", "/readyz"])
@@ -83,10 +83,10 @@ def test_what_the_operator_counts(line, ask):
 def test_the_error_for_a_taken_address_names_the_option():
     """Two operators on one machine."""
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        where = taken.getsockname()[:2]
+        where = Address(*taken.getsockname()[:2])
 
         with pytest.raises(PalaestraError, match=r"--metrics-address: .*: Address already in use; choose"):
-            HealthServer(where, healthy=str, ready=str, metrics=bytes)
+            serving(where, healthy=str, ready=str, metrics=bytes)
 
 
 @pytest.mark.parametrize("text", ["8080", ":8080", "localhost:", "localhost:http", "localhost:65536"])

@@ -14,7 +14,7 @@ from palaestra_protocol.pod.status import Cause, TrainerStatus
 from palaestra_trainer.episodes.evaluation import Episode, Evaluation
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead, SimulatorHung
 from palaestra_trainer.telemetry.progress import Counters, Progress
-from palaestra_trainer.telemetry.status_server import StatusServer
+from palaestra_trainer.telemetry.status_server import status_server
 
 
 @pytest.fixture
@@ -306,7 +306,7 @@ def test_the_success_rate_is_that_of_the_last_evaluation(progress):
 def test_status_is_the_protocol_s(progress):
     """The operator reads it with the same code."""
     progress.saved(50)
-    with StatusServer("127.0.0.1:0", progress) as server:
+    with status_server("127.0.0.1:0", progress) as server:
         answer = json.loads(get(server, "/status"))
 
     assert TrainerStatus.from_json(answer) == progress.status()
@@ -317,7 +317,7 @@ def test_metrics_are_the_same_numbers(progress):
     """Unknown values are absent."""
     progress.collected(7, [{"episode": {"r": 2.0, "l": 3}}])
     progress.fault("collect-0", SimulatorDead("collect-0", "gone"), steps_lost=0)
-    with StatusServer("127.0.0.1:0", progress) as server:
+    with status_server("127.0.0.1:0", progress) as server:
         text = get(server, "/metrics")
 
     assert "palaestra_trainer_steps_total 7.0" in text
@@ -331,7 +331,7 @@ def test_metrics_are_the_same_numbers(progress):
 
 def test_probes_are_answered(progress):
     """Kubernetes asks every few seconds."""
-    with StatusServer("127.0.0.1:0", progress) as server:
+    with status_server("127.0.0.1:0", progress) as server:
         assert get(server, "/healthz") == "ok\n"
         with pytest.raises(urllib.error.HTTPError, match="404"):
             get(server, "/other")
@@ -340,14 +340,14 @@ def test_probes_are_answered(progress):
 def test_a_port_in_use_is_reported_as_such(progress):
     """Two trainers on one laptop."""
     with (
-        StatusServer("127.0.0.1:0", progress) as server,
+        status_server("127.0.0.1:0", progress) as server,
         pytest.raises(ConfigurationError, match=r"statusAddress: 127.0.0.1:\d+ is in use"),
     ):
-        StatusServer(server.address, progress)
+        status_server(str(server.address), progress)
 
 
 @pytest.mark.parametrize("address", ["203.0.113.1:9090", "127.0.0.1:99999", "no.such.host.invalid:1"])
 def test_an_address_that_is_not_ours_is_reported_as_such(progress, address):
     """The message carries the system's own."""
     with pytest.raises(ConfigurationError, match="cannot be listened on"):
-        StatusServer(address, progress)
+        status_server(address, progress)

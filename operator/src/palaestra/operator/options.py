@@ -5,10 +5,12 @@ from dataclasses import dataclass, field
 
 from palaestra.errors import PalaestraError
 from palaestra.plan import Images
+from palaestra_protocol.http import Address
+from palaestra_protocol.numbers import MOST_PORT
 
 DEFAULT_NAMESPACE = "palaestra-system"
 NAME = "palaestra-operator"  # of the Lease, and of the objects of an installation
-MOST_PORT = 65_535
+METRICS_ADDRESS = Address("0.0.0.0", 8080)  # noqa: S104 - the pod's address, for probes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +40,7 @@ class Options:
     workers: int = 4
     resync_s: float = 600.0
     leader_elect: bool = True
-    metrics_address: tuple[str, int] = ("0.0.0.0", 8080)  # noqa: S104 - the pod's address, for probes
+    metrics_address: Address = METRICS_ADDRESS
     node_selector: Mapping[str, str] = field(default_factory=dict)
     allowed_pod_labels: tuple[str, ...] = ()
     allowed_pod_annotations: tuple[str, ...] = ()
@@ -46,8 +48,8 @@ class Options:
     context: str | None = None
 
 
-def address(text: str) -> tuple[str, int]:
-    """Return host and port of `0.0.0.0:8080`.
+def address(text: str) -> Address:
+    """Return the address `0.0.0.0:8080`; its host may be a name.
 
     Raises:
         PalaestraError: the text is no address.
@@ -55,4 +57,4 @@ def address(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     if not host or not port.isdecimal() or int(port) > MOST_PORT:
         raise PalaestraError(f"--metrics-address: {text!r} is no address; write it as 0.0.0.0:8080")
-    return host.removeprefix("[").removesuffix("]"), int(port)
+    return Address(host.removeprefix("[").removesuffix("]"), int(port))

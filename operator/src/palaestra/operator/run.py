@@ -13,12 +13,12 @@ from collections.abc import Collection
 import structlog
 
 from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
+from palaestra.operator import health
 from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
 from palaestra.operator.controller import Controller
 from palaestra.operator.definition import Definition
 from palaestra.operator.denials import Denials
-from palaestra.operator.health import HealthServer
 from palaestra.operator.logs import configure_logs
 from palaestra.operator.looking import Looking
 from palaestra.operator.metrics import Metrics
@@ -82,13 +82,13 @@ class Operator:
             waits=self._caches.waits,
             outdated=lambda: self._definition.outdated,
         )
-        self._server = HealthServer(
+        self._server = health.serving(
             options.metrics_address, healthy=self._unhealthy, ready=self._not_ready, metrics=metrics.text
         )
 
     def run(self, stopping: threading.Event) -> None:
         """Reconcile jobs until `stopping` is set."""
-        log.info("started", namespaces=self._options.namespaces or "all", address=self._server.shown)
+        log.info("started", namespaces=self._options.namespaces or "all", address=str(self._server.address))
         self._definition.follow(stopping, self._options.resync_s)
         self._caches.start()
         self._workers.start()

@@ -10,7 +10,7 @@ simulator    the one owner of the state: takes events in order and carries out t
 process      the only module that starts a process
 keeper       the small program between sidecar and simulator, from which no process can escape
 output       the simulator's output, forwarded line by line
-server       the two listeners: control, and health with metrics and state
+server       the routes of the two ports: control, and health with metrics and state
 families     every metric by name, as data
 metrics      the content of /metrics
 """

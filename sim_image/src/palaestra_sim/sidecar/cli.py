@@ -20,7 +20,7 @@ from palaestra_sim.sidecar.drivers import Driver, Launch, command
 from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
-from palaestra_sim.sidecar.server import Listener, control_routes, health_routes
+from palaestra_sim.sidecar.server import bound, control_routes, health_routes
 from palaestra_sim.sidecar.simulator import Simulator
 from palaestra_sim.world import RunIdentity
 
@@ -54,14 +54,14 @@ def look_after(given: argparse.Namespace) -> int:
     """Run the simulators of these options until a signal asks for the end; return the exit code."""
     try:
         simulators = prepare(given)
-        control = Listener("--control", given.control)
-        health = Listener("--health", given.health)
+        control = bound("--control", given.control, control_routes(simulators))
+        health = bound("--health", given.health, health_routes(simulators, metrics.registry(simulators)))
     except SimError as error:
         sys.stderr.write(f"palaestra-sidecar: {error}\n")
         return EXIT_WRONG
     signals.take(lambda: shut_down(simulators))
-    control.serve(control_routes(simulators))
-    health.serve(health_routes(simulators, metrics.registry(simulators)))
+    control.start()
+    health.start()
     if given.until_stdin_closes:
         threading.Thread(target=end_with_stdin, daemon=True).start()
     log.info("control=%s health=%s", control.address, health.address)

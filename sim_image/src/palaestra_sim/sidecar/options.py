@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from palaestra_protocol.http import Address
 from palaestra_protocol.numbers import whole
 from palaestra_sim.sidecar.drivers import Driver
 from palaestra_sim.sidecar.preparation import located
-from palaestra_sim.sidecar.server import Address
 
 EXIT_WRONG = 2
 

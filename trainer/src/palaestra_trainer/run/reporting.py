@@ -16,7 +16,7 @@ from palaestra_trainer.configuration import CONFIG_VARIABLE, load
 from palaestra_trainer.run.termination import write_last_word
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
-from palaestra_trainer.telemetry.status_server import StatusServer
+from palaestra_trainer.telemetry.status_server import status_server
 
 _lock = threading.Lock()
 
@@ -56,5 +56,5 @@ def _served() -> _Reported:
     """Return the progress of this process; the first call starts the status server."""
     configuration = load()
     progress = _Reported(configuration.steps, [])
-    StatusServer(configuration.status_address, progress, constants(configuration)).start()
+    status_server(configuration.status_address, progress, constants(configuration)).start()
     return progress

@@ -44,7 +44,7 @@ from palaestra_trainer.telemetry.figures import Logged
 from palaestra_trainer.telemetry.logs import last_lines
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
-from palaestra_trainer.telemetry.status_server import StatusServer
+from palaestra_trainer.telemetry.status_server import status_server
 from palaestra_trainer.waiting.interruption import Interruption
 
 log = structlog.get_logger(__name__)
@@ -176,7 +176,7 @@ class Attempt:
         self._algorithm = algorithms.begin_with(configuration, self._directory, before)
         self._take_over(found)  # before the server starts: Prometheus takes a jump of a counter for growth
         known = constants(configuration)
-        stack.enter_context(StatusServer(configuration.status_address, progress, known))
+        stack.enter_context(status_server(configuration.status_address, progress, known))
         stack.enter_context(self._around.display)
         self._begin(found)
         members = self._around.make_members(configuration)

@@ -1,8 +1,8 @@
-"""The addresses that a sidecar listens on."""
+"""The addresses that a server listens on."""
 
 import pytest
 
-from palaestra_sim.sidecar.server import Address
+from palaestra_protocol.http import Address
 
 
 @pytest.mark.parametrize("text", ["127.0.0.1:7100", "0.0.0.0:0", "[::1]:65535"])

@@ -1,0 +1,250 @@
+"""The HTTP server of operator, trainer and sidecar: a table of routes, and a bound for everything.
+
+A connection is one request. It has a deadline, a number of bytes, and a place among a bounded number of
+others; a connection beyond that number is closed at once. A slow or endless request is closed unanswered.
+Errors are JSON, {"error": "<field>: <fact>"}: 404 for a path that is not served, 405 for a method that its
+path does not take, 411 for a POST without Content-Length, 413 for a body that is too long. No request is
+logged: probes and scrapes come every few seconds.
+"""
+
+import io
+import ipaddress
+import json
+import logging
+import socket
+import socketserver
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler
+from types import TracebackType
+from typing import Any, NamedTuple, Self, cast
+
+from palaestra_protocol.numbers import MOST_PORT
+
+MOST_CONNECTIONS = 32
+MOST_REQUEST_BYTES = 2**17  # enough to answer a path of 64 KiB, the longest of http.server, with 414
+MOST_BODY_BYTES = 4096
+DEADLINE_S = 5.0
+_POLL_S = 0.1  # how long `close` takes at most
+
+log = logging.getLogger(__name__)
+
+
+class Address(NamedTuple):
+    """Where a server listens; port 0 takes one that is free."""
+
+    host: str
+    port: int
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the address of `127.0.0.1:7100` or `[::1]:7100`; a host is an IP address.
+
+        Raises:
+            ValueError: it is none, or has no port from 0 to 65535.
+        """
+        host, _, port = text.rpartition(":")
+        bare = host.removeprefix("[").removesuffix("]")
+        try:
+            ipaddress.ip_address(bare)
+            if 0 <= int(port) <= MOST_PORT:
+                return cls(bare, int(port))
+        except ValueError:
+            pass
+        raise ValueError(f"{text!r} is no address such as 127.0.0.1:7100")
+
+    def __str__(self) -> str:
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Response:
+    """An answer: a status, and a body of some type."""
+
+    status: HTTPStatus
+    body: bytes
+    content_type: str
+
+
+Route = Callable[[bytes], Response]  # from the body of a request
+Routes = Mapping[tuple[str, str], Route]  # by method, GET or POST, and path
+
+
+def json_response(status: HTTPStatus, content: Mapping[str, Any]) -> Response:
+    """Return JSON data."""
+    return Response(status=status, body=json.dumps(content).encode() + b"\n", content_type="application/json")
+
+
+def error_response(status: HTTPStatus, fact: str) -> Response:
+    """Return an error, as the server itself writes it."""
+    return json_response(status, {"error": fact})
+
+
+def probe_response(trouble: str | None = None) -> Response:
+    """Return the answer to a probe: "ok", or 503 with what is wrong."""
+    return Response(
+        status=HTTPStatus.OK if trouble is None else HTTPStatus.SERVICE_UNAVAILABLE,
+        body=f"{'ok' if trouble is None else trouble}\n".encode(),
+        content_type="text/plain; charset=utf-8",
+    )
+
+
+class Server(socketserver.ThreadingTCPServer):
+    """One port: bound when made, answering from `start` until `close`.
+
+    Args:
+        address: where to listen.
+        routes: what is served.
+        name: of the program, for the header `Server` and the thread.
+        deadline_s: for reading a request, and again for writing the answer.
+
+    Raises:
+        OSError: the address is in use, or not of this machine.
+    """
+
+    allow_reuse_address = True
+    daemon_threads = True
+    request_queue_size = MOST_CONNECTIONS
+
+    def __init__(
+        self, address: Address, routes: Routes, *, name: str, deadline_s: float = DEADLINE_S
+    ) -> None:
+        self.address_family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+        self.routes = routes
+        self.name = name
+        self.deadline_s = deadline_s
+        self._places = threading.BoundedSemaphore(MOST_CONNECTIONS)
+        self._thread: threading.Thread | None = None
+        super().__init__((address.host, address.port), _Handler)
+
+    @property
+    def address(self) -> Address:
+        """The address on which it listens, with the port that was free."""
+        return Address(*self.socket.getsockname()[:2])
+
+    def start(self) -> None:
+        """Begin to answer, in threads of its own."""
+        self._thread = threading.Thread(
+            target=self.serve_forever, kwargs={"poll_interval": _POLL_S}, name=self.name, daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Accept no more connections and free the address."""
+        if self._thread is not None:
+            self.shutdown()
+            self._thread.join()
+        self.server_close()
+
+    def __enter__(self) -> Self:
+        """Begin to answer."""
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop answering and free the address."""
+        self.close()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give a connection a thread, or close it if too many are open."""
+        if self._places.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer one connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._places.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
+        """Log an error of a route; a client that goes away is none."""
+        error = sys.exception()
+        if not isinstance(error, OSError):
+            log.error("%s: a request failed: %r", self.name, error)
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One request, by the routes of its server."""
+
+    def setup(self) -> None:
+        super().setup()
+        self.rfile.close()
+        self.rfile = io.BufferedReader(_Reader(self.connection, self._server.deadline_s))
+
+    def version_string(self) -> str:
+        return self._server.name
+
+    def do_GET(self) -> None:
+        self._answer(b"")
+
+    def do_POST(self) -> None:
+        length = self.headers.get("Content-Length", "")
+        if not length.isascii() or not length.isdecimal():
+            self._send(error_response(HTTPStatus.LENGTH_REQUIRED, "Content-Length: is missing"))
+        elif len(length) > len(str(MOST_BODY_BYTES)) or int(length) > MOST_BODY_BYTES:
+            fact = f"body: more than {MOST_BODY_BYTES} bytes"
+            self._send(error_response(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, fact))
+        else:
+            self._answer(self.rfile.read(int(length)))
+
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - http.server's signature
+        """Log nothing."""
+
+    @property
+    def _server(self) -> Server:
+        return cast("Server", self.server)
+
+    def _answer(self, body: bytes) -> None:
+        routes, path = self._server.routes, self.path.partition("?")[0]
+        route = routes.get((self.command, path))
+        if route is not None:
+            self._send(route(body))
+        elif any(known == path for _, known in routes):
+            fact = f"{path}: does not take {self.command}"
+            self._send(error_response(HTTPStatus.METHOD_NOT_ALLOWED, fact))
+        else:
+            known = ", ".join(sorted({known for _, known in routes}))
+            self._send(error_response(HTTPStatus.NOT_FOUND, f"path: is not one of {known}"))
+
+    def _send(self, response: Response) -> None:
+        self.connection.settimeout(self._server.deadline_s)
+        self.send_response(response.status)
+        self.send_header("Content-Type", response.content_type)
+        self.send_header("Content-Length", str(len(response.body)))
+        self.end_headers()
+        self.wfile.write(response.body)
+
+
+class _Reader(io.RawIOBase):
+    """Reads a connection until its deadline, and no more than MOST_REQUEST_BYTES."""
+
+    def __init__(self, connection: socket.socket, deadline_s: float) -> None:
+        self._connection = connection
+        self._ends = time.monotonic() + deadline_s
+        self._left = MOST_REQUEST_BYTES
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        wait_s = self._ends - time.monotonic()
+        if wait_s <= 0.0:
+            raise TimeoutError("the request is not complete at its deadline")
+        if self._left <= 0:
+            raise ConnectionAbortedError(f"the request is longer than {MOST_REQUEST_BYTES} bytes")
+        self._connection.settimeout(wait_s)
+        count = self._connection.recv_into(buffer)
+        self._left -= count
+        return count
