@@ -7,7 +7,6 @@ watching.
 import math
 import time
 from collections.abc import Callable
-from typing import Any
 
 from pydantic import ValidationError
 
@@ -18,6 +17,7 @@ from palaestra.client.waiting import News
 from palaestra.cluster import Api, ApiError, NotFound
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import PalaestraError
+from palaestra.objects import Object
 
 PERIOD_S = 2.0
 
@@ -25,7 +25,6 @@ PERIOD_S = 2.0
 SLACK_S = 60
 TTL_S = 3600
 
-Object = dict[str, Any]
 Tell = Callable[[str], None]
 
 
@@ -91,7 +90,8 @@ def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:
 
 def _wait(api: Api, namespace: str, name: str, within_s: float, tell: Tell) -> None:
     ends = time.monotonic() + within_s
-    phase, status, news = "", Object(), News(f"{namespace}/{name}")
+    status: Object = {}
+    phase, news = "", News(f"{namespace}/{name}")
     while phase not in TERMINAL:
         if time.monotonic() > ends:
             raise TrialFailed(f"{namespace}/{name}: {phase} after {within_s:g} s; {_why(status)}")

@@ -18,9 +18,9 @@ from palaestra.client.happenings import Happening, happenings
 from palaestra.client.reading import current, why
 from palaestra.client.waiting import News
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
-from palaestra.cluster.api import Object
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import SpecErrors
+from palaestra.objects import Object
 from palaestra.plan import ClusterLayout, Images
 from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica
 

@@ -23,8 +23,8 @@ from palaestra.client.errors import ClientError, NotFetched, TookTooLong
 from palaestra.client.following import changes
 from palaestra.client.reading_pod import CONTAINER, reading_pod, run_directory
 from palaestra.cluster import Api, ApiError, CommandFailed, NotFound, Unreachable
-from palaestra.cluster.api import Object
 from palaestra.cluster.resources import JOBS, PODS
+from palaestra.objects import Object
 from palaestra.plan.replica import TRAINER
 
 PARTS = (

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from palaestra.client.errors import TookTooLong
 from palaestra.cluster import Api, ApiError, Resource
-from palaestra.cluster.api import Object
+from palaestra.objects import Object
 
 LONGEST_WATCH_S = 300.0
 DELETED, BOOKMARK = "DELETED", "BOOKMARK"

@@ -14,8 +14,8 @@ from palaestra.cluster.lines import lines
 from palaestra.cluster.resources import PODS, Resource, of
 from palaestra.cluster.transport import JSON, Call, OnRequest, Transport
 from palaestra.cluster.watching import Watch
+from palaestra.objects import Object
 
-Object = dict[str, Any]
 Objects = list[Object]
 PAGE = 500
 MANAGER = "palaestra-operator"
@@ -141,7 +141,7 @@ class Api:
         """
         query = {"limit": str(limit), "labelSelector": labels, "fieldSelector": fields, "continue": None}
         while True:
-            answer = self._object(_call("list", resource, namespace, query=query))
+            answer = dict(self._object(_call("list", resource, namespace, query=query)))
             metadata = answer.get("metadata") or {}
             items = tuple(_complete(resource, item) for item in answer.pop("items", None) or ())
             yield Page(items=items, version=str(metadata.get("resourceVersion", "")))
@@ -174,7 +174,7 @@ class Api:
         call = _call("get" if name else "list", resource, namespace, name, query={"labelSelector": labels})
         return self._object(replace(call, accept=TABLE))
 
-    def create(self, resource: Resource, obj: Mapping[str, Any], *, dry_run: bool = False) -> Object:
+    def create(self, resource: Resource, obj: Object, *, dry_run: bool = False) -> Object:
         """Create an object in the namespace that it names, and return it as stored.
 
         With `dry_run` the API server does all its checks, admission included, and stores nothing.
@@ -193,7 +193,7 @@ class Api:
         resource: Resource,
         namespace: str | None,
         name: str,
-        patch: Mapping[str, Any],
+        patch: Object,
         *,
         subresource: str | None = None,
         resource_version: str | None = None,
@@ -212,7 +212,7 @@ class Api:
         call = _call("patch", resource, namespace, name, subresource=subresource)
         return self._object(call.sending(patch, method="PATCH", media_type=MERGE_PATCH))
 
-    def apply(self, obj: Mapping[str, Any], *, manager: str = MANAGER, force: bool = True) -> Object:
+    def apply(self, obj: Object, *, manager: str = MANAGER, force: bool = True) -> Object:
         """Apply the fields in `obj` (server-side apply), and return the object as stored.
 
         Fields that the same manager applied before and that `obj` leaves out are removed.
@@ -244,7 +244,11 @@ class Api:
             NotFound: there is none.
             Conflict: the object of this name has another uid or version.
         """
-        options: Object = {"kind": "DeleteOptions", "apiVersion": "v1", "propagationPolicy": propagation}
+        options: dict[str, Any] = {
+            "kind": "DeleteOptions",
+            "apiVersion": "v1",
+            "propagationPolicy": propagation,
+        }
         wanted = {"uid": uid, "resourceVersion": resource_version}
         if preconditions := {name: value for name, value in wanted.items() if value is not None}:
             options["preconditions"] = preconditions
@@ -377,7 +381,7 @@ def _call(
     return Call(verb=verb, plural=resource.plural, path=path, query=query or {}, accept=accept)
 
 
-def _namespace(obj: Mapping[str, Any]) -> str | None:
+def _namespace(obj: Object) -> str | None:
     namespace: str | None = obj["metadata"].get("namespace")
     return namespace
 

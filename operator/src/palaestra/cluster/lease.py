@@ -18,6 +18,7 @@ from palaestra.cluster.api import Api
 from palaestra.cluster.errors import AlreadyExists, ApiError, Conflict, NotFound
 from palaestra.cluster.resources import LEASES
 from palaestra.cluster.tenure import Claim, Sighting, Tenure
+from palaestra.objects import Object
 
 log = structlog.get_logger("palaestra.cluster")
 
@@ -166,7 +167,7 @@ class Leadership:
             "renewTime": _now(),
         }
 
-    def _hold(self, sent: float, written: dict[str, Any]) -> None:
+    def _hold(self, sent: float, written: Object) -> None:
         first = self._tenure is None
         self._terms += first
         self._version = str(written["metadata"]["resourceVersion"])

@@ -15,7 +15,7 @@ from typing import Generic, TypeVar
 
 from palaestra.cluster.backoff import Backoff
 
-Key = TypeVar("Key", bound=Hashable)
+Item = TypeVar("Item", bound=Hashable)
 RETRY = Backoff(first_s=0.1, cap_s=60.0)  # with its jitter: 0.05 s to 60 s
 
 
@@ -23,7 +23,7 @@ def _nobody(seconds: float) -> None:
     del seconds
 
 
-class WorkQueue(Generic[Key]):
+class WorkQueue(Generic[Item]):
     """A deduplicating queue with delays; safe to use from several threads.
 
     Args:
@@ -43,12 +43,12 @@ class WorkQueue(Generic[Key]):
         self._waited = waited
         self._clock = clock
         self._changed = threading.Condition()
-        self._ready: deque[Key] = deque()
-        self._since: dict[Key, float] = {}  # names that wait for a worker, also if one has them now
-        self._working: set[Key] = set()
-        self._later: list[tuple[float, int, Key]] = []
-        self._due: dict[Key, float] = {}
-        self._failures: dict[Key, int] = {}
+        self._ready: deque[Item] = deque()
+        self._since: dict[Item, float] = {}  # names that wait for a worker, also if one has them now
+        self._working: set[Item] = set()
+        self._later: list[tuple[float, int, Item]] = []
+        self._due: dict[Item, float] = {}
+        self._failures: dict[Item, int] = {}
         self._order = itertools.count()  # orders entries of the same moment
         self._closed = False
 
@@ -64,13 +64,13 @@ class WorkQueue(Generic[Key]):
         """Return whether `close` was called; then no name is handed out."""
         return self._closed
 
-    def add(self, key: Key) -> None:
+    def add(self, key: Item) -> None:
         """Ask for work on a name as soon as a worker is free."""
         with self._changed:
             self._add(key, self._clock())
             self._changed.notify_all()
 
-    def add_after(self, key: Key, seconds: float) -> None:
+    def add_after(self, key: Item, seconds: float) -> None:
         """Ask for work on a name after `seconds`; of several such requests the earliest counts."""
         with self._changed:
             due = self._clock() + seconds
@@ -79,7 +79,7 @@ class WorkQueue(Generic[Key]):
                 heapq.heappush(self._later, (due, next(self._order), key))
                 self._changed.notify_all()
 
-    def retry(self, key: Key) -> float:
+    def retry(self, key: Item) -> float:
         """Ask for work on a name that failed, later after each failure; return the seconds until then."""
         with self._changed:
             self._failures[key] = self._failures.get(key, 0) + 1
@@ -87,17 +87,17 @@ class WorkQueue(Generic[Key]):
         self.add_after(key, wait_s)
         return wait_s
 
-    def failures(self, key: Key) -> int:
+    def failures(self, key: Item) -> int:
         """Return how often in a row work on a name has failed."""
         with self._changed:
             return self._failures.get(key, 0)
 
-    def forget(self, key: Key) -> None:
+    def forget(self, key: Item) -> None:
         """Reset the failures of a name whose work succeeded."""
         with self._changed:
             self._failures.pop(key, None)
 
-    def get(self, deadline_s: float) -> Key | None:
+    def get(self, deadline_s: float) -> Item | None:
         """Return a name to work on, then call `done`; None after `deadline_s`, or if the queue is closed."""
         with self._changed:
             ends = self._clock() + deadline_s
@@ -111,7 +111,7 @@ class WorkQueue(Generic[Key]):
                 self._changed.wait(min([ends, *(due for due, _, _ in self._later[:1])]) - now)
             return None
 
-    def done(self, key: Key) -> None:
+    def done(self, key: Item) -> None:
         """End a worker's work on a name; it is handed out again if it was added meanwhile."""
         with self._changed:
             self._working.discard(key)
@@ -125,14 +125,14 @@ class WorkQueue(Generic[Key]):
             self._closed = True
             self._changed.notify_all()
 
-    def _add(self, key: Key, now: float) -> None:
+    def _add(self, key: Item, now: float) -> None:
         if key in self._since:
             return
         self._since[key] = now
         if key not in self._working:
             self._ready.append(key)
 
-    def _take(self, now: float) -> Key:
+    def _take(self, now: float) -> Item:
         key = self._ready.popleft()
         self._waited(now - self._since.pop(key))
         self._working.add(key)

@@ -9,7 +9,6 @@ namespace is being deleted, it raises instead, because the log would have a line
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
@@ -18,6 +17,7 @@ import structlog
 from palaestra.cluster.api import Api
 from palaestra.cluster.errors import AlreadyExists, ApiError, NamespaceTerminating, NotFound
 from palaestra.cluster.resources import EVENTS
+from palaestra.objects import Object
 
 log = structlog.get_logger("palaestra.cluster")
 
@@ -44,9 +44,7 @@ class Recorder:
         self._lock = threading.Lock()
         self._counts: OrderedDict[str, int] = OrderedDict()
 
-    def record(
-        self, obj: Mapping[str, Any], kind: str, reason: str, message: str, *, once: bool = False
-    ) -> None:
+    def record(self, obj: Object, kind: str, reason: str, message: str, *, once: bool = False) -> None:
         """Write an event about an object.
 
         Args:
@@ -102,7 +100,7 @@ class Recorder:
             while len(self._counts) > REMEMBERED:
                 self._counts.popitem(last=False)
 
-    def _event(self, obj: Mapping[str, Any], kind: str, reason: str, message: str) -> dict[str, Any]:
+    def _event(self, obj: Object, kind: str, reason: str, message: str) -> dict[str, Any]:
         metadata = obj["metadata"]
         name, uid = str(metadata["name"]), str(metadata.get("uid", ""))
         namespace = str(metadata.get("namespace") or "default")  # the namespace of events about nodes

@@ -10,20 +10,20 @@ import random
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
 
 import structlog
 
 from palaestra.cluster.api import Api, Page
 from palaestra.cluster.errors import ApiError, Gone
 from palaestra.cluster.resources import Resource
-from palaestra.cluster.store import Key, Store, key_of
+from palaestra.cluster.store import Store, key_of
 from palaestra.cluster.watching import Watch
+from palaestra.objects import Key, Object
 
 log = structlog.get_logger("palaestra.cluster")
 
-Keep = Callable[[dict[str, Any]], dict[str, Any]]
-Changed = Callable[[dict[str, Any]], None]
+Keep = Callable[[Object], Object]
+Changed = Callable[[Object], None]
 
 
 class Reflector:
@@ -153,7 +153,7 @@ class Reflector:
             self._heard = True
             self._take(event["type"], event["object"])
 
-    def _take(self, kind: str, obj: dict[str, Any]) -> None:
+    def _take(self, kind: str, obj: Object) -> None:
         self._version = str(obj["metadata"]["resourceVersion"])
         if kind in ("ADDED", "MODIFIED"):
             api_version = {"apiVersion": self._resource.api_version, "kind": self._resource.kind}
@@ -161,7 +161,7 @@ class Reflector:
         elif kind == "DELETED":
             self._drop(key_of(obj))
 
-    def _put(self, obj: dict[str, Any]) -> None:
+    def _put(self, obj: Object) -> None:
         try:
             kept = self._keep(obj)
             before = self.store.relabelled(kept)

@@ -1,9 +1,9 @@
 """The kinds of objects that the operator reads or writes, and their addresses at the API server."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 from urllib.parse import quote
+
+from palaestra.objects import Object
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +112,7 @@ ALL: tuple[Resource, ...] = (
 _BY_KIND = {(resource.api_version, resource.kind): resource for resource in ALL}
 
 
-def of(obj: Mapping[str, Any]) -> Resource:
+def of(obj: Object) -> Resource:
     """Return the resource of an object, by its apiVersion and kind.
 
     Raises:

@@ -10,13 +10,12 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+
+from palaestra.objects import Key, Object
 
 JOB_LABEL = "palaestra.dev/job"  # the label by which children are looked up
 
 FASTEST = 1  # of zlib: 50 µs for 5 kB, which it makes 1.4 kB
-
-Key = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +39,7 @@ class Store:
         with self._lock:
             return sum(map(len, self._kept.values()))
 
-    def get(self, namespace: str | None, name: str) -> dict[str, Any] | None:
+    def get(self, namespace: str | None, name: str) -> Object | None:
         """Return a copy of one object, or None; namespace None or "" for cluster-scoped kinds."""
         with self._lock:
             kept = self._kept.get(namespace or "", {}).get(name)
@@ -51,7 +50,7 @@ class Store:
         with self._lock:
             return name in self._kept.get(namespace, {})
 
-    def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[dict[str, Any]]:
+    def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
         """Return copies of all objects with these labels, in the order of their names.
 
         Args:
@@ -73,7 +72,7 @@ class Store:
         with self._lock:
             return {(namespace, name) for namespace, kept in self._kept.items() for name in kept}
 
-    def put(self, obj: Mapping[str, Any]) -> bool:
+    def put(self, obj: Object) -> bool:
         """Store an object in place of the one of its name; return whether they differ."""
         namespace, name = key_of(obj)
         labels = obj["metadata"].get("labels") or {}
@@ -88,7 +87,7 @@ class Store:
                 self._labelled[namespace, kept.labels[self._index]].add(name)
             return True
 
-    def relabelled(self, obj: Mapping[str, Any]) -> dict[str, Any] | None:
+    def relabelled(self, obj: Object) -> Object | None:
         """Return a copy of the stored object of this name, if its label `palaestra.dev/job` is another."""
         namespace, name = key_of(obj)
         label = (obj["metadata"].get("labels") or {}).get(self._index)
@@ -96,7 +95,7 @@ class Store:
             kept = self._kept.get(namespace, {}).get(name)
         return _object(kept.text) if kept and kept.labels.get(self._index) != label else None
 
-    def drop(self, namespace: str, name: str) -> dict[str, Any] | None:
+    def drop(self, namespace: str, name: str) -> Object | None:
         """Remove an object and return its last copy; None if there was none."""
         with self._lock:
             kept = self._forget(namespace, name)
@@ -122,16 +121,16 @@ class Store:
         return kept
 
 
-def key_of(obj: Mapping[str, Any]) -> Key:
+def key_of(obj: Object) -> Key:
     """Return (namespace, name) of an object; namespace is "" for cluster-scoped kinds."""
     return str(obj["metadata"].get("namespace") or ""), str(obj["metadata"]["name"])
 
 
-def _text(obj: Mapping[str, Any]) -> bytes:
+def _text(obj: Object) -> bytes:
     text = json.dumps(obj, separators=(",", ":"), sort_keys=True)  # equal objects, equal text
     return zlib.compress(text.encode(), FASTEST)
 
 
-def _object(text: bytes) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(zlib.decompress(text))
+def _object(text: bytes) -> Object:
+    found: Object = json.loads(zlib.decompress(text))
     return found

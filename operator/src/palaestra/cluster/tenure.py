@@ -6,9 +6,9 @@ moment when it *sent* the renewal, which is before the write, and stops at two t
 before another starts, unless one clock runs at two thirds of the other's speed.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+
+from palaestra.objects import Object
 
 SHARE = 2 / 3  # of a lease's duration, for its leader; the rest is for writes that are in flight
 
@@ -30,7 +30,7 @@ class Claim:
     transitions: int = 0
 
     @classmethod
-    def read(cls, lease: Mapping[str, Any]) -> "Claim":
+    def read(cls, lease: Object) -> "Claim":
         """Return the claim in a Lease object; an absent field is "" or 0."""
         spec = lease.get("spec") or {}
         return cls(

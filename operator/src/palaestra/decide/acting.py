@@ -8,8 +8,9 @@ from palaestra.decide.decision import Action, Basis, Create, Discard, Replace, S
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.replicas import Decided
 from palaestra.decide.suspending import mark, to_resume, to_set
+from palaestra.objects import Object
 from palaestra.observe.views import JobView, Observed, PodView, ReplicaObserved
-from palaestra.plan import Object, Plan, ReplicaPlan
+from palaestra.plan import Plan, ReplicaPlan
 
 
 def actions(

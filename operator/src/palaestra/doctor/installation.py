@@ -7,10 +7,10 @@ from importlib.metadata import version
 from palaestra.client.errors import TookTooLong
 from palaestra.client.following import changes
 from palaestra.cluster import ApiError, Forbidden, NotFound
-from palaestra.cluster.api import Object
 from palaestra.cluster.resources import DEPLOYMENTS, LEASES, PODS, WORKLOADS
 from palaestra.doctor.finding import Finding, Site, right, unknown, warning, wrong
 from palaestra.doctor.rights import OPERATOR, OPERATOR_WITH_KUEUE, Account, missing
+from palaestra.objects import Object
 from palaestra.operator.options import NAME
 from palaestra.plan import Images
 from palaestra.plan.network_policy import OPERATOR_LABEL

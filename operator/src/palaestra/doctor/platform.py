@@ -13,14 +13,13 @@ from palaestra.cluster import Forbidden, Invalid, NotFound
 from palaestra.cluster.resources import DEFINITIONS, NAMESPACES, NODES, PODS, STORAGE_CLASSES
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
 from palaestra.doctor.installation import trainer_image
+from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
 
 FIRST = (1, 33)
 DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"
 NO_ROOM = "exceeded quota"
-
-Object = dict[str, Any]
 
 
 def answers(site: Site) -> Iterator[Finding]:

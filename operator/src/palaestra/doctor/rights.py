@@ -6,9 +6,9 @@ The table of the operator's rights is compared with the installed role by a test
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from palaestra.cluster.api import Object
 from palaestra.cluster.resources import OWN_RIGHTS, RIGHTS
 from palaestra.doctor.finding import Finding, Site, right, unknown, wrong
+from palaestra.objects import Object
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,25 +4,21 @@ An action can be repeated safely: names are deterministic, so the API server ref
 same name. If an action fails, those of other replicas are still done.
 """
 
-from collections.abc import Mapping
 from http import HTTPStatus
-from typing import Any
 
 import structlog
 
 from palaestra.cluster import AlreadyExists, Api, ApiError, Conflict, NotFound
 from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, TRAINING_JOBS, of
 from palaestra.decide import Action, Create, Delete, Discard, Replace, SetSuspend, Stop
+from palaestra.objects import Key, Object
 from palaestra.observe.reading import owners
 from palaestra.operator.confirming import Outdated, confirm
 from palaestra.operator.denials import Denials, Denied
-from palaestra.operator.poller import Key
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.writing import Writer
 
 log = structlog.get_logger(__name__)
-
-Object = Mapping[str, Any]
 
 
 class Acting:

@@ -7,19 +7,16 @@ so their requests and their memory are separate from those for Jobs whose pods a
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from palaestra.cluster import Api, Forbidden, NotFound
 from palaestra.cluster.resources import WORKLOADS
+from palaestra.objects import Key, Object
 from palaestra.observe import why_not_admitted
 from palaestra.operator.asking import Answers, Asking
-from palaestra.operator.poller import Key
 from palaestra.operator.refusals import is_suspended, podless
 from palaestra.plan.job import QUEUE_LABEL
 
 JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # of a Workload; Kueue's pkg/controller/constants/constants.go
-
-Object = dict[str, Any]
 
 
 class Admissions(Asking[str, str]):

@@ -11,8 +11,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from palaestra.objects import Key
 from palaestra.operator.memory import Item, Memory
-from palaestra.operator.poller import Key
 
 PATIENCE_S = 5.0  # before the first request about an object
 RECHECK_S = 15.0  # between the first two requests about an object; each pause is twice the one before

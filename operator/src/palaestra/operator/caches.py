@@ -7,7 +7,6 @@ memory does not grow with other workloads of the cluster.
 import time
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
-from typing import Any
 
 from palaestra.api.status import Phase
 from palaestra.cluster import Api, Resource
@@ -19,15 +18,14 @@ from palaestra.cluster.resources import (
     PODS,
     TRAINING_JOBS,
 )
+from palaestra.objects import Key, Object
 from palaestra.observe import trimmed
 from palaestra.operator.following import Followed
-from palaestra.operator.poller import Key
 from palaestra.operator.schedule import Target
 from palaestra.operator.trainers import Trainers
 from palaestra.operator.waiting import waits
 from palaestra.plan.replica import JOB_LABEL
 
-Object = dict[str, Any]
 Changed = Callable[[Key], None]
 
 CHILDREN = (JOBS, PODS, CLAIMS, CONFIG_MAPS.only_metadata(), NETWORK_POLICIES)

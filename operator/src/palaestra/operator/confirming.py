@@ -5,17 +5,15 @@ and the write fails on a precondition of the write: the uid and the resourceVers
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from palaestra.cluster import Api, NotFound
 from palaestra.cluster.resources import JOBS, PODS, TRAINING_JOBS, of
 from palaestra.decide import Action, Create, Replace, Stop
 from palaestra.errors import PalaestraError
+from palaestra.objects import Object
 from palaestra.observe.pods import claims
 from palaestra.observe.reading import owners, part
 from palaestra.plan.replica import JOB_LABEL, REPLICA_LABEL, UID_LABEL
-
-Object = Mapping[str, Any]
 
 
 class Outdated(PalaestraError):

@@ -6,10 +6,9 @@ actions and status; no object is built here.
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any
 
 import structlog
 
@@ -28,19 +27,17 @@ from palaestra.decide import (
     reject,
     wants_whole,
 )
+from palaestra.objects import Key, Object
 from palaestra.observe import lacking, trimmed
 from palaestra.observe.reading import part
 from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
 from palaestra.operator.looking import Looking, Seen, earliest
-from palaestra.operator.poller import Key
 from palaestra.operator.records import Records
 from palaestra.operator.telling import StatusWrite, Telling
 from palaestra.plan import ClusterLayout
 
 log = structlog.get_logger(__name__)
-
-Object = Mapping[str, Any]
 
 
 def now(record: Record) -> Times:

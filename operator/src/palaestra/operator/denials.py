@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 from palaestra.api.lines import one_line
 from palaestra.cluster import ApiError, ServerError, TooManyRequests
+from palaestra.objects import Key
 from palaestra.observe.reading import MOST_TEXT
 from palaestra.operator.memory import Memory
-from palaestra.operator.poller import Key
 
 Denied = Mapping[int | None, ApiError]  # by replica; None: of the whole job
 

@@ -5,13 +5,10 @@ If the operator watches only some namespaces, each has a reflector of its own, b
 
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from palaestra.cluster import Api, Reflector, Resource
 from palaestra.cluster.reflector import Changed, Keep
-
-Object = dict[str, Any]
-Key = tuple[str, str]
+from palaestra.objects import Key, Object
 
 
 class Followed:

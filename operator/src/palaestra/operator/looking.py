@@ -23,12 +23,12 @@ from palaestra.cluster.resources import (
     TRAINING_JOBS,
 )
 from palaestra.decide import complete, resuming
+from palaestra.objects import Key
 from palaestra.observe import Objects, Observed, Polled, Raw, Source, SourceKind, observe, references, whole
 from palaestra.operator.admissions import Admissions
 from palaestra.operator.caches import Caches
 from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denials
-from palaestra.operator.poller import Key
 from palaestra.operator.refusals import Refusals
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.switchers import Switchers

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Hashable, Mapping
 from typing import Generic, TypeVar
 
-from palaestra.operator.poller import Key
+from palaestra.objects import Key
 
 REMEMBERED = 4000  # objects, of all jobs together, with a message each
 

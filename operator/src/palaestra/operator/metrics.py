@@ -1,10 +1,10 @@
 """The operator's metrics about itself and its jobs; the names are in `palaestra.operator.families`."""
 
 from collections import Counter as Count
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from importlib.metadata import version
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from prometheus_client import (
     CollectorRegistry,
@@ -19,10 +19,10 @@ from prometheus_client.registry import Collector
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import TERMINAL, ConditionType, Phase
+from palaestra.objects import Object
 from palaestra.operator import families
 from palaestra_protocol.metrics import Family, Values
 
-Object = Mapping[str, Any]
 Counted = TypeVar("Counted", Counter, Histogram)
 
 # Otherwise each counter has a second, unused series.

@@ -16,6 +16,7 @@ from types import MappingProxyType
 
 import structlog
 
+from palaestra.objects import Key
 from palaestra.observe import Polled
 from palaestra.operator.schedule import Entry, Schedule, Standing, Target
 from palaestra_protocol.pod.status import ProtocolError, TrainerStatus, decoded
@@ -29,8 +30,6 @@ MOST_HEAD_BYTES = 8192
 REQUEST = "GET /status HTTP/1.0\r\nHost: {host}\r\nAccept: application/json\r\n\r\n"
 
 log = structlog.get_logger(__name__)
-
-Key = tuple[str, str]  # namespace and name of a TrainingJob
 
 
 class Poller:

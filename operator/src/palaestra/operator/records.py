@@ -3,7 +3,7 @@
 import threading
 
 from palaestra.decide import Record
-from palaestra.operator.poller import Key
+from palaestra.objects import Key
 
 
 class Records:

@@ -6,16 +6,14 @@ Only events report this, and a watch of all events in a cluster is expensive. So
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 from palaestra.cluster import Api
 from palaestra.cluster.resources import EVENTS
+from palaestra.objects import Key, Object
 from palaestra.observe import last_refusal
 from palaestra.observe.reading import holds, owners
 from palaestra.operator.asking import Answers, Asking
-from palaestra.operator.poller import Key
 
-Object = dict[str, Any]
 Lacking = tuple[str, str]  # uid of a Job or pod, and a selector of the events with the reason
 
 

@@ -13,6 +13,7 @@ from collections.abc import Collection
 import structlog
 
 from palaestra.cluster import Api, Leadership, Recorder, WorkQueue, connect
+from palaestra.objects import Key
 from palaestra.operator import health
 from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
@@ -23,7 +24,7 @@ from palaestra.operator.logs import configure_logs
 from palaestra.operator.looking import Looking
 from palaestra.operator.metrics import Metrics
 from palaestra.operator.options import NAME, Options
-from palaestra.operator.poller import Key, Poller
+from palaestra.operator.poller import Poller
 from palaestra.operator.schedule import Target
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.telling import Telling

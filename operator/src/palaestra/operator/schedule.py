@@ -11,9 +11,9 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 
-FIRST_S = 1.0  # within which a new trainer is polled for the first time
+from palaestra.objects import Key
 
-Key = tuple[str, str]  # namespace and name of a TrainingJob
+FIRST_S = 1.0  # within which a new trainer is polled for the first time
 
 
 class Standing(Enum):

@@ -6,17 +6,14 @@ because its name is taken. It reads that Job again every few seconds until it is
 
 import time
 from collections.abc import Callable, Collection
-from typing import Any
 
 from palaestra.cluster import Api, NotFound
 from palaestra.cluster.resources import JOBS
+from palaestra.objects import Key, Object
 from palaestra.observe import trimmed
 from palaestra.operator.memory import Memory
-from palaestra.operator.poller import Key
 
 RECHECK_S = 10.0
-
-Object = dict[str, Any]
 
 
 class Strangers(Memory[str, tuple[float, Object]]):

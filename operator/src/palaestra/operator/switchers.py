@@ -10,12 +10,12 @@ from palaestra.api import TrainingJob
 from palaestra.cluster import Api, NotFound
 from palaestra.cluster.resources import JOBS
 from palaestra.decide.suspending import overruled
+from palaestra.objects import Key
 from palaestra.observe import Raw
 from palaestra.observe.jobs import job_view
 from palaestra.observe.managers import suspends
 from palaestra.observe.reading import count, owners
 from palaestra.operator.memory import Memory
-from palaestra.operator.poller import Key
 
 Change = tuple[str, int]  # uid and generation of a Job
 

@@ -5,19 +5,18 @@ Progress alone is written rarely; conditions and phases at once.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from palaestra.api.reasons import Reason
 from palaestra.cluster import NotFound, Recorder
 from palaestra.decide import Decision, Happening, as_data, fitted, write_in_s
+from palaestra.objects import Key, Object
 from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denied
-from palaestra.operator.poller import Key
 from palaestra.operator.writing import Writer, difference
 
-Object = Mapping[str, Any]
 Written = Callable[[Object, Object], None]
 Accepted = Callable[[Any, dict[str, Any]], dict[str, Any]]
 

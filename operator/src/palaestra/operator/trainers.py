@@ -5,16 +5,13 @@ the address and the owners of a pod are kept.
 """
 
 import ipaddress
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
+from palaestra.objects import Key, Object
 from palaestra.observe.reading import owners, part, parts, text
-from palaestra.operator.schedule import Key, Target
+from palaestra.operator.schedule import Target
 from palaestra.plan.layout import STATUS_PORT
 from palaestra.plan.replica import JOB_LABEL, TRAINER
-
-Object = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

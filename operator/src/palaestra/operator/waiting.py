@@ -1,16 +1,14 @@
 """The reasons for which the replicas of a TrainingJob wait, from its status, for a metric."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from palaestra.api.reasons import WAITING
 from palaestra.api.status import Phase
+from palaestra.objects import Object
 from palaestra.observe.reading import count, parts, text
 
 _WORDS = frozenset(reason.value for reason in WAITING)
 
 
-def waits(job: Mapping[str, Any]) -> tuple[str, ...]:
+def waits(job: Object) -> tuple[str, ...]:
     """Return the reason of each replica that waits, or that runs without a step so far."""
     return tuple(
         text(each, "reason")
@@ -19,6 +17,6 @@ def waits(job: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _before_training(replica: Mapping[str, Any]) -> bool:
+def _before_training(replica: Object) -> bool:
     phase = text(replica, "phase")
     return phase == Phase.PENDING or (phase == Phase.RUNNING and count(replica, "step") == 0)

@@ -12,8 +12,8 @@ import structlog
 from prometheus_client import Histogram
 
 from palaestra.cluster import ApiError, Conflict, WorkQueue
+from palaestra.objects import Key
 from palaestra.operator.confirming import Outdated
-from palaestra.operator.poller import Key
 from palaestra.operator.writing import NotLeading
 
 IDLE_S = 1.0  # between two checks whether to stop

@@ -11,8 +11,7 @@ from typing import Any
 from palaestra.cluster import Api, Resource
 from palaestra.cluster.resources import TRAINING_JOBS, of
 from palaestra.errors import PalaestraError
-
-Object = Mapping[str, Any]
+from palaestra.objects import Object
 
 
 class NotLeading(PalaestraError):

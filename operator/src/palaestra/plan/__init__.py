@@ -8,9 +8,9 @@ has its whole plan recorded in tests/golden/, as a cluster gets it and as a lapt
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from palaestra.api import TrainingJob
+from palaestra.objects import Object
 from palaestra.plan.claim import claim
 from palaestra.plan.config_map import config_map
 from palaestra.plan.errors import PlanError
@@ -27,7 +27,6 @@ __all__ = [
     "Images",
     "Layout",
     "LocalLayout",
-    "Object",
     "Places",
     "Plan",
     "PlanError",
@@ -37,7 +36,6 @@ __all__ = [
     "plan",
 ]
 
-Object = Mapping[str, Any]  # a Kubernetes object, as in JSON
 Mounted = Mapping[int, Collection[str]]  # replica -> names of the volumes that its Job mounts; none: no Job
 
 
