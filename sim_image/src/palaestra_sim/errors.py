@@ -7,9 +7,9 @@
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
     ├── SidecarError            the sidecar cannot run as asked (sidecar.errors)
     ├── FaultError              the description of a fault is wrong (stub.faults.language)
-    ├── NoSuchHandleError       this load of the world has no such node (stub.nodes)
+    ├── NoSuchHandleError       this load of the world has no such node (stub.tree)
     ├── NoValueError            a field has no such value (stub.fields)
-    └── UnsimulatedError        Webots does it, the stub does not (stub.effects)
+    └── UnsimulatedError        Webots does it, the stub does not (stub.seam)
 
 A message names the place, the fact and the remedy.
 """

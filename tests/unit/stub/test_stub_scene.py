@@ -6,6 +6,7 @@ import pickle
 import pytest
 
 from palaestra_sim.errors import WorldError, WorldRefusedError
+from palaestra_sim.stub.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene import read_scene
 from palaestra_sim.stub.simulation import Simulation
 from palaestra_sim.world import builtin, parse
@@ -33,14 +34,14 @@ def test_the_shipped_arena_is_read_whole():
     assert scene.basic_step_ms == 32
     assert robot.name == "robotino"
     assert robot.body.radius == pytest.approx(0.2286)
-    assert len(robot.devices.of_distance()) == 9
+    assert len(robot.devices.of(DISTANCE_SENSOR)) == 9
 
 
 def test_rays_sit_on_the_rim_and_count_counter_clockwise():
     """ir1 is the front, ir2 at 40 degrees."""
     (robot,) = scene_of(builtin("arena")).robots
 
-    azimuths = [math.degrees(math.atan2(it.ray[3], it.ray[2])) for it in robot.devices.of_distance()]
+    azimuths = [math.degrees(math.atan2(it.ray[3], it.ray[2])) for it in robot.devices.of(DISTANCE_SENSOR)]
 
     assert azimuths == pytest.approx([0, 40, 80, 120, 160, -160, -120, -80, -40], abs=0.1)
 

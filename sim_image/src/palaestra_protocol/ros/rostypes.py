@@ -114,6 +114,19 @@ def service_type(name: str) -> ServiceType:
     return ServiceType(name, md5, _codec(spec.request), _codec(spec.response))
 
 
+@cache
+def last_field(name: str) -> struct.Struct | None:
+    """Return the layout of the last field of the message type `package/Name`; None if it is not of numbers.
+
+    Raises:
+        KeyError: `definitions.txt` has no such message.
+    """
+    type_ = message_spec(name).types[-1]
+    record = _record_of(type_) if is_defined(type_) else None
+    codes = _STRUCT_CODES.get(type_, "") if record is None else record.codes
+    return struct.Struct(f"<{codes}") if codes else None
+
+
 def _codec(spec: Any) -> Codec:
     record = _record(spec)
     return _StructCodec(record) if record and record.codes else _GenpyCodec(spec)

@@ -1,8 +1,8 @@
-"""What a supervisor may ask about node types: their numbers, their fields, what each field holds.
+"""Node types as a supervisor sees them: their numbers, their fields, the type of each field.
 
 Numbers are those of webots/nodes.h, fields and defaults those of resources/nodes/*.wrl, R2023b.
-Only types that the stub's worlds are made of are listed; a field that is not listed is known where
-a world sets it, with the type that its value shows.
+Only the types of the stub's worlds are listed, those of devices in `devices`. A field that is not listed is
+known where a world sets it, with the type that its value shows.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final, NamedTuple
 
+from palaestra_sim.stub.devices import DEVICES
 from palaestra_sim.world import Node, Value
 
 
@@ -123,19 +124,6 @@ _FIELDS: Final = {
         customData SFString; supervisor SFBool FALSE; synchronization SFBool TRUE; battery MFFloat;
         cpuConsumption SFFloat 10; selfCollision SFBool FALSE; window SFString <generic>;
         remoteControl SFString <none>""",
-    "DistanceSensor": f"""{_SOLID};
-        name SFString distance sensor; lookupTable MFVec3f 0 0 0 0.1 1000 0; type SFString generic;
-        numberOfRays SFInt32 1; aperture SFFloat 1.5708; gaussianWidth SFFloat 1;
-        resolution SFFloat -1; redColorSensitivity SFFloat 1""",
-    "TouchSensor": f"""{_SOLID};
-        name SFString touch sensor; type SFString bumper;
-        lookupTable MFVec3f 0 0 0 5000 50000 0; resolution SFFloat -1""",
-    "RotationalMotor": """
-        name SFString rotational motor; acceleration SFFloat -1; consumptionFactor SFFloat 10;
-        controlPID SFVec3f 10 0 0; maxVelocity SFFloat 10; minPosition SFFloat 0;
-        maxPosition SFFloat 0; maxTorque SFFloat 10; multiplier SFFloat 1;
-        sound MFString sounds/rotational_motor.wav; muscles MFNode""",
-    "PositionSensor": "name SFString position sensor; noise SFFloat 0; resolution SFFloat -1",
     "HingeJoint": "jointParameters SFNode; device MFNode; endPoint SFNode; position SFFloat 0",
     "HingeJointParameters": """
         position SFFloat 0; axis SFVec3f 1 0 0; anchor SFVec3f 0 0 0; minStop SFFloat 0;
@@ -172,12 +160,20 @@ def type_number(type_name: str) -> int:
 def field_kinds(type_name: str) -> dict[str, FieldKind]:
     """Return the fields of a node type in the order that indices count; {} for an unknown type."""
     kinds: dict[str, FieldKind] = {}
-    for entry in _FIELDS.get(type_name, "").split(";"):
+    for entry in _declared(type_name).split(";"):
         words = entry.split(maxsplit=2)
         if words:
             name, sort, *default = words
             kinds[name] = FieldKind(_TYPES[sort[2:]], sort.startswith("MF"), "".join(default))
     return kinds
+
+
+def _declared(type_name: str) -> str:
+    kind = DEVICES.get(type_name)
+    if kind is None:
+        return _FIELDS.get(type_name, "")
+    own = f"name SFString {kind.name}; {kind.fields}"
+    return own if kind.on_joint else f"{_SOLID}; {own}"
 
 
 def guessed_kind(value: Value) -> FieldKind:

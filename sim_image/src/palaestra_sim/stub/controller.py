@@ -20,20 +20,15 @@ from typing import Any
 
 from palaestra_sim.errors import SimError
 from palaestra_sim.stub.arguments import Arguments
+from palaestra_sim.stub.devices.pseudo import PSEUDO_DEVICES
 from palaestra_sim.stub.host import Host
 from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
 from palaestra_sim.stub.seam import Handler, Node, Publisher, Service
-from palaestra_sim.stub.services.motors import motor_services
+from palaestra_sim.stub.services.devices import Outlet, device_services
 from palaestra_sim.stub.services.robot import RobotServices
 from palaestra_sim.stub.services.scene_fields import FieldServices
 from palaestra_sim.stub.services.scene_nodes import NodeServices
-from palaestra_sim.stub.services.sensors import (
-    Feed,
-    pseudo_feeds,
-    sensor_feed,
-    sensor_services,
-)
 from palaestra_sim.stub.services.supervisor import SupervisorServices
 from palaestra_sim.stub.simulation import Mode, Simulation
 from palaestra_sim.stub.stepping import Stepping
@@ -61,9 +56,14 @@ class Controller:
         self._options = host.options
         self._host_clock = host.clock
         self._stepping = stepping
-        self._feeds = {it.name: sensor_feed(it, node.name) for it in robot.sensors.values()}
-        self._pseudo_feeds = pseudo_feeds(node.name)
-        self._all_feeds = (*self._feeds.values(), *self._pseudo_feeds.values())
+        self._outlets = {
+            name: Outlet(node, name, topics, kind.enable)
+            for name, (kind, device) in robot.parts.devices.rows.items()
+            if (topics := kind.topics(device))
+        }
+        self._pseudo_outlets = [Outlet(node, it.name, it.topics, it.enable) for it in PSEUDO_DEVICES]
+        outlets = (*self._outlets.values(), *self._pseudo_outlets)
+        self._feeds = tuple(feed for outlet in outlets for feed in outlet.feeds)
         self._clock: Publisher | None = None
         self._basic_ms = self.simulation.basic_step_ms
         self._step_ms = self._basic_ms  # of the last accepted time_step
@@ -95,8 +95,8 @@ class Controller:
             self._serve(*FieldServices(self._tree).table())
         self._serve_devices()
         if self._arguments.auto_publish:
-            for feed in self._feeds.values():
-                feed.enable(node, self._basic_ms, self._basic_ms)
+            for outlet in self._outlets.values():
+                outlet.enable(self._basic_ms, self._basic_ms)
         self._serve(services.device_list())
         if self.robot.parts.node.flag("synchronization", True):
             self._stepping.join(self.robot)
@@ -117,7 +117,7 @@ class Controller:
             seconds, rest_ms = divmod(self.simulation.time_ms, 1000)
             self._clock.send({"clock": {"secs": seconds, "nsecs": rest_ms * 1_000_000}})
         elapsed_ms = self._count * self._step_ms
-        for feed in self._all_feeds:
+        for feed in self._feeds:
             if feed.publishers:
                 feed.publish(elapsed_ms)
         if self._options.lost_wakeup:
@@ -128,28 +128,15 @@ class Controller:
             self.node.serve(path, type_name, _told(handler))
 
     def _serve_devices(self) -> None:
-        devices = self.robot.parts.devices
-        for name in devices.order:
-            if name in devices.motors:
-                self._serve(*motor_services(devices.motors[name], devices))
-            else:
-                self._serve(*sensor_services(devices.sensors[name]))
-                self._serve_feed(self._feeds[name].topic.rpartition("/")[0], self._feeds[name])
-        for path, feed in self._pseudo_feeds.items():
-            self._serve_feed(path, feed)
+        for name, (kind, device) in self.robot.parts.devices.rows.items():
+            self._serve(*device_services(kind, device))
+            if name in self._outlets:
+                self._serve_outlet(self._outlets[name])
+        for outlet in self._pseudo_outlets:
+            self._serve_outlet(outlet)
 
-    def _serve_feed(self, path: str, feed: Feed) -> None:
-        def enable(request: Any) -> dict[str, Any]:
-            return {"success": feed.enable(self.node, request.value, self._step_ms)}
-
-        self._serve(
-            Service(f"{path}/enable", "webots_ros/set_int", enable),
-            Service(
-                f"{path}/get_sampling_period",
-                "webots_ros/get_int",
-                lambda _: {"value": feed.period_ms},
-            ),
-        )
+    def _serve_outlet(self, outlet: Outlet) -> None:
+        self._serve(*outlet.services(lambda: self._step_ms))
 
     def _time_step(self, request: Any) -> Any:
         step_ms = request.value

@@ -7,35 +7,28 @@ from __future__ import annotations
 
 from typing import Final
 
-from palaestra_sim.errors import SimError
+from palaestra_sim.stub.devices import DEVICES
 from palaestra_sim.stub.nodes import SceneNode
+from palaestra_sim.stub.seam import UnsimulatedError
 
 # Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
-_ACTING: Final = frozenset(
+_ACTING: Final = DEVICES.keys() | frozenset(
     (
         "ContactProperties",
-        "DistanceSensor",
         "Group",
         "HingeJoint",
         "HingeJointParameters",
         "Physics",
         "Pose",
-        "PositionSensor",
         "Robot",
-        "RotationalMotor",
         "Solid",
-        "TouchSensor",
         "Transform",
         "WorldInfo",
     )
 )
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "recognitionColors", "title"))
 _PLACING: Final = frozenset(("translation", "rotation"))
-_SENSORS: Final = frozenset(("DistanceSensor", "TouchSensor"))
-
-
-class UnsimulatedError(SimError, NotImplementedError):
-    """What is asked for works in Webots, and not here."""
+_MOUNTED: Final = frozenset(kind.node for kind in DEVICES.values() if not kind.on_joint)
 
 
 def require_effect(node: SceneNode, field: str) -> None:
@@ -79,7 +72,7 @@ def _moves(node: SceneNode, field: str) -> bool:
         return False
     if node.robot is not None or not _on_robot(node):
         return True
-    return not any(it.type_name in _SENSORS for it in (node, *node.descendants()))
+    return not any(it.type_name in _MOUNTED for it in (node, *node.descendants()))
 
 
 def _on_robot(node: SceneNode) -> bool:

@@ -1,4 +1,4 @@
-"""Motors and the shaft angles that position sensors tell.
+"""Motors, and the angles of their shafts.
 
 A motor is commanded as in Webots: a target position and a velocity. With a target of infinity it turns at
 that velocity; with a finite one it turns there, no faster than that velocity. Every command is taken
@@ -39,6 +39,7 @@ class Motor:
         speed_rad_s: how fast the shaft turns.
         angle_rad: of the shaft, since the start or the last reset.
         changed: whether a command came since the physics looked; the physics sets it back.
+        position_sensor: the name of the first PositionSensor of its joint, "" if there is none.
     """
 
     __slots__ = (
@@ -46,6 +47,7 @@ class Motor:
         "angle_rad",
         "available_torque_nm",
         "changed",
+        "position_sensor",
         "spec",
         "speed_rad_s",
         "target_rad",
@@ -54,7 +56,18 @@ class Motor:
 
     def __init__(self, spec: MotorSpec) -> None:
         self.spec = spec
+        self.position_sensor = ""
         self.reset()
+
+    @property
+    def name(self) -> str:
+        """Its name in the world file."""
+        return self.spec.name
+
+    @property
+    def model(self) -> str:
+        """The node's `model`."""
+        return self.spec.model
 
     def reset(self) -> None:
         """Return to the state of a new world: position control, at zero, as fast as allowed."""

@@ -3,19 +3,20 @@
 The seed of the noise comes in the robot's `customData`, either as a whole number (`"7"`) or as JSON
 (`'{"seed": 7}'`), and is taken when the world is loaded and at each `simulation_reset`. Anything
 else leaves the seed as it was; the first one is WorldInfo.randomSeed. From a reset on, the noise is a
-function of the seed and of the number of steps alone: every distance sensor draws at every step, in
-the order of the world file, whether anybody looks or not.
+function of the seed and of the number of steps alone. Every sensor with noise draws at every step, also
+while it is not enabled: types in the order of the table of devices, sensors in that of the world file.
 """
 
 from __future__ import annotations
 
 import json
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-from palaestra_sim.stub.devices import PositionSensor, Sensor, TouchSensor, sample
+from palaestra_sim.stub.devices import DEVICES
+from palaestra_sim.stub.devices.kind import Sample, Source
 from palaestra_sim.stub.motors import Motor
-from palaestra_sim.stub.obstacles import Neighbourhood
+from palaestra_sim.stub.obstacles import Neighbourhood, Ray
 from palaestra_sim.stub.physics import Body
 from palaestra_sim.stub.places import Place
 from palaestra_sim.stub.rays import Fan
@@ -30,8 +31,10 @@ class Robot:
         name: Robot.name in the world file.
         motors: by device name.
         sensors: by device name; each has a `value` after a step.
-        place: where it stands.
-        body: what drives; None for a robot that only watches.
+        samplers: give all sensors their values of this moment, in this order.
+        gauss: returns the next number of the robot's noise, from mean and deviation.
+        place: its frame.
+        body: None for a robot that only watches.
         custom_data: the customData field, as it stands now.
     """
 
@@ -39,19 +42,18 @@ class Robot:
         self.parts = parts
         self.name = parts.name
         self.motors: dict[str, Motor] = parts.devices.motors
-        self.sensors: dict[str, Sensor] = parts.devices.sensors
+        self.sensors: Mapping[str, Source] = parts.devices.sensors
         self.place: Place = parts.place
         self.body: Body | None = parts.body
         self.custom_data = parts.node.text("customData") or ""
         self.seed = random_seed
         self._random = random.Random()  # noqa: S311 - noise, not secrets
-        self._distance_sensors = parts.devices.of_distance()
-        self._other_sensors = tuple(
-            it for it in self.sensors.values() if isinstance(it, TouchSensor | PositionSensor)
-        )
-        self._fan = Fan(
-            [it.ray for it in self._distance_sensors],
-            [it.table.reach_m for it in self._distance_sensors],
+        self.gauss = self._random.gauss
+        self._fans: list[tuple[Fan, tuple[float, float]]] = []
+        self.samplers: tuple[Sample, ...] = tuple(
+            kind.sampler(devices, self)
+            for kind in DEVICES.values()
+            if kind.sampler is not None and (devices := parts.devices.of(kind))
         )
         self._stray_motors = tuple(
             it for it in self.motors.values() if self.body is None or not self.body.driven_by(it)
@@ -65,8 +67,17 @@ class Robot:
         if self.body is not None and self.body.radius > 0.0:
             in_the_way = _between(solids, self.parts.heights, height)
             self.body.face(_neighbourhood(in_the_way, self.body.radius), bodies)
-        visible = _between(solids, self.parts.ray_heights, height)
-        self._fan.face(_neighbourhood(visible, self._fan.reach_m), bodies)
+        for fan, heights in self._fans:
+            fan.face(_neighbourhood(_between(solids, heights, height), fan.reach_m), bodies)
+
+    def look(
+        self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
+    ) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each ray travels now, in metres; see `Carrier`."""
+        fan = Fan(rays, reach_m)
+        self._fans.append((fan, (min(heights_m), max(heights_m))))
+        cast, frame = fan.cast, self._frame
+        return lambda: cast(frame())
 
     def advance(self, step_s: float) -> None:
         """Move on by one basic step."""
@@ -75,16 +86,6 @@ class Robot:
         for motor in self._stray_motors:
             motor.speed_rad_s = motor.demand(step_s)
             motor.angle_rad += motor.speed_rad_s * step_s
-
-    def sense(self) -> None:
-        """Give every sensor its value of this moment."""
-        gauss = self._random.gauss
-        if self._distance_sensors:
-            distances = self._fan.cast(self._frame())
-            for sensor, distance in zip(self._distance_sensors, distances, strict=True):
-                sensor.value = sensor.table.response(distance, gauss)
-        for other in self._other_sensors:
-            sample(other, gauss)
 
     def reset(self) -> None:
         """Return to the start of the world file: pose, rest, motors, noise. customData stays."""

@@ -1,6 +1,6 @@
-"""What a controller needs of a ROS node, and what a service is before it has one.
+"""The ROS node that a controller needs, as a Protocol, and services before they have a node.
 
-The wire is in `ros`; everything here can be had without a socket.
+The wire is in `ros`; nothing here needs a socket.
 """
 
 from __future__ import annotations
@@ -8,12 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
+from palaestra_sim.errors import SimError
+
 Fields = Mapping[str, Any]
 Handler = Callable[[Any], Any]
+Row = tuple[str, str, Handler]  # of a table of services: last part of the path, type without package, handler
+
+
+class UnsimulatedError(SimError, NotImplementedError):
+    """Webots does what the request asks for, and the stub does not."""
 
 
 class Service(NamedTuple):
-    """One service: its path below the node's name, its type, and who answers."""
+    """One service: its path below the node's name, its type, and the function that answers."""
 
     path: str
     type_name: str
@@ -27,8 +34,11 @@ class Publisher(Protocol):
         """Send a message of these fields."""
         ...
 
-    def send_value(self, value: float) -> None:
-        """Send a message stamped with the wall clock: the template, and `value` in its last field."""
+    def send_value(self, value: Any) -> None:
+        """Send a message stamped with the wall clock: the template, and `value` in its last field.
+
+        A field of several numbers takes a tuple of them.
+        """
         ...
 
 

@@ -37,7 +37,7 @@ class Simulation:
         world: as read.
         robots: in the order of the world file.
         time_ms: simulated so far, back to 0 at a reset.
-        mode: for whoever paces the steps; `step` itself works in all three.
+        mode: for the program that paces the steps; `step` itself works in all three.
         quit_status: the exit status that `quit` asked for; None before.
     """
 
@@ -50,6 +50,7 @@ class Simulation:
         self.quit_status: int | None = None
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
+        self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
         self._step_s = scene.basic_step_ms / 1000.0
         self._solids_moved = False
         self._arrange()
@@ -75,6 +76,15 @@ class Simulation:
         Raises:
             ValueError: the duration is no positive multiple of the basic step.
         """
+        self.advance(duration_ms)
+        self.sample()
+
+    def advance(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`; the sensors keep their values.
+
+        Raises:
+            ValueError: the duration is no positive multiple of the basic step.
+        """
         count, rest = divmod(duration_ms, self.scene.basic_step_ms)
         if rest or count < 1:
             raise ValueError(
@@ -83,8 +93,11 @@ class Simulation:
             )
         for _ in range(count):
             self._basic_step()
-        for robot in self.robots:
-            robot.sense()
+
+    def sample(self) -> None:
+        """Give every sensor its value of this moment."""
+        for sample in self._samplers:
+            sample()
 
     def before_next_step(self, change: Callable[[], None]) -> None:
         """Have a change made when the next basic step begins, as writes to fields are."""

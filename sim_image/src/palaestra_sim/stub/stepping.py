@@ -1,19 +1,40 @@
-"""Who has asked for a step, and when the world moves: when all that it waits for have asked.
+"""The steps that robots asked for; the world moves once all robots that it waits for have asked.
 
 A robot whose `synchronization` is TRUE holds the world until it asks. Steps of different lengths are
 served piece by piece: the world advances by the shortest that is left. While the simulation is
-paused everyone waits.
+paused all of them wait.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from palaestra_sim.stub.robot import Robot
-from palaestra_sim.stub.simulation import Mode, Simulation
+from palaestra_sim.stub.simulation import Mode
 
 Done = Callable[[bool], None]
+
+
+class Simulated(Protocol):
+    """A simulation as its steps need it; another simulator can take the place of the stub's own.
+
+    Attributes:
+        mode: in PAUSE nothing moves.
+        quit_status: None until a client asked for the end; from then on nothing moves.
+    """
+
+    mode: Mode
+    quit_status: int | None
+
+    def advance(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`; the sensors keep their values."""
+        ...
+
+    def sample(self) -> None:
+        """Give every sensor its value of this moment."""
+        ...
 
 
 @dataclass(slots=True)
@@ -25,7 +46,7 @@ class _Wish:
 class Stepping:
     """The steps that the controllers of one simulation ask for."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulated) -> None:
         self._simulation = simulation
         self._awaited: set[Robot] = set()
         self._wishes: dict[Robot, _Wish] = {}
@@ -52,11 +73,12 @@ class Stepping:
         """Move the world as far as it was asked to."""
         while self._wishes and self._awaited <= self._wishes.keys() and self._may_move():
             duration_ms = min(wish.left_ms for wish in self._wishes.values())
-            self._simulation.step(duration_ms)
+            self._simulation.advance(duration_ms)
+            self._simulation.sample()
             self._grant(duration_ms)
 
     def end(self) -> None:
-        """Tell everyone who waits that the simulator ends."""
+        """Call back for every pending step: the simulator ends."""
         wishes, self._wishes = self._wishes, {}
         for wish in wishes.values():
             wish.done(False)

@@ -101,7 +101,7 @@ class SceneTree:
 
     def of_device(self, robot: Robot, name: str) -> SceneNode | None:
         """Return the node of a robot's device by its name in the world file."""
-        if name not in robot.parts.devices.order:
+        if name not in robot.parts.devices.rows:
             return None
         inside = self.of_robot(robot).descendants()
         return next((it for it in inside if it.source and it.source.text("name") == name), None)

@@ -9,28 +9,32 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from palaestra_protocol.ros.rostypes import Codec
+from palaestra_protocol.ros.rostypes import Codec, last_field
 from palaestra_protocol.ros.tcpros import LENGTH, frame
 from palaestra_sim.stub.faults.course import Damage
 from palaestra_sim.stub.faults.kinds import WrongValue
 
-# Of the topics that sensors publish, those with a fraction in their last field; a bumper has none.
-_TRAILING_FLOATS = {
-    "sensor_msgs/Range": struct.Struct("<f"),
-    "webots_ros/Float64Stamped": struct.Struct("<d"),
-}
+_FRACTIONS = frozenset("fd")  # the codes of `struct`
 
 
 def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage]) -> bytes:
     """Return a framed message of a topic with everything of `damages` wrong about it."""
     payload = data[LENGTH.size :]
+    reading = last_field(type_name) if type_name else None
     for damage in damages:
         if not isinstance(damage, WrongValue):
             payload = payload[: len(payload) // 2]
-        elif type_name in _TRAILING_FLOATS:
-            trailing = _TRAILING_FLOATS[type_name]
-            payload = payload[: -trailing.size] + trailing.pack(damage.value)
+        elif reading is not None and len(payload) >= reading.size:
+            payload = _with_reading(payload, reading, damage.value)
     return frame(payload)
+
+
+def _with_reading(payload: bytes, reading: struct.Struct, value: float) -> bytes:
+    """Return a message with `value` in place of each number with a fraction in its last field."""
+    before, numbers = payload[: -reading.size], reading.unpack(payload[-reading.size :])
+    codes = reading.format.lstrip("<")
+    wrong = (value if code in _FRACTIONS else it for code, it in zip(codes, numbers, strict=True))
+    return before + reading.pack(*wrong)
 
 
 def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> bytes:

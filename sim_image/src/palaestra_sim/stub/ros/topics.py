@@ -7,17 +7,13 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from palaestra_protocol.ros.rostypes import MessageType
+from palaestra_protocol.ros.rostypes import MessageType, last_field
 from palaestra_protocol.ros.tcpros import LENGTH
 from palaestra_sim.stub.ros.links import Connection, Endpoint
 
 _STAMP = struct.Struct("<III")  # the start of a std_msgs/Header: seq, seconds, nanoseconds
-# What a message ends with.
-_READINGS = {
-    "sensor_msgs/Range": struct.Struct("<f"),
-    "webots_ros/BoolStamped": struct.Struct("<?"),
-    "webots_ros/Float64Stamped": struct.Struct("<d"),
-}
+_ONE_NUMBER = len("<d")
+_Pack = Callable[[bytearray, int, Any], None]
 
 
 class Topic:
@@ -74,7 +70,7 @@ class _SubscriberEnd:
 class Publisher:
     """Sends messages to the subscribers that are connected at that moment, queue size 1."""
 
-    __slots__ = ("_frame", "_reading", "_sequence", "_template", "topic")
+    __slots__ = ("_frame", "_pack", "_reading_at", "_sequence", "_template", "topic")
 
     def __init__(self, topic: Topic, template: dict[str, Any]) -> None:
         self.topic = topic
@@ -82,29 +78,48 @@ class Publisher:
         self._sequence = 0
         # Of `send_value`, made when it is first called.
         self._frame = bytearray()
-        self._reading = struct.Struct("")
+        self._reading_at = 0
+        self._pack: _Pack = _STAMP.pack_into
 
     def send(self, fields: Mapping[str, Any]) -> None:
         """Send a message of `fields`, over the template's."""
         self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))
 
-    def send_value(self, value: float, stamp_ns: int | None = None) -> None:
+    def send_value(self, value: Any, stamp_ns: int | None = None) -> None:
         """Send a stamped message whose last field is `value`, the rest as in the template.
 
         Without a subscriber it is none, and is not counted.
 
         Args:
-            value: the reading.
+            value: the reading, or a tuple of the numbers of the last field.
             stamp_ns: nanoseconds of the header's time; the wall clock by default.
         """
         if not self.topic.links:
             return
         if not self._frame:
-            self._frame += self.topic.type.codec.frame(self._template)
-            self._reading = _READINGS[self.topic.type.name]
-        data, reading = self._frame, self._reading
+            self._prepare()
+        data = self._frame
         self._sequence += 1
         seconds, nanoseconds = divmod(time.time_ns() if stamp_ns is None else stamp_ns, 1_000_000_000)
         _STAMP.pack_into(data, LENGTH.size, self._sequence, seconds, nanoseconds)
-        reading.pack_into(data, len(data) - reading.size, value)
+        self._pack(data, self._reading_at, value)
         self.topic.send(bytes(data))
+
+    def _prepare(self) -> None:
+        """Make the frame of all values, and find the reading in it."""
+        type_ = self.topic.type
+        reading = last_field(type_.name)
+        if reading is None:
+            raise TypeError(f"{type_.name} does not end with numbers; use `send`")
+        self._frame += type_.codec.frame(self._template)
+        self._reading_at = len(self._frame) - reading.size
+        self._pack = reading.pack_into if len(reading.format) == _ONE_NUMBER else _pack_tuple(reading)
+
+
+def _pack_tuple(layout: struct.Struct) -> _Pack:
+    """Return `layout.pack_into` for the numbers of a tuple."""
+
+    def pack(data: bytearray, at: int, values: tuple[float, ...]) -> None:
+        layout.pack_into(data, at, *values)
+
+    return pack

@@ -8,11 +8,10 @@ from typing import Any
 from palaestra_sim.stub.host import Host
 from palaestra_sim.stub.robot import Robot
 from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.seam import Handler, Service
+from palaestra_sim.stub.seam import Handler, Row, Service
 from palaestra_sim.stub.simulation import Simulation
 
 Fields = dict[str, Any]
-Row = tuple[str, str, Handler]
 
 
 class RobotServices:
@@ -41,7 +40,7 @@ class RobotServices:
             ("get_project_path", "get_string", str(world_path.parent.parent)),
             ("get_world_path", "get_string", str(world_path)),
             ("get_basic_time_step", "get_float", float(self._simulation.basic_step_ms)),
-            ("get_number_of_devices", "get_int", len(self._robot.parts.devices.order)),
+            ("get_number_of_devices", "get_int", len(self._robot.parts.devices.names)),
             ("wwi_receive_text", "get_string", ""),
         ):
             yield name, type_name, _always({"value": value})
@@ -62,7 +61,7 @@ class RobotServices:
 
     def device_list(self) -> Service:
         """Return the service that is advertised last, so that a client that finds it finds all."""
-        names = list(self._robot.parts.devices.order)
+        names = list(self._robot.parts.devices.names)
         return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
 
     def _get_custom_data(self, _request: Any) -> Fields:

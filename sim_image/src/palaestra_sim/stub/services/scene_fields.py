@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 from palaestra_sim.stub.catalogue import FieldType
 from palaestra_sim.stub.fields import Field, NoValueError, quaternion_to_axis_angle
 from palaestra_sim.stub.geometry import axis_angle_to_quaternion
-from palaestra_sim.stub.seam import Handler, Service
+from palaestra_sim.stub.seam import Row, Service
 from palaestra_sim.stub.tree import SceneTree
 
 Fields = dict[str, Any]
@@ -64,7 +64,7 @@ class FieldServices:
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
-        rows: list[tuple[str, str, Handler]] = [
+        rows: list[Row] = [
             ("get_name", "field_get_name", self._get_name),
             ("get_type", "field_get_type", self._get_type),
             ("get_type_name", "field_get_name", self._get_type_name),

@@ -14,11 +14,10 @@ from palaestra_sim.stub.host import Host
 from palaestra_sim.stub.nodes import SceneNode
 from palaestra_sim.stub.places import Place
 from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.seam import Handler, Service
+from palaestra_sim.stub.seam import Handler, Row, Service
 from palaestra_sim.stub.tree import SceneTree
 
 Fields = dict[str, Any]
-Row = tuple[str, str, Handler]
 
 
 class NodeServices:

@@ -1,0 +1,149 @@
+"""Every row of the table of devices: read, sampled, served, enabled, published and damaged."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from palaestra_protocol.ros.rostypes import last_field, message_type
+from palaestra_protocol.ros.tcpros import LENGTH
+from palaestra_sim.stub.catalogue import field_kinds, type_number
+from palaestra_sim.stub.devices import DEVICES
+from palaestra_sim.stub.effects import require_effect
+from palaestra_sim.stub.faults.damage import damaged_message
+from palaestra_sim.stub.faults.language import parse
+from palaestra_sim.stub.ros.topics import Publisher, Topic
+from palaestra_sim.stub.seam import UnsimulatedError
+from palaestra_sim.stub.tree import SceneTree
+
+COMMON = {"get_model", "get_name", "get_node_type"}
+PUBLISHING = {"enable", "get_sampling_period"}
+NAMES = sorted(DEVICES)
+SENSORS = [name for name in NAMES if DEVICES[name].sampler is not None]
+
+
+def written(kind):
+    """The node of a device as a world has it, with no field but its name."""
+    node = f'{kind.node} {{ name "device" }}'
+    return f"HingeJoint {{ device {node} }}" if kind.on_joint else node
+
+
+@pytest.fixture
+def stub(start, world):
+    """`stub("GPS")`: a stub whose robot has one device of that type."""
+
+    def begin(name):
+        robot = f"""Robot {{ supervisor TRUE controller "ros"
+          controllerArgs [ "--name=robotino" "--synchronize" ] children [ {written(DEVICES[name])} ] }}"""
+        return start(world(robot=robot))
+
+    return begin
+
+
+@pytest.fixture
+def device(stub, ros):
+    """`device("GPS")`: its row, itself, and the node of its robot."""
+
+    def begin(name):
+        (robot,) = stub(name).simulation.robots
+        return *robot.parts.devices.rows["device"], ros.node("robotino")
+
+    return begin
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_device_is_listed_and_serves_what_its_row_has(device, name):
+    """Nothing else: a client must not rely on services that the row does not have."""
+    kind, found, node = device(name)
+
+    served = {path.partition("/")[2] for path in node.services if path.startswith("device/")}
+
+    publishing = PUBLISHING if kind.topics(found) else set()
+    assert served == COMMON | publishing | {path for path, _, _ in kind.services(found)}
+    assert node.get("robot/get_device_list") == ["device"]
+    assert node.get("device/get_name") == "device"
+    assert node.get("device/get_node_type") == type_number(name) > 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_node_has_the_fields_of_webots(name):
+    """A supervisor finds them by name, also those that the world does not set."""
+    kinds = field_kinds(name)
+
+    assert kinds["name"].default == DEVICES[name].name
+    assert len(kinds) > 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
+    """A success without effect would leave a client with a world that is not the one it wrote."""
+    tree = SceneTree(stub(name).simulation)
+    node = next(it for it in tree.nodes if it.type_name == name)
+
+    with pytest.raises(UnsimulatedError, match=f"the stub cannot change {name}.name"):
+        require_effect(node, "name")
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_sensor_has_a_value_after_a_step_and_publishes_all_its_topics(device, name):
+    """A row whose sampler is forgotten would publish NaN for ever."""
+    kind, found, node = device(name)
+    inboxes = [node.inbox(f"device/{topic.name}") for topic in kind.topics(found)]
+
+    assert node.get("device/enable", value=32) is True
+    node.call("robot/time_step", value=32)
+
+    assert inboxes
+    for (value,) in inboxes:
+        assert all(math.isfinite(it) for it in (value if isinstance(value, tuple) else [value]))
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_enable_0_ends_all_topics(device, name):
+    """As each client does before it changes a period."""
+    kind, found, node = device(name)
+    node.call("device/enable", value=64)
+    assert node.get("device/get_sampling_period") == 64
+
+    node.call("device/enable", value=0)
+
+    assert node.get("device/get_sampling_period") == 0
+    assert not any(node.publishers(f"device/{topic.name}") for topic in kind.topics(found))
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_the_message_of_each_topic_ends_with_its_reading(device, name):
+    """The rest of the message is made once; a reading elsewhere would be written over other fields."""
+    kind, found, node = device(name)
+    node.call("robot/time_step", value=32)
+
+    for topic in kind.topics(found):
+        link = SimpleNamespace(sent=[])
+        link.send_newest = link.sent.append
+        type_ = message_type(topic.type_name)
+        wire = Topic("/device", type_, latched=False)
+        wire.links.append(link)
+        Publisher(wire, dict(topic.constants)).send_value(topic.source.value)
+        (data,) = link.sent
+
+        numbers = last_field(topic.type_name).unpack(data[-last_field(topic.type_name).size :])
+        value = topic.source.value
+
+        assert numbers == pytest.approx(value if isinstance(value, tuple) else (value,))
+        type_.codec.decode(data[LENGTH.size :])
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_wrong_value_reaches_each_fraction_of_a_reading(device, name):
+    """The table has no column for it: a row that forgot it would make a fault without effect."""
+    kind, found, _ = device(name)
+
+    for topic in kind.topics(found):
+        layout = last_field(topic.type_name)
+        sound = message_type(topic.type_name).codec.frame({})
+        wrong = damaged_message(topic.type_name, sound, parse("wrong_value", "test"))
+        numbers = layout.unpack(wrong[-layout.size :])
+
+        fractions = [it for it in numbers if isinstance(it, float)]
+        assert all(map(math.isnan, fractions))
+        assert (wrong == sound) is (not fractions)
