@@ -2,15 +2,15 @@
 
 The real controller's main loop is a thread that polls; this one is a few rules:
 
-    time_step   refused unless it is 0 or a positive multiple of the basic step; while it is
-                pending the robot is `blocked`: Webots holds a mutex that every other service needs
-    publish     comes after the answer, once a step, for every enabled sensor that is due
-                by (count * step) % period, to the subscribers that are connected at that moment
-    the count   goes up before the step is made, and the step of the last accepted call counts:
-                a product, not a sum, so changing the step disturbs the phase of longer periods
+- `time_step` is refused unless it is 0 or a positive multiple of the basic step. While it is pending, the
+  robot is `blocked`: Webots holds a mutex that every other service needs.
+- Messages come after the answer, once a step, for every enabled sensor that is due: (count * step) % period
+  is 0. They go to the subscribers that are connected at that moment.
+- The count goes up before the step is made, and the step of the last accepted call counts. Elapsed time is a
+  product, not a sum, so changing the step disturbs the phase of longer periods.
 
-With `lost_wakeup` a step that is asked for while the loop is still at the one before is made and
-answered, but its messages never come. Without, the messages of the one before go out first.
+With `lost_wakeup`, a step that is requested while the loop still handles the one before is made and answered,
+but its messages never come. Without it, the messages of the one before go out first.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Controller:
             self._stepping.join(self.robot)
 
     def close(self) -> None:
-        """End: nobody waits for this robot any more, its services and topics are gone."""
+        """End: no step waits for this robot any more, and its services and topics are gone."""
         self._closed = True
         self._publish_due = False
         self._stepping.leave(self.robot)
@@ -154,7 +154,7 @@ class Controller:
         return self._answer
 
     def _loop_hears(self) -> bool:
-        """Say whether the main loop will see that the count went up, or is too busy to."""
+        """Return whether the main loop will see that the count went up; it may be too busy."""
         if not self._options.lost_wakeup:
             self.publish()
             return True

@@ -1,7 +1,7 @@
 """Fields of nodes: typed values that a supervisor reads and writes.
 
 The next read answers a written value at once; the simulation sees it when the next basic step begins.
-`translation` and `rotation` move things, `customData` reaches the robot, and what is drawn only has no
+`translation` and `rotation` move things, `customData` reaches the robot, and a field that only draws has no
 effect in Webots either. Every other write is refused: it would be read back, and change nothing (`effects`).
 
 As in Webots, a value that the field cannot hold is ignored without an error.
@@ -146,8 +146,8 @@ class Field:
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
     """Return what the controller makes of a quaternion, with the fault of its RosMathUtils.
 
-    An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then: NaN for the exact identity,
-    so that a zero rotation that was read cannot be written back. |w| > 1 makes the angle NaN.
+    An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then. For the exact identity that is NaN,
+    so a zero rotation that was read cannot be written back. If |w| > 1, the angle is NaN.
     """
     angle_rad = 2.0 * math.acos(w) if -1.0 <= w <= 1.0 else math.nan
     if angle_rad < 1e-4:  # noqa: PLR2004 - Source: RosMathUtils
@@ -159,7 +159,7 @@ def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngl
 
 
 def _acceptable(type_: FieldType, value: Any) -> bool:
-    """Say whether libController takes a value: no NaN, no infinity, no axis without direction."""
+    """Return whether libController accepts a value: no NaN, no infinity, no axis without direction."""
     if type_ is FieldType.ROTATION and not any(value[:3]):
         return False
     if isinstance(value, tuple):

@@ -18,7 +18,7 @@ IDENTITY: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Pose(NamedTuple):
-    """A position in metres and a rotation, both in the frame of whoever holds it."""
+    """A position in metres and a rotation, in a frame that the holder of the pose knows."""
 
     position: Vector = (0.0, 0.0, 0.0)
     rotation: Matrix = IDENTITY
@@ -111,7 +111,7 @@ def to_quaternion(m: Matrix) -> Quaternion:
 
 
 def axis_angle_to_quaternion(rotation: AxisAngle) -> Quaternion:
-    """Return the quaternion of an axis of length 1 and an angle, as a rotation field is told."""
+    """Return the quaternion of an axis of length 1 and an angle, for the service of a rotation field."""
     x, y, z, angle_rad = rotation
     s = math.sin(angle_rad / 2.0)
     return (x * s, y * s, z * s, math.cos(angle_rad / 2.0))

@@ -1,6 +1,6 @@
 """The Robotino on the floor: from three wheel motors to a pose, basic step by basic step.
 
-Kinematics and geometry are the Robotino 3's, with wheel 0 at the rear, 1 front right and 2 front left:
+Kinematics and geometry are the Robotino 3's. Wheel 0 is at the rear, 1 front right, and 2 front left.
     w0 = (vy - L omega) / R,  w1 = (-k vx - vy / 2 - L omega) / R,  w2 = (k vx - vy / 2 - L omega) / R,
 with k = sqrt(3/4). Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c.
 
@@ -60,7 +60,7 @@ class Body(Disc):
         heading_rad: in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
-        touched: whether anything was touched since the bumper was last read; whoever reads it clears it.
+        touched: whether anything was touched since the bumper was last read; its reader clears it.
     """
 
     __slots__ = (

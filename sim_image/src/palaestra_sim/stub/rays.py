@@ -1,7 +1,7 @@
-"""Infrared rays: from where the robot stands to the volts that its sensors tell.
+"""Infrared rays: from the pose of the robot to the volts of its sensors.
 
-A ray stops at the first obstacle; its length goes through the sensor's lookup table, as in Webots:
-linear between the rows, the end values beyond both ends, Gaussian noise as a fraction of the response.
+A ray stops at the first obstacle. As in Webots, its length goes through the sensor's lookup table: linear
+between the rows, the end values beyond both ends, and Gaussian noise as a fraction of the response.
 """
 
 from __future__ import annotations

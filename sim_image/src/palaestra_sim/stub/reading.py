@@ -1,7 +1,7 @@
-"""What every part of reading a scene needs: `USE` resolved, numbers checked, errors that point.
+"""Reading a scene: `USE` resolved, numbers checked, and errors with their place.
 
-A stub refuses what it cannot simulate, by line and column, rather than simulate something else. What is
-refused is noted, and the reading goes on: `conclude` raises one error for everything.
+The stub refuses what it cannot simulate, by line and column, rather than simulate something else. A refusal
+is noted, and the reading goes on: `conclude` raises one error for all of them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Reading:
         """Return if nothing was refused.
 
         Raises:
-            WorldError: everything that was.
+            WorldError: everything that was refused.
         """
         if error := refusal(self._refused):
             raise error

@@ -1,7 +1,7 @@
 """From a world file to the things that the stub simulates.
 
-What is drawn only is skipped, what is upright and bounded stands in the way, robots drive. Whatever else
-would act in Webots, such as a PROTO, a loose crate, a camera, is refused with its place in the file.
+Nodes that are only drawn are skipped, upright ones with a boundingObject are obstacles, and robots drive. Any
+other node that would act in Webots, such as a PROTO or a loose crate, is refused with its place in the file.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """One running stub: a simulation and the controllers of its robots, from one world to the next.
 
-Controllers come and go with worlds, as Webots kills and starts them; this is what outlives them. The
-process around it (command line, loop, signals) gives it nodes and a clock, and hears when it is to end.
+Controllers come and go with worlds, as Webots kills and starts them; the simulator outlives them. The process
+around it (command line, loop, signals) gives it nodes and a clock, and ends when it calls back.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Simulator:
         self._stepping.advance()
 
     def quit(self, status: int) -> None:
-        """End, after the answer of the present call: pending steps fail, then the process is told."""
+        """End, after the answer of the present call: pending steps fail, then the callback is called."""
         if self.quit_status is not None:
             return
         self.quit_status = status
@@ -161,4 +161,4 @@ def _read(world_path: Path, mode: Mode) -> tuple[Simulation, dict[Robot, Argumen
 
 
 def _ignore(_status: int) -> None:
-    """Take the end without a word, until somebody wants to hear it."""
+    """Ignore the end, until `on_quit` sets another function."""

@@ -1,15 +1,15 @@
 """Faults on demand: a stub that fails as simulators do, so that training code can be tried against it.
 
-kinds       what can go wrong, as data
-language    `crash:probability=0.0005` to data, and a sentence about what is wrong with it
-schedule    PURE: which faults happen at the k-th step, reset, call or start of a life
-course      PURE: what becomes of each request and message, from counts and the schedule
-damage      PURE: messages and answers made wrong, as bytes
-survey      which paths a world serves, so that a misspelt one is noticed
-wire        the edge: a ROS node whose traffic the course decides about
-effects     the edge: signals, memory, the end
+- `kinds`: the faults, as data
+- `language`: from `crash:probability=0.0005` to data, or to a sentence about the mistake
+- `schedule`, pure: the faults of the k-th step, reset, call or start of a life
+- `course`, pure: the fate of each request and message, from counts and the schedule
+- `damage`, pure: wrong messages and answers, as bytes
+- `survey`: the paths that a world serves, so that a misspelt one is noticed
+- `wire`, the edge: a ROS node whose traffic the course decides about
+- `effects`, the edge: signals, memory, the end
 
-Nothing of it is in the way of a stub without faults: it has the plain node, not this one.
+A stub without faults has the plain node, and nothing of this package in its way.
 """
 
 from palaestra_sim.stub.faults.course import Course

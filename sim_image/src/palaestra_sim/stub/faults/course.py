@@ -36,7 +36,7 @@ class Ruling:
     Attributes:
         lost: it is forgotten, and nothing comes of it.
         delay_s: how long it waits.
-        damages: what is made wrong about the answer, or about the message.
+        damages: the faults of the answer, or of the message.
         effects: what happens to the process first, in this order.
     """
 

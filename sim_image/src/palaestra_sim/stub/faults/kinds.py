@@ -14,7 +14,7 @@ RESET_PATHS = frozenset(
 
 
 class Event(StrEnum):
-    """What is counted, from 1, in each life of a stub; lives are counted by whoever starts it.
+    """Events that are counted, from 1, in each life of a stub; the program that starts it counts the lives.
 
     step: a `time_step` request of the robot that asked first: once a step, however many robots.
     reset: a request for the start of the world. call: one of a service that the fault names.

@@ -24,7 +24,7 @@ class Life:
     Attributes:
         seed: chosen by a person.
         simulator: which one it is among those with that seed.
-        number: of the life, counted from 1 by whoever starts the simulator.
+        number: of the life, counted from 1 by the program that starts the simulator.
     """
 
     seed: int = 0

@@ -29,8 +29,8 @@ _LOOKS = 30
 
 _EVENTS = 32  # at a time; others that are ready come with the next look
 
-# What is due as soon as this is what the peers wait for too, such as the end of a step: they send nothing
-# before, and looking for it would only take the processor from those who compute, and come late.
+# The peers wait for a callback that is due as soon as this, such as the end of a step. They send nothing
+# before it, so looking at the sockets would only delay it, and take the processor from other programs.
 _NEAR_S = 10e-3
 
 

@@ -145,7 +145,7 @@ class SlaveApi:
 
 
 def host_name() -> str:
-    """Return the name that others are told, by the rules of ROS: ROS_HOSTNAME, ROS_IP, the host's name."""
+    """Return the name for other nodes, by the rules of ROS: ROS_HOSTNAME, ROS_IP, the host's name."""
     return os.environ.get("ROS_HOSTNAME") or os.environ.get("ROS_IP") or socket.gethostname()
 
 

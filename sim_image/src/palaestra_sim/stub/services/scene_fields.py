@@ -1,9 +1,9 @@
 """Services under `supervisor/field/`: read and write typed values by handle.
 
-Writes of what a field cannot hold answer success 1, as the controller does; writes that would have no effect
-in the stub alone fail with a sentence that says so. Reads of the wrong type
-answer 0 or "" where libController has such a value, and fail where it has a null pointer (vectors,
-rotations, colours), which crashes the real controller.
+A write of a value that a field cannot hold answers success 1, as in the controller. A write that would have
+no effect in the stub alone fails with a sentence that says so. A read of the wrong type answers 0 or "" where
+libController has such a value. It fails where libController has a null pointer (vectors, rotations, colors),
+which crashes the real controller.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Services under `supervisor/node/`: what a node is and where, and what can be done to it.
+"""Services under `supervisor/node/`: a node's type, its place, and changes to it.
 
-What Webots would do and the stub cannot (forces, saved states, new nodes) fails with a sentence that says so,
-instead of a success that did nothing.
+A request for something that the stub lacks (forces, saved states, new nodes) fails with a sentence that says
+so, instead of a success that did nothing.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class NodeServices:
         return {"velocity": {"linear": _point((vx, vy, 0.0)), "angular": _point((0.0, 0.0, omega))}}
 
     def _set_velocity(self, request: Any) -> Fields:
-        """Push a robot; its motors bring it back to what they are told within a few basic steps."""
+        """Push a robot; its motors bring it back to their commands within a few basic steps."""
         node = self._node(request)
         if node.robot is not None and node.robot.body is not None:
             wanted = request.velocity
