@@ -1,11 +1,12 @@
 """The values that are read from a sensor's messages, and the messages that are refused."""
 
+import math
 import struct
 
 import pytest
 
 from palaestra_protocol.ros.rostypes import message_type
-from palaestra_trainer.webots.readings import BOOL, FLOAT64, RANGE, Reading
+from palaestra_trainer.webots.readings import BOOL, FLOAT64, POINT, RANGE, Reading, VectorReading
 
 KINDS = {
     "sensor_msgs/Range": (RANGE, "range", 0.5),
@@ -84,3 +85,19 @@ def test_what_is_no_finite_number_is_refused_with_the_device(kind, read, wrong):
     """One NaN in an observation is in every weight one update later."""
     with pytest.raises(ValueError, match=f"{wrong} from ir1"):
         read(message(kind, wrong))
+
+
+def test_a_reading_of_several_numbers_is_a_tuple():
+    """In the order of the message."""
+    point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {"x": 1.0, "y": 2.0, "z": 3.0}})
+
+    assert VectorReading("gps", POINT)(point) == (1.0, 2.0, 3.0)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_each_number_of_a_tuple_has_to_be_finite(axis):
+    """One NaN would reach a loss as well as three."""
+    point = message_type("geometry_msgs/PointStamped").codec.encode({"point": {axis: math.nan}})
+
+    with pytest.raises(ValueError, match=r"nan.* from gps"):
+        VectorReading("gps", POINT)(point)

@@ -29,6 +29,7 @@ class Sensor:
         device: the device's name in the world, e.g. ir1
         type_name: the type of its topic.
         decode: reads the value out of a message's bytes.
+        topic: the name of its topic below the device's.
 
     Attributes:
         robot: see above.
@@ -44,12 +45,13 @@ class Sensor:
         device: str,
         type_name: str,
         decode: Callable[[bytes | memoryview], Any] | None = None,
+        topic: str = "value",
     ) -> None:
         self.robot = robot
         self.device = device
         path = f"/{robot}/{topic_name(device)}"
         self._enable = RosService(f"{path}/enable", "webots_ros/set_int")
-        self._values = RosSubscriber(f"{path}/value", type_name, decode)
+        self._values = RosSubscriber(f"{path}/{topic}", type_name, decode)
         self._value: Any = None
         self.late = False
 

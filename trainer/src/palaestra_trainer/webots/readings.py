@@ -1,4 +1,4 @@
-"""Read the one number that matters from a sensor's message, without decoding the rest.
+"""Read the reading from a sensor's message, without decoding the rest.
 
 Every topic of a sensor begins with a std_msgs/Header. Only its `frame_id` varies in length, and one device
 always sends the same `frame_id`.
@@ -15,6 +15,7 @@ from typing import Any
 RANGE = "Bffff"  # sensor_msgs/Range: type, field of view, least, most
 BOOL = "?"
 FLOAT64 = "d"
+POINT = "ddd"  # geometry_msgs/PointStamped: x, y, z
 
 _FRAME_ID_LENGTH = struct.Struct("<I")
 _FRAME_ID_AT = 12  # after sequence number and stamp
@@ -60,6 +61,24 @@ class Reading:
             raise ValueError(f"a message of {len(message)} bytes, not {length}")
         self._frame_id_bytes = frame_id_bytes
         self._layout = _layout(frame_id_bytes, self._codes)
+
+
+class VectorReading(Reading):
+    """Reads all numbers after the header, as a tuple."""
+
+    __slots__ = ()
+
+    def __call__(self, message: bytes | memoryview) -> tuple[float, ...]:
+        """Return the reading.
+
+        Raises:
+            ValueError, struct.error: as `Reading`.
+        """
+        super().__call__(message)
+        numbers = self._layout.unpack(message)[1:]
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError(f"{numbers} from {self._device}")
+        return numbers
 
 
 @cache
