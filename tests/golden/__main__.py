@@ -4,6 +4,7 @@
 - `manifests/crd.yaml`, docs/trainingjob.md: made from the API's models
 - `docs/trainingjob.md`: the default hyperparameters of the algorithms
 - `docs/metrics.md`: every metric that the programs declare
+- `docs/simulators.md`: the devices of the stub
 - `charts/palaestra/README.md`: made from its values.yaml
 - `charts/palaestra/dashboards/*.json`: made by tools/dashboards
 - `manifests/install.yaml`: the chart with its default values, where Helm is built
@@ -26,6 +27,7 @@ from palaestra_sim.world import builtin
 from tests.chart import installation, readme
 from tests.control_plane.programs import NoPrograms
 from tools import dashboards
+from tools.devices import page as devices
 from tools.hyperparameters import page as hyperparameters
 from tools.metrics import page as metrics
 
@@ -51,6 +53,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
         yield ROOT / name, text
     yield ROOT / hyperparameters.PAGE, hyperparameters.page((ROOT / hyperparameters.PAGE).read_text())
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
+    yield ROOT / devices.PAGE, devices.page((ROOT / devices.PAGE).read_text())
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text
     yield readme.PATH, readme.text()

@@ -1,0 +1,45 @@
+"""The devices that the stub simulates, in docs/simulators.md: a row for each row of the stub's own table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from palaestra.api.marks import between_marks
+from palaestra_sim.stub.devices import DEVICES
+from palaestra_sim.stub.devices.kind import Kind
+from palaestra_sim.stub.simulation import Simulation
+
+PAGE = "docs/simulators.md"
+BEGIN = "<!-- generated: devices of the stub -->"
+
+
+def page(text: str) -> str:
+    """Return docs/simulators.md, now `text`, with the table made anew.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    return between_marks(text, BEGIN, table())
+
+
+def table() -> str:
+    """Return a row for each type of device: its topics with their messages, and its services."""
+    rows = (_row(kind) for kind in DEVICES.values())
+    return "\n".join(("| node | topics | services |", "|---|---|---|", *rows, ""))
+
+
+def _row(kind: Kind[Any]) -> str:
+    device = _device(kind)
+    topics = ", ".join(f"`{it.name}` ({it.type_name})" for it in kind.topics(device))
+    services = ", ".join(f"`{path}`" for path, _, _ in kind.services(device))
+    return f"| {kind.node} | {topics} | {services} |"
+
+
+def _device(kind: Kind[Any]) -> object:
+    """Return a device of that type, from a world that has nothing else."""
+    node = f"{kind.node} {{ }}"
+    part = f"HingeJoint {{ device {node} }}" if kind.on_joint else node
+    world = f"#VRML_SIM R2023b utf8\nRobot {{ children [ {part} ] }}\n"
+    (robot,) = Simulation.load(world.encode()).robots
+    (device,) = robot.parts.devices.of(kind)
+    return device
