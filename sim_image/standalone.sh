@@ -1,12 +1,13 @@
 #!/bin/sh
 # Make a folder that holds the sidecar and everything it needs but a shell: Python, its libraries, the C library.
 # It runs where it is copied to, in any Linux image of this machine's processor, whatever that image holds.
-# Run inside the stub's image, when the packages are installed. Argument: the folder.
+# Run inside the stub's image, when the packages are installed.
+# Arguments: the folder; where the packages are installed, if elsewhere.
 set -eu
 target=$1
 python=$(readlink -f /usr/bin/python3)
 name=$(basename "$python")
-installed=/usr/local/lib/$name/dist-packages
+installed=${2:-/usr/local/lib/$name/dist-packages}
 own=$target/lib/python3/dist-packages # where Debian's Python looks below its own prefix
 
 mkdir -p "$target/bin" "$own"

@@ -123,12 +123,12 @@ def world(tmp_path):
 def arguments(tmp_path, world):
     """Return the command line of a sidecar; its simulator is Python as text, or a command line."""
 
-    def make(program, *options):
+    def make(program, *options, executable=PROGRAM):
         if isinstance(program, str):
             (tmp_path / "simulator.py").write_text(program)
             program = [sys.executable, "-I", "-S", "-u", str(tmp_path / "simulator.py")]
         return [
-            *(PROGRAM, "--driver", "command", "--world", str(world)),
+            *(executable, "--driver", "command", "--world", str(world)),
             *("--control", "127.0.0.1:0", "--health", "127.0.0.1:0", *options),
             *("--", *program, str(tmp_path)),
         ]
@@ -141,8 +141,8 @@ def sidecar(arguments, tmp_path):
     """Return how to run a sidecar; at the end of the test nothing of it may be left."""
     running = []
 
-    def run(program, *options, before=()):
-        running.append(Sidecar([*before, *arguments(program, *options)]))
+    def run(program, *options, before=(), executable=PROGRAM):
+        running.append(Sidecar([*before, *arguments(program, *options, executable=executable)]))
         return running[-1]
 
     yield run
