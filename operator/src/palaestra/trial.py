@@ -126,7 +126,7 @@ def _readable(status: Object) -> Status:
 
 def _why(status: Object) -> str:
     """Return reason and message of the condition that is the subject of the status."""
-    conditions = {each["type"]: each for each in status.get("conditions", ())}
+    conditions = {condition["type"]: condition for condition in status.get("conditions", ())}
     if not conditions:
         return "nothing has looked at it: does the operator run, and does it look after this namespace?"
     accepted = conditions.get("Accepted", {}).get("status") != "False"

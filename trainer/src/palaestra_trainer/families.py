@@ -12,7 +12,7 @@ from palaestra_protocol.pod.status import Cause, FaultKind, Role
 # The scale of returns is not known in advance, and they are often negative. So the buckets are the same on
 # both sides of 0, and each is at most two and a half times as wide as the one before.
 DECADES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
-RETURNS = (*(-each for each in reversed(DECADES)), 0.0, *DECADES)
+RETURNS = (*(-decade for decade in reversed(DECADES)), 0.0, *DECADES)
 LENGTHS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0)
 STEP_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 CHECKPOINT_S = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
@@ -73,7 +73,7 @@ RETURN_MEAN = gauge(
 RETURN_QUANTILE = gauge(
     "palaestra_trainer_episode_return_quantile",
     "Quantiles of the returns of the last 100 training episodes: minimum, median, maximum.",
-    Label(name="rank", values=tuple(f"{each:g}" for each in QUANTILES)),
+    Label(name="rank", values=tuple(f"{quantile:g}" for quantile in QUANTILES)),
 )
 LENGTH = histogram(
     "palaestra_trainer_episode_length_steps", "Steps of each training episode of this attempt.", LENGTHS

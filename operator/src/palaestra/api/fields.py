@@ -86,7 +86,9 @@ def _without_unknown_words(items: Any, read: ValidatorFunctionWrapHandler) -> An
     try:
         return read(items)
     except ValidationError as error:
-        unknown = {each["loc"][0] for each in error.errors(include_url=False) if each["type"] == "enum"}
+        unknown = {
+            problem["loc"][0] for problem in error.errors(include_url=False) if problem["type"] == "enum"
+        }
         if not unknown:
             raise
         return read([item for place, item in enumerate(items) if place not in unknown])

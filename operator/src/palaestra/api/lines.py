@@ -12,6 +12,6 @@ def one_line(text: str, most: int) -> str:
 
 def flat(text: str, most: int) -> str:
     """Return the same with a space at either end where there was some."""
-    plain = "".join(each if each.isprintable() else " " for each in text[: most * 4])
+    plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])
     words = _SPACES.sub(" ", plain)
     return words if len(words) <= most else words[: most - 3] + "..."

@@ -20,7 +20,7 @@ def lacks(served: Schema, ours: Schema, path: str = "") -> Iterator[str]:
     if kind != wanted:
         yield f"{path}: is {_article(kind)}, not {_article(wanted)}"
         return
-    if unknown := [each for each in ours.get("enum", ()) if each not in served.get("enum", (each,))]:
+    if unknown := [choice for choice in ours.get("enum", ()) if choice not in served.get("enum", (choice,))]:
         yield f"{path}: does not know {', '.join(map(str, unknown))}"
     for name, inner in ours.get("properties", {}).items():
         below = f"{path}.{name}" if path else name

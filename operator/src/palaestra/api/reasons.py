@@ -448,5 +448,5 @@ ROWS: dict[Reason, Row] = {
 
 def say(reason: Reason, **facts: object) -> str:
     """Return the message of `reason` with the facts filled in: one line, at most 1024 characters."""
-    told = {name: flat(str(fact), LONGEST_FACT) for name, fact in facts.items()}
-    return one_line(ROWS[reason].message.format(**told), LONGEST_MESSAGE)
+    words = {name: flat(str(fact), LONGEST_FACT) for name, fact in facts.items()}
+    return one_line(ROWS[reason].message.format(**words), LONGEST_MESSAGE)

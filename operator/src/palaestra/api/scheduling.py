@@ -45,19 +45,23 @@ class Toleration(ApiModel):
     rules = (
         Rule(
             field="key",
-            holds=lambda it: not it.key.startswith("node-role.kubernetes.io/"),
+            holds=lambda toleration: not toleration.key.startswith("node-role.kubernetes.io/"),
             cel="!self.key.startsWith('node-role.kubernetes.io/')",
             message="is a taint that reserves nodes for the cluster's own components; remove it",
         ),
         Rule(
             field="value",
-            holds=lambda it: it.value is None or it.operator is TolerationOperator.EQUAL,
+            holds=lambda toleration: (
+                toleration.value is None or toleration.operator is TolerationOperator.EQUAL
+            ),
             cel="!has(self.value) || self.operator == 'Equal'",
             message="has no effect with operator Exists; remove it or use Equal",
         ),
         Rule(
             field="tolerationSeconds",
-            holds=lambda it: it.toleration_seconds is None or it.effect is TaintEffect.NO_EXECUTE,
+            holds=lambda toleration: (
+                toleration.toleration_seconds is None or toleration.effect is TaintEffect.NO_EXECUTE
+            ),
             cel="!has(self.tolerationSeconds) || (has(self.effect) && self.effect == 'NoExecute')",
             message="requires effect NoExecute; set that effect or remove it",
         ),
@@ -116,13 +120,13 @@ class Scheduling(ApiModel):
     rules = (
         Rule(
             field="priorityClassName",
-            holds=lambda it: not (it.priority_class_name or "").startswith("system-"),
+            holds=lambda scheduling: not (scheduling.priority_class_name or "").startswith("system-"),
             cel="!has(self.priorityClassName) || !self.priorityClassName.startsWith('system-')",
             message="classes that begin with system- are for the cluster's own components; choose another",
         ),
         Rule(
             field="podLabels",
-            holds=lambda it: all(_is_selected_by_nobody(key) for key in it.pod_labels),
+            holds=lambda scheduling: all(_is_selected_by_nobody(key) for key in scheduling.pod_labels),
             cel="self.podLabels.all(key, key.contains('/') && !key.startsWith('/')"
             " && !key.split('/')[0].endsWith('kubernetes.io') && !key.split('/')[0].endsWith('k8s.io'))",
             message="Services and NetworkPolicies of other users may select pods by a label without your"
@@ -130,21 +134,21 @@ class Scheduling(ApiModel):
         ),
         Rule(
             field="podAnnotations",
-            holds=lambda it: not any(_confines(key) for key in it.pod_annotations),
+            holds=lambda scheduling: not any(_confines(key) for key in scheduling.pod_annotations),
             cel="!self.podAnnotations.exists(key, key.contains('/') && key.split('/')[0].contains('security')"
             " && key.split('/')[0].endsWith('.kubernetes.io'))",
             message="a job must not select AppArmor or seccomp profiles; remove those annotations",
         ),
         Rule(
             field="podLabels",
-            holds=lambda it: _has_none_of_ours(it.pod_labels),
+            holds=lambda scheduling: _has_none_of_ours(scheduling.pod_labels),
             cel="self.podLabels.all(key, !key.startsWith('palaestra.dev/')"
             " && !key.startsWith('kueue.x-k8s.io/'))",
             message="Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; remove them",
         ),
         Rule(
             field="podAnnotations",
-            holds=lambda it: _has_none_of_ours(it.pod_annotations),
+            holds=lambda scheduling: _has_none_of_ours(scheduling.pod_annotations),
             cel="self.podAnnotations.all(key, !key.startsWith('palaestra.dev/')"
             " && !key.startsWith('kueue.x-k8s.io/'))",
             message="Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; remove them",

@@ -46,31 +46,31 @@ class Storage(ApiModel):
     rules = (
         Rule(
             field="ephemeral",
-            holds=lambda it: not (it.ephemeral and it.existing_claim is not None),
+            holds=lambda storage: not (storage.ephemeral and storage.existing_claim is not None),
             cel="!(self.ephemeral && has(self.existingClaim))",
             message="cannot be combined with existingClaim; remove one of them",
         ),
         Rule(
             field="ephemeral",
-            holds=lambda it: not (it.ephemeral and it.storage_class_name is not None),
+            holds=lambda storage: not (storage.ephemeral and storage.storage_class_name is not None),
             cel="!(self.ephemeral && has(self.storageClassName))",
             message="cannot be combined with storageClassName, as no claim is created; remove one of them",
         ),
         Rule(
             field="storageClassName",
-            holds=lambda it: it.storage_class_name is None or it.existing_claim is None,
+            holds=lambda storage: storage.storage_class_name is None or storage.existing_claim is None,
             cel="!(has(self.storageClassName) && has(self.existingClaim))",
             message="cannot be combined with existingClaim, which already has a class; remove one of them",
         ),
         Rule(
             field="retain",
-            holds=lambda it: it.existing_claim is None or it.retain is Retain.KEEP,
+            holds=lambda storage: storage.existing_claim is None or storage.retain is Retain.KEEP,
             cel="!has(self.existingClaim) || self.retain == 'Keep'",
             message="an existing claim is never deleted with the job; use Keep",
         ),
         Rule(
             field="resumeFrom",
-            holds=lambda it: it.resume_from is None or it.existing_claim is not None,
+            holds=lambda storage: storage.resume_from is None or storage.existing_claim is not None,
             cel="!has(self.resumeFrom) || has(self.existingClaim)",
             message="needs existingClaim; name the claim that contains the run",
         ),

@@ -74,19 +74,19 @@ class Normalize(ApiModel):
 
     rules = (
         Rule(
-            holds=lambda it: it.observations or it.rewards,
+            holds=lambda normalize: normalize.observations or normalize.rewards,
             cel="self.observations || self.rewards",
             message="has no effect while observations and rewards are both false; remove it",
         ),
         Rule(
             field="clipObservations",
-            holds=lambda it: it.clip_observations is None or it.observations,
+            holds=lambda normalize: normalize.clip_observations is None or normalize.observations,
             cel="!has(self.clipObservations) || self.observations",
             message="has no effect while observations is false; remove it",
         ),
         Rule(
             field="clipRewards",
-            holds=lambda it: it.clip_rewards is None or it.rewards,
+            holds=lambda normalize: normalize.clip_rewards is None or normalize.rewards,
             cel="!has(self.clipRewards) || self.rewards",
             message="has no effect while rewards is false; remove it",
         ),
@@ -128,13 +128,13 @@ class Evaluation(ApiModel):
     rules = (
         Rule(
             field="stopAtSuccessRate",
-            holds=lambda it: it.stop_at_success_rate is None or it.every_steps > 0,
+            holds=lambda evaluation: evaluation.stop_at_success_rate is None or evaluation.every_steps > 0,
             cel="!has(self.stopAtSuccessRate) || self.everySteps > 0",
             message="nothing is evaluated while everySteps is 0; remove it or evaluate",
         ),
         Rule(
             field="confirmEpisodes",
-            holds=lambda it: not it.confirm_episodes or it.every_steps > 0,
+            holds=lambda evaluation: not evaluation.confirm_episodes or evaluation.every_steps > 0,
             cel="!has(self.confirmEpisodes) || self.confirmEpisodes == 0 || self.everySteps > 0",
             message="nothing is evaluated while everySteps is 0; remove it or evaluate",
         ),
@@ -198,13 +198,17 @@ class Trainer(ApiModel):
     rules = (
         Rule(
             field="algorithm.name",
-            holds=lambda it: it.algorithm.name is not AlgorithmName.SAC or _actions(it) != "discrete",
+            holds=lambda trainer: (
+                trainer.algorithm.name is not AlgorithmName.SAC or _actions(trainer) != "discrete"
+            ),
             reads=_ACTIONS,
             message="SAC needs continuous actions; set environment.options.actions: continuous",
         ),
         Rule(
             field="algorithm.name",
-            holds=lambda it: it.algorithm.name is not AlgorithmName.DQN or _actions(it) != "continuous",
+            holds=lambda trainer: (
+                trainer.algorithm.name is not AlgorithmName.DQN or _actions(trainer) != "continuous"
+            ),
             reads=_ACTIONS,
             message="DQN needs discrete actions; set environment.options.actions: discrete",
         ),

@@ -32,10 +32,10 @@ def add(commands: Commands) -> None:
 def _doctor(client: Client, options: argparse.Namespace) -> int:
     site = Site(api=client.api, namespace=client.namespace, operator_namespace=options.operator_namespace)
     found = []
-    for each in examine(site):
-        found.append(each)
-        say(shown(each))
-    return REFUSED if any(each.verdict is Verdict.WRONG for each in found) else 0
+    for finding in examine(site):
+        found.append(finding)
+        say(shown(finding))
+    return REFUSED if any(finding.verdict is Verdict.WRONG for finding in found) else 0
 
 
 def shown(found: Finding) -> Iterator[str]:

@@ -101,7 +101,7 @@ def _document(client: Client, options: argparse.Namespace, namespace: str | None
         if namespace is not None and not found:
             check_namespace(client.api, namespace)
     if options.output == "name":
-        say(f"trainingjob.palaestra.dev/{each['metadata']['name']}" for each in found)
+        say(f"trainingjob.palaestra.dev/{job['metadata']['name']}" for job in found)
     elif options.output == "yaml":
         say([as_yaml(found).rstrip("\n")])
     else:

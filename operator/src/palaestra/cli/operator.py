@@ -134,8 +134,8 @@ def _add_images(parser: argparse.ArgumentParser) -> None:
     release = Images.of_release(version("palaestra"))
     for name in ("trainer", "stub", "webots"):
         image = getattr(release, name)
-        told = f"image for jobs that name none; default: {image}"
-        parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=told)
+        meaning = f"image for jobs that name none; default: {image}"
+        parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=meaning)
 
 
 def _operator(options: argparse.Namespace) -> int:

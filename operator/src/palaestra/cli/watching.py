@@ -58,11 +58,14 @@ def _drawn(client: Client, options: argparse.Namespace) -> TrainingJob:
 
 def _printed(client: Client, options: argparse.Namespace) -> TrainingJob:
     """Print a line for each visible change, and return the job's last state."""
-    job, told = client.get(options.name), ""
+    job, shown = client.get(options.name), ""
     for job in client.changes(options.name, deadline_s=options.timeout):
-        parts = [f"{each.index}: {each.phase} {progress(each)}".rstrip() for each in job.status.replicas]
+        parts = [
+            f"{replica.index}: {replica.phase} {progress(replica)}".rstrip()
+            for replica in job.status.replicas
+        ]
         line = "; ".join([str(job.status.phase or "not reconciled by an operator yet"), *parts])
-        if line != told:
+        if line != shown:
             say([line])
-            told = line
+            shown = line
     return job

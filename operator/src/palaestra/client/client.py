@@ -97,7 +97,7 @@ class Client:
     def list(self, labels: str | None = None) -> tuple[TrainingJob, ...]:
         """Return all jobs of the namespace, or those that match a label selector."""
         with asked(None, self.namespace):
-            return tuple(_job(each) for each in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
+            return tuple(_job(job) for job in self.api.list(TRAINING_JOBS, self.namespace, labels=labels))
 
     def raw(self, name: str) -> Object:
         """Return a job as plain data, as the API server stores it.
@@ -118,8 +118,8 @@ class Client:
         found = None
         deadline = time.monotonic() + deadline_s
         with asked(None, self.namespace):
-            for each in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
-                found = _job(each)
+            for change in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline):
+                found = _job(change)
                 yield found
                 if current(found) and found.status.phase in TERMINAL:
                     return
@@ -281,7 +281,7 @@ def _newest_pod(job: TrainingJob, replica: int) -> PodReference:
     Raises:
         NoPod: it has none.
     """
-    pod = next((each.pod for each in job.status.replicas if each.index == replica), None)
+    pod = next((known.pod for known in job.status.replicas if known.index == replica), None)
     if pod is None:
         name = job.metadata.name
         raise NoPod(
@@ -295,7 +295,7 @@ def _containers(job: TrainingJob, replica: int) -> tuple[str, ...]:
     """Return the names of the containers of a replica whose logs people read."""
     layout = ClusterLayout(images=Images.of_release(version("palaestra")))
     simulators = Replica(job=job, index=replica, layout=layout).simulators
-    return (TRAINER, ROS_MASTER, *(each.container for each in simulators))
+    return (TRAINER, ROS_MASTER, *(simulator.container for simulator in simulators))
 
 
 def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:

@@ -187,7 +187,7 @@ def _running(api: Api, job: TrainingJob, replica: int) -> str | None:
     Raises:
         NotFetched: the pod is about to start and needs its volume, or is just ending.
     """
-    known = next((each for each in job.status.replicas if each.index == replica), None)
+    known = next((reported for reported in job.status.replicas if reported.index == replica), None)
     name = known.pod.name if known is not None and known.pod is not None else None
     status = _status(api, job.metadata.namespace, name) if name is not None else {}
     phase = status.get("phase")
@@ -220,7 +220,10 @@ def _status(api: Api, namespace: str, name: str) -> Object:
 
 def _trainer_ended(status: Object) -> bool:
     containers = status.get("containerStatuses", ())
-    return any(each["name"] == TRAINER and "terminated" in (each.get("state") or {}) for each in containers)
+    return any(
+        container["name"] == TRAINER and "terminated" in (container.get("state") or {})
+        for container in containers
+    )
 
 
 @contextmanager
@@ -245,13 +248,13 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
     namespace, name = pod["metadata"]["namespace"], pod["metadata"]["name"]
     why = ""
     try:
-        for each in changes(api, PODS, namespace, name, deadline=deadline):
-            phase = each["status"].get("phase")
+        for change in changes(api, PODS, namespace, name, deadline=deadline):
+            phase = change["status"].get("phase")
             if phase == "Running":
                 return
             if phase in {"Succeeded", "Failed"}:
                 break
-            why = hindrance(each) or why
+            why = hindrance(change) or why
     except TookTooLong:
         raise TookTooLong(
             f"pod {name}: did not start in time ({why or 'no reason reported'}); "
@@ -263,7 +266,9 @@ def _await(api: Api, pod: Object, deadline: float) -> None:
 def hindrance(pod: Object) -> str:
     """Return why a pod does not run, as the cluster reports it; empty: no reason reported."""
     status = pod["status"]
-    waiting = [(each.get("state") or {}).get("waiting") for each in status.get("containerStatuses", ())]
-    unmet = [each for each in status.get("conditions", ()) if each.get("status") == "False"]
-    told = [each for each in (*waiting, *unmet) if each and each.get("message")]
-    return f"{told[0].get('reason')}: {told[0]['message']}" if told else ""
+    waiting = [
+        (container.get("state") or {}).get("waiting") for container in status.get("containerStatuses", ())
+    ]
+    unmet = [condition for condition in status.get("conditions", ()) if condition.get("status") == "False"]
+    reports = [report for report in (*waiting, *unmet) if report and report.get("message")]
+    return f"{reports[0].get('reason')}: {reports[0]['message']}" if reports else ""

@@ -38,7 +38,7 @@ def changes(
         TookTooLong: the deadline passed.
         ApiError: the API server refuses. Retryable errors are retried once the object was seen.
     """
-    told, failures = "", 0
+    version, failures = "", 0
     while True:
         try:
             for found in _until_the_watch_ends(api, resource, namespace, name, deadline):
@@ -46,13 +46,13 @@ def changes(
                 uid = uid or found["metadata"]["uid"]
                 if found["metadata"]["uid"] != uid:
                     return
-                if _version(found) != told:
-                    told = _version(found)
+                if _version(found) != version:
+                    version = _version(found)
                     yield found
         except _Gone:
             return
         except ApiError as error:
-            if not (error.retryable and told):
+            if not (error.retryable and version):
                 raise
         failures += 1
         threading.Event().wait(min(api.limits.again.wait_s(failures), _left(deadline)))

@@ -46,7 +46,11 @@ def happenings(api: Api, job: TrainingJob) -> tuple[Happening, ...]:
         ApiError: the API server refuses.
     """
     events = api.list(EVENTS, job.metadata.namespace)
-    return tuple(sorted((_read(each) for each in events if concerns(each, job)), key=lambda each: each.time))
+    return tuple(
+        sorted(
+            (_read(event) for event in events if concerns(event, job)), key=lambda happening: happening.time
+        )
+    )
 
 
 def concerns(event: Mapping[str, Any], job: TrainingJob) -> bool:
@@ -64,7 +68,7 @@ def _read(event: Mapping[str, Any]) -> Happening:
     about = event["involvedObject"]
     times = (event.get("lastTimestamp"), event.get("eventTime"), event["metadata"]["creationTimestamp"])
     return Happening(
-        time=datetime.fromisoformat(next(each for each in times if each)),
+        time=datetime.fromisoformat(next(time for time in times if time)),
         warning=event.get("type") == "Warning",
         about=f"{about.get('kind')}/{about.get('name')}",
         reason=str(event.get("reason") or ""),

@@ -16,9 +16,9 @@ def files(folder: str, name: str) -> list[str]:
     if os.path.isfile(path):
         return [name]
     found = [
-        os.path.relpath(os.path.join(where, each), folder)
+        os.path.relpath(os.path.join(where, name), folder)
         for where, _, names in os.walk(path)
-        for each in names
+        for name in names
     ]
     return sorted(found)
 

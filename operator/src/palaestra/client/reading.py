@@ -11,7 +11,11 @@ def current(job: TrainingJob) -> bool:
 
 def why(status: Status) -> str:
     """Return reason and message of the condition of the phase; empty if there is none."""
-    for each in status.conditions:
-        if status.phase and each.type.value == status.phase.value and each.status is ConditionStatus.TRUE:
-            return f"{each.reason}: {each.message}"
+    for condition in status.conditions:
+        if (
+            status.phase
+            and condition.type.value == status.phase.value
+            and condition.status is ConditionStatus.TRUE
+        ):
+            return f"{condition.reason}: {condition.message}"
     return ""

@@ -34,7 +34,7 @@ def reading_pod(job: TrainingJob, template: Mapping[str, Any], name: str, lives_
     spec |= {
         "activeDeadlineSeconds": lives_s,
         "terminationGracePeriodSeconds": GRACE_S,
-        "volumes": [each for each in spec["volumes"] if each["name"] == VOLUME],
+        "volumes": [volume for volume in spec["volumes"] if volume["name"] == VOLUME],
         "containers": [_reader(trainer_of(template), lives_s)],
     }
     labels = {"app.kubernetes.io/managed-by": "palaestra", FETCH_LABEL: job.metadata.name}
@@ -61,16 +61,18 @@ def _reader(trainer: Mapping[str, Any], lives_s: int) -> dict[str, Any]:
         "securityContext": trainer["securityContext"],
         "resources": RESOURCES,
         "volumeMounts": [
-            {**each, "readOnly": True} for each in trainer["volumeMounts"] if each["name"] == VOLUME
+            {**mount, "readOnly": True} for mount in trainer["volumeMounts"] if mount["name"] == VOLUME
         ],
     }
 
 
 def trainer_of(template: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the trainer's container."""
-    return next(each for each in template["spec"]["containers"] if each["name"] == TRAINER)
+    return next(container for container in template["spec"]["containers"] if container["name"] == TRAINER)
 
 
 def run_directory(template: Mapping[str, Any]) -> str:
     """Return the path of the run in the trainer and in the reading pod."""
-    return next(str(each["value"]) for each in trainer_of(template)["env"] if each["name"] == RUN_VARIABLE)
+    return next(
+        str(variable["value"]) for variable in trainer_of(template)["env"] if variable["name"] == RUN_VARIABLE
+    )

@@ -91,7 +91,7 @@ def _read(file: Path) -> str:
 def _proxy(host: str) -> str | None:
     """Return the proxy that the environment names for a host; None without one."""
     proxies = getproxies()
-    direct = proxy_bypass(host) or any(_covers(each, host) for each in proxies.get("no", "").split(","))
+    direct = proxy_bypass(host) or any(_covers(pattern, host) for pattern in proxies.get("no", "").split(","))
     return None if direct else proxies.get("https")
 
 

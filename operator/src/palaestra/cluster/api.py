@@ -97,9 +97,9 @@ class Api:
         group, _, version = group_version.rpartition("/")
         name = {"group": group, "version": version, "kind": kind}
         found: Objects = list(document.get("components", {}).get("schemas", {}).values())
-        for each in found:
-            if name in each.get("x-kubernetes-group-version-kind", ()):
-                return each
+        for resource in found:
+            if name in resource.get("x-kubernetes-group-version-kind", ()):
+                return resource
         raise NotFound(404, "NotFound", f"{path} has no {kind}")
 
     def list(

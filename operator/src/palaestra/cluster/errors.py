@@ -177,7 +177,7 @@ def from_status(code: int, status: Mapping[str, Any], retry_after: str | None = 
 def _by_cause(status: Mapping[str, Any]) -> type[ApiError] | None:
     """Return the error that a cause names, for reasons that several errors share."""
     causes = (status.get("details") or {}).get("causes") or ()
-    return next((BY_CAUSE[each["reason"]] for each in causes if each.get("reason") in BY_CAUSE), None)
+    return next((BY_CAUSE[cause["reason"]] for cause in causes if cause.get("reason") in BY_CAUSE), None)
 
 
 def _seconds(text: str | None) -> float:

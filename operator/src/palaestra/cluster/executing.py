@@ -96,7 +96,7 @@ def _failure(status: Mapping[str, Any], said: str) -> CommandFailed | ApiError |
     if status.get("status") == "Success":
         return None
     causes = (status.get("details") or {}).get("causes") or ()
-    codes = [str(each.get("message")) for each in causes if each.get("reason") == EXIT_CODE]
+    codes = [str(cause.get("message")) for cause in causes if cause.get("reason") == EXIT_CODE]
     if not codes:
         return from_status(SERVER_ERROR, status)
     return CommandFailed(int(codes[0]) if codes[0].isdecimal() else UNKNOWN_CODE, said.strip())

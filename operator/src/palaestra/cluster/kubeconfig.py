@@ -58,7 +58,7 @@ def namespace(files: str, context: str | None) -> str | None:
     except WRONG as error:
         raise NotConfigured(_fact(files, error)) from error
     known, current = contexts
-    chosen = next((each for each in known if each["name"] == context), None) if context else current
+    chosen = next((entry for entry in known if entry["name"] == context), None) if context else current
     if chosen is None:
         raise NotConfigured(
             f"--context: {files} has no {context!r}; `kubectl config get-contexts` names them"

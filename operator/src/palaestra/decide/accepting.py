@@ -9,7 +9,13 @@ from pydantic import ValidationError
 from palaestra.api import TrainingJob, validate
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import Phase, Status
-from palaestra.decide.conditions import Claim, Told, claims, conditions, reconciliation
+from palaestra.decide.conditions import (
+    ConditionState,
+    Explanation,
+    condition_states,
+    conditions,
+    reconciliation,
+)
 from palaestra.decide.decision import Decision
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import happening, of_actions, of_change
@@ -61,7 +67,7 @@ def reject(raw: Mapping[str, Any], refused: Refused, now: datetime) -> Decision:
     release accepted continues as it is; this release does not touch its pods.
     """
     now = whole(now)
-    told = Told(reason=refused.reason, message=refused.message)
+    explanation = Explanation(reason=refused.reason, message=refused.message)
     warning = happening(refused.reason, refused.message)
     try:
         old = _status(raw)
@@ -69,7 +75,7 @@ def reject(raw: Mapping[str, Any], refused: Refused, now: datetime) -> Decision:
         return Decision(status=None, events=(warning,))
     if old.release is not None:
         return Decision(status=None, events=(warning,))
-    status = _failed(raw, old, told, now)
+    status = _failed(raw, old, explanation, now)
     ttl_s = count(part(raw, "spec"), "ttlSecondsAfterFinished") if _has_ttl(raw) else None
     at, metadata = expires(status, ttl_s), part(raw, "metadata")
     actions = expired(text(metadata, "name", 253), text(metadata, "uid", 253), at, status, now)
@@ -92,11 +98,11 @@ def _has_ttl(raw: Mapping[str, Any]) -> bool:
     return part(raw, "spec").get("ttlSecondsAfterFinished") is not None
 
 
-def _failed(raw: Mapping[str, Any], old: Status, told: Told, now: datetime) -> Status:
+def _failed(raw: Mapping[str, Any], old: Status, explanation: Explanation, now: datetime) -> Status:
     generation = count(part(raw, "metadata"), "generation") or None
     current = {
-        **claims(Claim(holds=False, told=told), Phase.FAILED, told),
-        **reconciliation(Phase.FAILED, told, suspend=False),
+        **condition_states(ConditionState(holds=False, explanation=explanation), Phase.FAILED, explanation),
+        **reconciliation(Phase.FAILED, explanation, suspend=False),
     }
     return old.model_copy(
         update={

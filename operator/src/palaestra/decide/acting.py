@@ -14,16 +14,18 @@ from palaestra.plan import Plan, ReplicaPlan
 
 
 def actions(
-    job: TrainingJob, observed: Observed, prepared: Prepared, each: Sequence[Decided]
+    job: TrainingJob, observed: Observed, prepared: Prepared, decided: Sequence[Decided]
 ) -> tuple[Action, ...]:
     """Return the actions for the replicas of a job."""
-    stops = tuple(_stops(observed, each))
+    stops = tuple(_stops(observed, decided))
     stopping = {stop.replica for stop in stops}
-    switches = tuple(it for it in _switches(job, observed, prepared, each) if it.replica not in stopping)
+    switches = tuple(
+        switch for switch in _switches(job, observed, prepared, decided) if switch.replica not in stopping
+    )
     creations: tuple[Create, ...] = ()
     if prepared.plan is not None and job.status.release is not None:
-        creations = wanted(prepared.plan, observed, tuple(it.status for it in each))
-    return (*stops, *_replacements(observed, each), *switches, *_discards(job, observed), *creations)
+        creations = wanted(prepared.plan, observed, tuple(replica.status for replica in decided))
+    return (*stops, *_replacements(observed, decided), *switches, *_discards(job, observed), *creations)
 
 
 def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) -> tuple[Create, ...]:
@@ -33,7 +35,7 @@ def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) ->
     one volume. If a Job exists, its volumes have the names in it, even if a newer release names them
     otherwise.
     """
-    going_on = [each for each in observed.replicas if replicas[each.index].phase not in TERMINAL]
+    going_on = [replica for replica in observed.replicas if replicas[replica.index].phase not in TERMINAL]
     if not going_on:
         return ()
     missing = [
@@ -43,15 +45,17 @@ def wanted(plan: Plan, observed: Observed, replicas: Sequence[ReplicaStatus]) ->
         if (planned := plan.replicas.get(seen.index)) is None:
             continue
         things = _things(planned, seen)
-        missing += [Create(object=it, replica=seen.index) for it in things if not _there(it, observed)]
+        missing += [
+            Create(object=thing, replica=seen.index) for thing in things if not _there(thing, observed)
+        ]
     return tuple(missing)
 
 
 def _things(planned: ReplicaPlan, seen: ReplicaObserved) -> tuple[Object, ...]:
     volumes = [thing for thing in (planned.config_map, planned.claim) if thing is not None]
     if seen.job is not None:
-        return tuple(each for each in volumes if each["metadata"]["name"] in seen.job.volumes)
-    if seen.obstacle is not None or seen.in_the_way or seen.former or any(not it.ended for it in seen.pods):
+        return tuple(volume for volume in volumes if volume["metadata"]["name"] in seen.job.volumes)
+    if seen.obstacle is not None or seen.in_the_way or seen.former or any(not pod.ended for pod in seen.pods):
         return ()
     return (*volumes, planned.job)
 
@@ -60,12 +64,12 @@ def _there(thing: Object, observed: Observed) -> bool:
     return (thing["kind"], thing["metadata"]["name"]) in observed.present
 
 
-def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
+def _stops(observed: Observed, decided: Sequence[Decided]) -> Iterator[Stop]:
     """Yield a stop for each replica that has to end and was not stopped yet."""
-    for seen, it in zip(observed.replicas, each, strict=True):
+    for seen, replica in zip(observed.replicas, decided, strict=True):
         if seen.job is None or seen.job.end is not None:
             continue
-        if (stop := it.course.stop) is not None and seen.job.stopped is None:
+        if (stop := replica.course.stop) is not None and seen.job.stopped is None:
             yield Stop(
                 job=seen.job.name,
                 replica=seen.index,
@@ -75,10 +79,10 @@ def _stops(observed: Observed, each: Sequence[Decided]) -> Iterator[Stop]:
             )
 
 
-def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Replace]:
+def _replacements(observed: Observed, decided: Sequence[Decided]) -> Iterator[Replace]:
     """Yield a replacement for each pod that no kubelet repairs, unless the pod is being deleted."""
-    for seen, it in zip(observed.replicas, each, strict=True):
-        why = it.course.replace
+    for seen, replica in zip(observed.replicas, decided, strict=True):
+        why = replica.course.replace
         if why is None or seen.job is None or seen.pod is None or seen.pod.gone_by is not None:
             continue
         mark = seen.job.replaced
@@ -97,18 +101,18 @@ def _replacements(observed: Observed, each: Sequence[Decided]) -> Iterator[Repla
 
 
 def _switches(
-    job: TrainingJob, observed: Observed, prepared: Prepared, each: Sequence[Decided]
+    job: TrainingJob, observed: Observed, prepared: Prepared, decided: Sequence[Decided]
 ) -> Iterator[SetSuspend]:
     """Yield a change for each Job whose `suspend` is not as in the spec; a hold prevents a resumption."""
-    for seen, it in zip(observed.replicas, each, strict=True):
+    for seen, replica in zip(observed.replicas, decided, strict=True):
         held = prepared.closed is not None and to_resume(job, seen.job)
-        going_on = it.status.phase not in TERMINAL and not held
+        going_on = replica.status.phase not in TERMINAL and not held
         if seen.job is not None and going_on and to_set(job, seen.job):
             yield SetSuspend(
                 job=seen.job.name,
                 replica=seen.index,
                 suspend=job.spec.suspend,
-                mark=mark(seen, it.status.pod, suspend=job.spec.suspend),
+                mark=mark(seen, replica.status.pod, suspend=job.spec.suspend),
                 basis=_basis(seen.job),
             )
 
@@ -118,7 +122,7 @@ def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
 
     The deadline of a suspended Job does not run, so nothing else would ever end it.
     """
-    ended = {each.index for each in job.status.replicas if each.phase in TERMINAL}
+    ended = {replica.index for replica in job.status.replicas if replica.phase in TERMINAL}
     for seen in observed.replicas:
         if seen.index not in ended or seen.job is None or seen.job.end is not None or seen.job.deleting:
             continue
@@ -127,4 +131,4 @@ def _discards(job: TrainingJob, observed: Observed) -> Iterator[Discard]:
 
 
 def _basis(job: JobView, pods: Sequence[PodView] = ()) -> Basis:
-    return Basis(uid=job.uid, version=job.version, pods=frozenset((each.uid, each.version) for each in pods))
+    return Basis(uid=job.uid, version=job.version, pods=frozenset((pod.uid, pod.version) for pod in pods))

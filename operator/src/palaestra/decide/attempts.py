@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from palaestra.api.reasons import Reason
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code, failed_by_itself
 from palaestra.decide.memory import killed_for_memory, kills_of, limit_of
-from palaestra.decide.situation import Situation, told
+from palaestra.decide.situation import Situation, explain
 from palaestra.decide.suspending import ended_by_suspension, suspended_by
 from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, storage_eviction
 from palaestra.observe.views import JobView, PodView
@@ -28,14 +28,14 @@ class Attempt:
     """An attempt that has ended.
 
     Attributes:
-        it: the replica.
+        situation: the replica.
         number: from 1.
         name: of its pod.
         pod: None if it is gone.
         code: exit code of its trainer; None if unknown.
     """
 
-    it: Situation
+    situation: Situation
     number: int
     name: str
     pod: PodView | None
@@ -44,127 +44,127 @@ class Attempt:
     @property
     def word(self) -> Termination | None:
         """Return the trainer's termination message, its last word."""
-        return self.it.seen.terminations.get(self.pod.uid) if self.pod is not None else None
+        return self.situation.seen.terminations.get(self.pod.uid) if self.pod is not None else None
 
     @property
     def words(self) -> str:
         """Return why it ended, in the best words that are known."""
         if self.word is not None:
             return self.word.reason
-        return how_it_failed(self.it, self.pod) if self.pod is not None else GONE
+        return how_it_failed(self.situation, self.pod) if self.pod is not None else GONE
 
 
-EndCheck = Callable[[Attempt], Told | None]
+EndCheck = Callable[[Attempt], Explanation | None]
 
 
-def of_pod(it: Situation, pod: PodView, number: int) -> Attempt:
+def of_pod(situation: Situation, pod: PodView, number: int) -> Attempt:
     """Return the attempt of a pod that still exists."""
-    return Attempt(it=it, number=number, name=pod.name, pod=pod, code=exit_code(pod))
+    return Attempt(situation=situation, number=number, name=pod.name, pod=pod, code=exit_code(pod))
 
 
-def completed(attempt: Attempt) -> Told | None:
+def completed(attempt: Attempt) -> Explanation | None:
     """The training is complete."""
-    return told(Reason.SUCCEEDED, what=success(attempt.word)) if attempt.code == ExitCode.DONE else None
+    return explain(Reason.SUCCEEDED, what=success(attempt.word)) if attempt.code == ExitCode.DONE else None
 
 
-def evicted_for_storage(attempt: Attempt) -> Told | None:
+def evicted_for_storage(attempt: Attempt) -> Explanation | None:
     """The pod was evicted because it wrote more than its limit."""
     return None if attempt.pod is None else storage_eviction(attempt.pod)
 
 
-def replaced(attempt: Attempt) -> Told | None:
+def replaced(attempt: Attempt) -> Explanation | None:
     """The operator replaced the pod, because no kubelet repairs it."""
-    return None if attempt.pod is None else mark_of(attempt.it, attempt.pod)
+    return None if attempt.pod is None else mark_of(attempt.situation, attempt.pod)
 
 
-def disrupted(attempt: Attempt) -> Told | None:
+def disrupted(attempt: Attempt) -> Explanation | None:
     """The cluster interrupted the pod, by a condition of the pod."""
     if attempt.pod is None or not attempt.pod.disruption:
         return None
-    return told(Reason.DISRUPTED, pod=attempt.name, words=attempt.pod.disruption)
+    return explain(Reason.DISRUPTED, pod=attempt.name, words=attempt.pod.disruption)
 
 
-def gone(attempt: Attempt) -> Told | None:
+def gone(attempt: Attempt) -> Explanation | None:
     """The pod is gone; report the cause under which its restart was counted."""
     if attempt.pod is not None:
         return None
-    before, after = attempt.it.old.restarts, attempt.it.counted.restarts
+    before, after = attempt.situation.old.restarts, attempt.situation.counted.restarts
     if after.trainer > before.trainer:
-        return told(Reason.TRAINER_FAILED, how=GONE)
-    mark = attempt.it.seen.job.replaced if attempt.it.seen.job is not None else None
+        return explain(Reason.TRAINER_FAILED, how=GONE)
+    mark = attempt.situation.seen.job.replaced if attempt.situation.seen.job is not None else None
     if mark is not None and (after.operator or 0) > (before.operator or 0):
-        return Told(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
+        return Explanation(reason=Reason.known(mark.reason), message=mark.message or mark.reason)
     if after.suspension > before.suspension:
-        return paused(attempt.it)
-    return told(Reason.DISRUPTED, pod=attempt.name, words=GONE)
+        return paused(attempt.situation)
+    return explain(Reason.DISRUPTED, pod=attempt.name, words=GONE)
 
 
-def deleted(attempt: Attempt) -> Told | None:
+def deleted(attempt: Attempt) -> Explanation | None:
     """The pod was deleted: by us, by Kueue, or by a person."""
-    pod, job = attempt.pod, attempt.it.seen.job
+    pod, job = attempt.pod, attempt.situation.seen.job
     if attempt.code not in BY_SIGNAL or pod is None or pod.gone_by is None:
         return None
     if job is not None and (stop := stop_of(job)) is not None:
         return stop
-    if job is not None and (job.suspended or ended_by_suspension(attempt.it.seen, pod)):
-        return paused(attempt.it)
+    if job is not None and (job.suspended or ended_by_suspension(attempt.situation.seen, pod)):
+        return paused(attempt.situation)
     if attempt.code not in {None, ExitCode.INTERRUPTED} or failed_by_itself(pod):  # the Job counts it so
-        how = f"{how_it_failed(attempt.it, pod)}; its pod was deleted, and it did not save in time"
-        return told(Reason.TRAINER_FAILED, how=how)
-    return told(Reason.DISRUPTED, pod=attempt.name, words="it was deleted")
+        how = f"{how_it_failed(attempt.situation, pod)}; its pod was deleted, and it did not save in time"
+        return explain(Reason.TRAINER_FAILED, how=how)
+    return explain(Reason.DISRUPTED, pod=attempt.name, words="it was deleted")
 
 
-def interrupted(attempt: Attempt) -> Told | None:
+def interrupted(attempt: Attempt) -> Explanation | None:
     """The trainer saved a checkpoint and stopped for an unknown reason."""
     if attempt.code != ExitCode.INTERRUPTED or attempt.pod is None:
         return None
-    return told(Reason.INTERRUPTED, pod=attempt.name, how=how_it_failed(attempt.it, attempt.pod))
+    return explain(Reason.INTERRUPTED, pod=attempt.name, how=how_it_failed(attempt.situation, attempt.pod))
 
 
-def configuration_refused(attempt: Attempt) -> Told | None:
+def configuration_refused(attempt: Attempt) -> Explanation | None:
     """The trainer refused its configuration; retrying cannot help."""
     return _of_code(attempt, ExitCode.CONFIGURATION, Reason.CONFIGURATION_REFUSED)
 
 
-def simulator_budget_spent(attempt: Attempt) -> Told | None:
+def simulator_budget_spent(attempt: Attempt) -> Explanation | None:
     """The trainer gave up on a simulator."""
     return _of_code(attempt, ExitCode.FAULT_BUDGET, Reason.SIMULATOR_BUDGET_SPENT)
 
 
-def diverged(attempt: Attempt) -> Told | None:
+def diverged(attempt: Attempt) -> Explanation | None:
     """The learner diverged."""
     return _of_code(attempt, ExitCode.DIVERGED, Reason.DIVERGED)
 
 
-def trainer_out_of_memory(attempt: Attempt) -> Told | None:
+def trainer_out_of_memory(attempt: Attempt) -> Explanation | None:
     """The trainer ran out of memory; a retry would need as much."""
     trainer = attempt.pod.trainer if attempt.pod is not None else None
     if trainer is None or not killed_for_memory(trainer):
         return None
-    return told(
+    return explain(
         Reason.TRAINER_OUT_OF_MEMORY,
         limit=limit_of(trainer.memory_limit),
-        times=kills_of(attempt.it, TRAINER),
+        times=kills_of(attempt.situation, TRAINER),
     )
 
 
-def simulator_hung(attempt: Attempt) -> Told | None:
+def simulator_hung(attempt: Attempt) -> Explanation | None:
     """The trainer waited for one simulator until it gave up."""
     if attempt.code != ExitCode.STALLED or attempt.word is None or not attempt.word.reason.startswith(_HUNG):
         return None
-    return told(Reason.SIMULATOR_HUNG, what=attempt.word.reason)
+    return explain(Reason.SIMULATOR_HUNG, what=attempt.word.reason)
 
 
-def stalled(attempt: Attempt) -> Told | None:
+def stalled(attempt: Attempt) -> Explanation | None:
     """The trainer's watchdog ended it."""
     if attempt.code != ExitCode.STALLED:
         return None
-    seconds = attempt.it.job.spec.stall_deadline_seconds
+    seconds = attempt.situation.job.spec.stall_deadline_seconds
     what = attempt.word.reason if attempt.word else f"no environment step for {seconds} s"
-    return told(Reason.STALLED, what=what)
+    return explain(Reason.STALLED, what=what)
 
 
-def storage_full(attempt: Attempt) -> Told | None:
+def storage_full(attempt: Attempt) -> Explanation | None:
     """The volume is full."""
     return full_volume(attempt.word)
 
@@ -192,31 +192,33 @@ ENDS: tuple[EndCheck, ...] = (
 )
 
 
-def why(attempt: Attempt) -> Told:
+def why(attempt: Attempt) -> Explanation:
     """Return why an attempt ended, by the first check that holds."""
-    return first(ENDS, attempt) or told(Reason.TRAINER_FAILED, how=attempt.words)
+    return first(ENDS, attempt) or explain(Reason.TRAINER_FAILED, how=attempt.words)
 
 
-def first(checks: tuple[EndCheck, ...], attempt: Attempt) -> Told | None:
+def first(checks: tuple[EndCheck, ...], attempt: Attempt) -> Explanation | None:
     """Return the result of the first check that holds."""
     return next((found for check in checks if (found := check(attempt)) is not None), None)
 
 
-def stop_of(job: JobView) -> Told | None:
+def stop_of(job: JobView) -> Explanation | None:
     """Return why the operator stopped a replica, by the mark on its Job; None if it did not."""
     if job.stopped is None:
         return None
     reason, message = job.stopped
-    return Told(reason=Reason.known(reason), message=message or f"stopped: {reason}")
+    return Explanation(reason=Reason.known(reason), message=message or f"stopped: {reason}")
 
 
-def paused(it: Situation, why: str = "") -> Told:
+def paused(situation: Situation, why: str = "") -> Explanation:
     """Return why a Job is suspended; if it has a queue, Kueue did it, and `why` is its message."""
-    queue = (it.seen.job.queue if it.seen.job else "") or it.job.spec.scheduling.queue_name
+    queue = (
+        situation.seen.job.queue if situation.seen.job else ""
+    ) or situation.job.spec.scheduling.queue_name
     if not queue:
-        return told(Reason.SUSPENDED, by=suspended_by(it.job, it.seen))
-    taken, again = (TAKEN, AGAIN) if it.counted.attempt else ("", "")
-    return told(Reason.QUEUED, queue=queue, taken=taken, why=f": {why}" if why else "", again=again)
+        return explain(Reason.SUSPENDED, by=suspended_by(situation.job, situation.seen))
+    taken, again = (TAKEN, AGAIN) if situation.counted.attempt else ("", "")
+    return explain(Reason.QUEUED, queue=queue, taken=taken, why=f": {why}" if why else "", again=again)
 
 
 def success(word: Termination | None) -> str:
@@ -229,5 +231,5 @@ def success(word: Termination | None) -> str:
     return f"the training is complete: {word.step} steps{rate}"
 
 
-def _of_code(attempt: Attempt, code: ExitCode, reason: Reason) -> Told | None:
-    return told(reason, words=attempt.words) if attempt.code == code else None
+def _of_code(attempt: Attempt, code: ExitCode, reason: Reason) -> Explanation | None:
+    return explain(reason, words=attempt.words) if attempt.code == code else None

@@ -24,7 +24,7 @@ _CONDITION_OF = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class Explanation:
     """A reason and its message."""
 
     reason: Reason
@@ -32,34 +32,34 @@ class Told:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Claim:
+class ConditionState:
     """Whether a condition holds, and why."""
 
     holds: bool
-    told: Told
+    explanation: Explanation
 
 
-Claims = Mapping[ConditionType, Claim]
+ConditionStates = Mapping[ConditionType, ConditionState]
 
 
-def claims(accepted: Claim, phase: Phase, why: Told) -> Claims:
-    """Return the claim of each condition of a job in `phase` for the reason `why`.
+def condition_states(accepted: ConditionState, phase: Phase, why: Explanation) -> ConditionStates:
+    """Return the state of each condition of a job in `phase` for the reason `why`.
 
     All have the reason, but only its subject has the whole message; otherwise `kubectl describe` would print
     it four times.
     """
     true = _CONDITION_OF.get(phase)
     subject = true or (ConditionType.RUNNING if accepted.holds else ConditionType.ACCEPTED)
-    elsewhere = Told(reason=why.reason, message=f"the job is {phase}; see the condition {subject}")
+    elsewhere = Explanation(reason=why.reason, message=f"the job is {phase}; see the condition {subject}")
     others = {
-        kind: Claim(holds=kind is true, told=why if kind is subject else elsewhere)
+        kind: ConditionState(holds=kind is true, explanation=why if kind is subject else elsewhere)
         for kind in _CONDITION_OF.values()
     }
     return {ConditionType.ACCEPTED: accepted, **others}
 
 
-def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
-    """Return `Stalled` or `Reconciling` if a job is not as its spec asks, else no claim.
+def reconciliation(phase: Phase, why: Explanation, *, suspend: bool) -> ConditionStates:
+    """Return `Stalled` or `Reconciling` if a job is not as its spec asks, else neither.
 
     Each has the whole message, because kstatus shows nothing else. A job in a queue is `Reconciling` even if
     its spec asks for a suspension, because Kueue ignores that.
@@ -70,11 +70,11 @@ def reconciliation(phase: Phase, why: Told, *, suspend: bool) -> Claims:
         suspend: whether the spec asks for a suspended job.
     """
     if phase is Phase.FAILED or why.reason in HELD:
-        return {ConditionType.STALLED: Claim(holds=True, told=why)}
+        return {ConditionType.STALLED: ConditionState(holds=True, explanation=why)}
     wanted = Phase.SUSPENDED if suspend else Phase.RUNNING
     if phase is Phase.SUCCEEDED or (phase is wanted and why.reason is not Reason.QUEUED):
         return {}
-    return {ConditionType.RECONCILING: Claim(holds=True, told=why)}
+    return {ConditionType.RECONCILING: ConditionState(holds=True, explanation=why)}
 
 
 def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
@@ -89,29 +89,31 @@ def conditions_of_ended(ended: Status) -> tuple[Condition, ...]:
     return (*ended.conditions, failed.model_copy(update={"type": ConditionType.STALLED}))
 
 
-def conditions(old: Status, current: Claims, generation: int | None, now: datetime) -> tuple[Condition, ...]:
-    """Return the conditions for the current claims; if a status has not changed, its time stays."""
-    before = {each.type: each for each in old.conditions}
+def conditions(
+    old: Status, current: ConditionStates, generation: int | None, now: datetime
+) -> tuple[Condition, ...]:
+    """Return the conditions that are current; if a status has not changed, its time stays."""
+    before = {condition.type: condition for condition in old.conditions}
     return tuple(
-        _condition(kind, claim, before.get(kind), generation, now) for kind, claim in current.items()
+        _condition(kind, state, before.get(kind), generation, now) for kind, state in current.items()
     )
 
 
 def condition(status: Status, kind: ConditionType) -> Condition | None:
     """Return the condition of a type; None if the status has none."""
-    return next((each for each in status.conditions if each.type is kind), None)
+    return next((condition for condition in status.conditions if condition.type is kind), None)
 
 
 def _condition(
-    kind: ConditionType, claim: Claim, old: Condition | None, generation: int | None, now: datetime
+    kind: ConditionType, state: ConditionState, old: Condition | None, generation: int | None, now: datetime
 ) -> Condition:
-    status = ConditionStatus.TRUE if claim.holds else ConditionStatus.FALSE
+    status = ConditionStatus.TRUE if state.holds else ConditionStatus.FALSE
     kept = old is not None and old.status is status
     return Condition(
         type=kind,
         status=status,
-        reason=claim.told.reason.value,
-        message=claim.told.message,
+        reason=state.explanation.reason.value,
+        message=state.explanation.message,
         last_transition_time=old.last_transition_time if old is not None and kept else now,
         observed_generation=generation,
     )

@@ -73,10 +73,10 @@ def newer_pods(old: ReplicaStatus, pods: Sequence[PodView]) -> tuple[PodView, ..
     named = old.pod
     if named is None:
         return tuple(pods)
-    uids = [each.uid for each in pods]
+    uids = [pod.uid for pod in pods]
     if named.uid in uids:
         return tuple(pods[uids.index(named.uid) + 1 :])
-    return tuple(each for each in pods if each.created >= named.created)
+    return tuple(pod for pod in pods if pod.created >= named.created)
 
 
 def failed_by_itself(pod: PodView) -> bool:
@@ -130,17 +130,17 @@ def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 def _by_evidence(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
     """Return how many of the pods replaced since the status failed by themselves."""
-    named = [each for each in seen.pods if old.pod is not None and each.uid == old.pod.uid]
+    named = [pod for pod in seen.pods if old.pod is not None and pod.uid == old.pod.uid]
     chain = [*named, *newer]
-    return sum(failed_by_itself(each) for each in chain[:-1])
+    return sum(failed_by_itself(pod) for pod in chain[:-1])
 
 
 def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
     """Return for how many of the pods replaced since the status a trainer is known to have run."""
-    named = [each for each in seen.pods if old.pod is not None and each.uid == old.pod.uid]
+    named = [pod for pod in seen.pods if old.pod is not None and pod.uid == old.pod.uid]
     chain = [*named, *newer]
     gone = old.pod is not None and not named and old.phase is Phase.RUNNING
-    return int(gone) + sum(has_run(each) for each in chain[:-1])
+    return int(gone) + sum(has_run(pod) for pod in chain[:-1])
 
 
 def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
@@ -164,7 +164,7 @@ def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVie
     """Return 1 if a suspension ended one of the pods replaced since the status."""
     if not newer or seen.job is None:
         return 0
-    replaced = {old.pod.uid if old.pod is not None else "", *(each.uid for each in newer[:-1])}
+    replaced = {old.pod.uid if old.pod is not None else "", *(pod.uid for pod in newer[:-1])}
     mark = seen.job.suspension
     if mark is not None and mark.pod in replaced:
         return int(mark.lived)
@@ -195,7 +195,7 @@ def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodVie
 def _within_attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
     """Return the restarts of simulators within the current attempt."""
     before = 0 if newer else old.simulator_restarts
-    polled = sum(each.restarts for each in seen.polled.status.simulators) if seen.polled else 0
+    polled = sum(simulator.restarts for simulator in seen.polled.status.simulators) if seen.polled else 0
     ended = (seen.termination.restarts or 0) if seen.termination else 0
     return _bounded(max(before, polled, ended))
 
@@ -207,7 +207,7 @@ def _simulators(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVi
     words = seen.terminations
     named = words.get(old.pod.uid) if old.pod else None
     late = max((named.restarts or 0) - old.simulator_restarts, 0) if named else 0
-    passed = sum(_told(words[each.uid].restarts) for each in newer[:-1] if each.uid in words)
+    passed = sum(_told(words[pod.uid].restarts) for pod in newer[:-1] if pod.uid in words)
     return _bounded(old.restarts.simulator + late + passed + within)
 
 

@@ -8,10 +8,10 @@ from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.acting import actions
 from palaestra.decide.conditions import (
-    Claim,
-    Claims,
-    Told,
-    claims,
+    ConditionState,
+    ConditionStates,
+    Explanation,
+    condition_states,
     conditions,
     conditions_of_ended,
     reconciliation,
@@ -44,47 +44,51 @@ def decide(job: TrainingJob, observed: Observed, prepared: Prepared, times: Time
     """
     now = whole(times.now)
     times = replace(times, now=now)
-    each = tuple(_replica(job, seen, prepared, times) for seen in observed.replicas)
+    decided = tuple(_replica(job, seen, prepared, times) for seen in observed.replicas)
     if job.status.phase in TERMINAL:
         updates = {
             "observed_generation": job.metadata.generation,
             "conditions": conditions_of_ended(job.status),
-            "replicas": _kept(job, each),
+            "replicas": _kept(job, decided),
         }
         status = job.status.model_copy(update=updates)
     else:
-        status = _status(job, observed, prepared, tuple(it.status for it in each), times)
+        status = _status(job, observed, prepared, tuple(replica.status for replica in decided), times)
     expiry = expires(status, job.spec.ttl_seconds_after_finished)
     todo = (
-        *actions(job, observed, prepared, each),
+        *actions(job, observed, prepared, decided),
         *expired(job.metadata.name, job.metadata.uid, expiry, status, now),
     )
-    waits_s = (seconds_to(expiry, now), *(left_s for it in each for left_s in it.course.left_s))
+    waits_s = (seconds_to(expiry, now), *(left_s for replica in decided for left_s in replica.course.left_s))
     return Decision(
         status=status,
         actions=todo,
         events=(*of_change(job.status, status), *of_actions(todo), *edits(job, observed)),
         wake_after_s=first_of(waits_s),
-        record=_record(job, each, status, times),
+        record=_record(job, decided, status, times),
     )
 
 
-def _record(job: TrainingJob, each: Sequence[Decided], status: Status, times: Times) -> Record:
+def _record(job: TrainingJob, decided: Sequence[Decided], status: Status, times: Times) -> Record:
     """Return the record for the next reconcile: open waits, their troubles, and the active time."""
     return Record(
         waits={
-            (it.status.index, *wait.key): times.since_s(it.status.index, wait)
-            for it in each
-            for wait in it.course.waits
+            (replica.status.index, *wait.key): times.since_s(replica.status.index, wait)
+            for replica in decided
+            for wait in replica.course.waits
         },
-        troubles={it.status.index: it.course.trouble for it in each if it.course.trouble is not None},
+        troubles={
+            replica.status.index: replica.course.trouble
+            for replica in decided
+            if replica.course.trouble is not None
+        },
         active_s=times.active_s(job.status.active_seconds),
         active_at_s=times.clock_s if status.active_since is not None else None,
     )
 
 
 def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times: Times) -> Decided:
-    before = {each.index: each for each in job.status.replicas}
+    before = {replica.index: replica for replica in job.status.replicas}
     old = before.get(seen.index, ReplicaStatus(index=seen.index))
     situation = Situation(
         job=job,
@@ -101,18 +105,18 @@ def _replica(job: TrainingJob, seen: ReplicaObserved, prepared: Prepared, times:
     return decided(situation)
 
 
-def _kept(job: TrainingJob, each: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
+def _kept(job: TrainingJob, decided: Sequence[Decided]) -> tuple[ReplicaStatus, ...]:
     """Return the replicas of an ended job; only those that its status has."""
-    had = {it.index for it in job.status.replicas}
-    return tuple(it.status for it in each if it.status.index in had)
+    had = {replica.index for replica in job.status.replicas}
+    return tuple(replica.status for replica in decided if replica.status.index in had)
 
 
-def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Told | None:
+def _still_to_stop(old: ReplicaStatus, seen: ReplicaObserved) -> Explanation | None:
     """Return why to stop a failed replica whose Job still runs, for example because it was just created."""
     going_on = seen.job is not None and seen.job.end is None and seen.job.stopped is None
     if not going_on or old.phase is not Phase.FAILED:
         return None
-    return Told(reason=Reason(old.reason or Reason.JOB_FAILED), message=old.message or "")
+    return Explanation(reason=Reason(old.reason or Reason.JOB_FAILED), message=old.message or "")
 
 
 def _active_left_s(job: TrainingJob, times: Times) -> float | None:
@@ -133,7 +137,7 @@ def _status(
     old = job.status
     where = standing(replicas)
     current = {
-        **claims(_accepted(job, prepared), where.phase, where.told),
+        **condition_states(_accepted(job, prepared), where.phase, where.explanation),
         **_reconciliation(job, where, replicas),
     }
     now, generation = times.now, job.metadata.generation
@@ -151,24 +155,26 @@ def _status(
     )
 
 
-def _reconciliation(job: TrainingJob, where: Verdict, replicas: Sequence[ReplicaStatus]) -> Claims:
-    """Return the claims `Stalled` and `Reconciling`; a replica that ignores `suspend` gives the reason."""
+def _reconciliation(job: TrainingJob, where: Verdict, replicas: Sequence[ReplicaStatus]) -> ConditionStates:
+    """Return the states of `Stalled` and `Reconciling`; a replica that ignores `suspend` gives the reason."""
     unheeded = where.phase is Phase.RUNNING and job.spec.suspend
-    why = as_first(replicas, Phase.RUNNING).told if unheeded else where.told
+    why = as_first(replicas, Phase.RUNNING).explanation if unheeded else where.explanation
     return reconciliation(where.phase, why, suspend=job.spec.suspend)
 
 
 def _waits(observed: Observed, prepared: Prepared) -> bool:
     """Return whether a hold prevents the plan of all replicas, so that no active time passes."""
-    return prepared.hold is not None and all(each.job is None for each in observed.replicas)
+    return prepared.hold is not None and all(replica.job is None for replica in observed.replicas)
 
 
-def _accepted(job: TrainingJob, prepared: Prepared) -> Claim:
+def _accepted(job: TrainingJob, prepared: Prepared) -> ConditionState:
     """Return whether the job is accepted; an accepted job stays accepted."""
     if prepared.hold is not None and job.status.release is None:
-        return Claim(holds=False, told=prepared.hold.told)
+        return ConditionState(holds=False, explanation=prepared.hold.explanation)
     note = EPHEMERAL if job.spec.storage.ephemeral else ""
-    return Claim(holds=True, told=Told(reason=Reason.ACCEPTED, message=say(Reason.ACCEPTED, note=note)))
+    return ConditionState(
+        holds=True, explanation=Explanation(reason=Reason.ACCEPTED, message=say(Reason.ACCEPTED, note=note))
+    )
 
 
 def _release(prepared: Prepared) -> Release | None:

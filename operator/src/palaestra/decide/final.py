@@ -2,44 +2,46 @@
 
 from palaestra.api.reasons import Reason
 from palaestra.decide.counting import failed_by_itself, has_run
-from palaestra.decide.situation import Finding, Situation, first_waiting, found, told
+from palaestra.decide.situation import Finding, Situation, explain, first_waiting, found
 from palaestra.decide.troubles import mark_of, of_image, storage_eviction
 
 
-def active_deadline(it: Situation) -> Finding | None:
+def active_deadline(situation: Situation) -> Finding | None:
     """The job was active as long as `activeDeadlineSeconds` allows."""
-    if it.active_left_s is None or (seconds := it.job.spec.active_deadline_seconds) is None:
+    if situation.active_left_s is None or (seconds := situation.job.spec.active_deadline_seconds) is None:
         return None
-    return Finding(left_s=it.active_left_s, told=told(Reason.DEADLINE_EXCEEDED, seconds=seconds))
+    return Finding(
+        left_s=situation.active_left_s, explanation=explain(Reason.DEADLINE_EXCEEDED, seconds=seconds)
+    )
 
 
-def cannot_be_planned(it: Situation) -> Finding | None:
+def cannot_be_planned(situation: Situation) -> Finding | None:
     """No objects can be created from its spec, and a spec does not change."""
-    if it.seen.job is not None or it.hold is None or not it.hold.final:
+    if situation.seen.job is not None or situation.hold is None or not situation.hold.final:
         return None
-    return Finding(told=it.hold.told)
+    return Finding(explanation=situation.hold.explanation)
 
 
-def image_name_is_invalid(it: Situation) -> Finding | None:
+def image_name_is_invalid(situation: Situation) -> Finding | None:
     """No registry has an image of such a name."""
-    stuck = first_waiting(it.pod, frozenset({"InvalidImageName"}))
+    stuck = first_waiting(situation.pod, frozenset({"InvalidImageName"}))
     return None if stuck is None else of_image(stuck)
 
 
-def no_progress(it: Situation) -> Finding | None:
+def no_progress(situation: Situation) -> Finding | None:
     """Its pods are interrupted again and again without progress; Kubernetes has no limit for that."""
-    limit = it.job.spec.most_fruitless
-    pods = it.counted.fruitless + _taken_and_not_replaced(it)
+    limit = situation.job.spec.most_fruitless
+    pods = situation.counted.fruitless + _taken_and_not_replaced(situation)
     if limit == 0 or pods < limit:
         return None
-    evictions = (storage_eviction(pod) for pod in reversed(it.seen.pods) if pod.ended)
+    evictions = (storage_eviction(pod) for pod in reversed(situation.seen.pods) if pod.ended)
     cause = next(evictions, None)  # of the last that ended
-    return Finding(told=cause) if cause is not None else found(Reason.NO_PROGRESS, pods=pods)
+    return Finding(explanation=cause) if cause is not None else found(Reason.NO_PROGRESS, pods=pods)
 
 
-def _taken_and_not_replaced(it: Situation) -> bool:
+def _taken_and_not_replaced(situation: Situation) -> bool:
     """Return whether the newest pod was interrupted; Kubernetes doubles the wait for the next each time."""
-    pod = it.seen.pod
-    if pod is None or not it.counted.furthest_step or mark_of(it, pod) is not None:
+    pod = situation.seen.pod
+    if pod is None or not situation.counted.furthest_step or mark_of(situation, pod) is not None:
         return False
     return pod.phase == "Failed" and not failed_by_itself(pod) and has_run(pod)

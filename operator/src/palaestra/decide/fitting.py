@@ -44,8 +44,8 @@ def _size(data: Any) -> int:
 
 def _taken(job: Mapping[str, Any]) -> int:
     """Return the bytes of a job without its status; for a small job, the upper limit of a small one."""
-    told = text(part(job, "metadata", "annotations"), SIZE)
-    return int(told) if told.isdecimal() else SMALL
+    noted = text(part(job, "metadata", "annotations"), SIZE)
+    return int(noted) if noted.isdecimal() else SMALL
 
 
 def _of_replicas(cut: Cut, *, healthy: bool | None = None) -> Cut:
@@ -55,7 +55,12 @@ def _of_replicas(cut: Cut, *, healthy: bool | None = None) -> Cut:
         return healthy is None or (replica.get("phase") in _HEALTHY) is healthy
 
     def all_of(status: Data) -> Data:
-        return {**status, "replicas": [cut(it) if cuts(it) else it for it in status.get("replicas", ())]}
+        return {
+            **status,
+            "replicas": [
+                cut(replica) if cuts(replica) else replica for replica in status.get("replicas", ())
+            ],
+        }
 
     return all_of
 
@@ -78,12 +83,12 @@ def _messages(replica: Data) -> Data:
 
 def _memory_kills(replica: Data) -> Data:
     """Return a replica with only the count and the time of each kill, by which a kill is recognized."""
-    kills = [{name: each[name] for name in _OF_KILL} for each in replica.get("memoryKills", ())]
+    kills = [{name: kill[name] for name in _OF_KILL} for kill in replica.get("memoryKills", ())]
     return {**replica, "memoryKills": kills}
 
 
 def _conditions(status: Data) -> Data:
-    return {**status, "conditions": [_shortened(each) for each in status.get("conditions", ())]}
+    return {**status, "conditions": [_shortened(condition) for condition in status.get("conditions", ())]}
 
 
 # Applied in this order until the status fits.

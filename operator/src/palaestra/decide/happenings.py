@@ -33,11 +33,11 @@ def happening(reason: Reason, message: str, replica: int | None = None) -> Happe
 def of_change(old: Status, new: Status) -> Iterator[Happening]:
     """Yield an event for each change of a condition or replica for which a person or program may wait."""
     yield from _of_condition(old, new, ConditionType.ACCEPTED)
-    before = {each.index: each for each in old.replicas}
-    for each in new.replicas:
-        yield from _of_replica(before.get(each.index), each)
-        yield from _of_attempt(before.get(each.index), each)
-        yield from _of_memory(before.get(each.index), each)
+    before = {replica.index: replica for replica in old.replicas}
+    for replica in new.replicas:
+        yield from _of_replica(before.get(replica.index), replica)
+        yield from _of_attempt(before.get(replica.index), replica)
+        yield from _of_memory(before.get(replica.index), replica)
     for kind in _ENDS:
         yield from _of_condition(old, new, kind)
 
@@ -94,10 +94,10 @@ def _of_attempt(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happe
 
 def _of_memory(old: ReplicaStatus | None, new: ReplicaStatus) -> Iterator[Happening]:
     """Yield an event for each container that ran out of memory, unless an event of the replica reports it."""
-    before = {each.container: each.times for each in old.memory_kills} if old is not None else {}
-    told = {each.message for each in _of_replica(old, new)}
-    for each in new.memory_kills:
-        whose = Reason.TRAINER_OUT_OF_MEMORY if each.container == TRAINER else Reason.SIMULATOR_OUT_OF_MEMORY
-        message = say(whose, container=each.container, limit=limit_of(each.limit), times=each.times)
-        if each.times > before.get(each.container, 0) and message not in told:
+    before = {kill.container: kill.times for kill in old.memory_kills} if old is not None else {}
+    reported = {happening.message for happening in _of_replica(old, new)}
+    for kill in new.memory_kills:
+        whose = Reason.TRAINER_OUT_OF_MEMORY if kill.container == TRAINER else Reason.SIMULATOR_OUT_OF_MEMORY
+        message = say(whose, container=kill.container, limit=limit_of(kill.limit), times=kill.times)
+        if kill.times > before.get(kill.container, 0) and message not in reported:
             yield happening(whose, message, new.index)

@@ -18,7 +18,7 @@ from palaestra.api.lines import one_line
 from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.status import Phase
 from palaestra.decide import final, outcomes, replacing, standing, troubles
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.situation import STARTING, Check, Finding, Situation, Verdict, after
 from palaestra.decide.times import Trouble, Wait
 
@@ -49,85 +49,94 @@ class Course:
             first step was done.
     """
 
-    stop: Told | None = None
-    replace: Told | None = None
+    stop: Explanation | None = None
+    replace: Explanation | None = None
     left_s: tuple[float, ...] = ()
     waits: tuple[Wait, ...] = ()
     trouble: Trouble | None = None
 
 
-def judge(it: Situation) -> tuple[Verdict, Course]:
+def judge(situation: Situation) -> tuple[Verdict, Course]:
     """Return the verdict on a replica and what follows, by the first checks of the list that hold."""
-    asked = [(kind, finding) for kind, check in JUDGED if (finding := check(it)) is not None]
+    asked = [(kind, finding) for kind, check in JUDGED if (finding := check(situation)) is not None]
     left_s = tuple(finding.left_s for _, finding in asked if finding.left_s > 0)
     waits = tuple(finding.wait for _, finding in asked if finding.wait is not None)
     holding = [(kind, finding) for kind, finding in asked if finding.left_s <= 0]
     if (end := _first(holding, Kind.ENDED)) is not None:
-        return _verdict(it, end), Course(waits=waits)
+        return _verdict(situation, end), Course(waits=waits)
     stop = _first(holding, Kind.FINAL)
-    if stop is not None and it.seen.job is None:  # there is no Job to stop, and none will be created
-        return Verdict(phase=Phase.FAILED, told=stop.told), Course()
+    if stop is not None and situation.seen.job is None:  # there is no Job to stop, and none will be created
+        return Verdict(phase=Phase.FAILED, explanation=stop.explanation), Course()
     kind, shown = next((kind, each) for kind, each in holding if kind not in {Kind.ENDED, Kind.FINAL})
     replaced = kind is Kind.COUNTED and stop is None
     course = Course(
-        stop=None if stop is None else stop.told,
-        replace=shown.told if replaced else None,
+        stop=None if stop is None else stop.explanation,
+        replace=shown.explanation if replaced else None,
         left_s=left_s,
         waits=waits,
-        trouble=_trouble(it, shown.told) if FIRST_STEP in {each.key for each in waits} else None,
+        trouble=_trouble(situation, shown.explanation)
+        if FIRST_STEP in {wait.key for wait in waits}
+        else None,
     )
-    return _verdict(it, _refused(it, shown) if replaced else shown), course
+    return _verdict(situation, _refused(situation, shown) if replaced else shown), course
 
 
-def start_timeout(it: Situation) -> Finding | None:
+def start_timeout(situation: Situation) -> Finding | None:
     """Its first step has not come within `startTimeoutSeconds`; the reason is the cause of that wait."""
-    if it.suspended or it.hold is not None or it.counted.furthest_step or _is_past_its_start(it):
+    if (
+        situation.suspended
+        or situation.hold is not None
+        or situation.counted.furthest_step
+        or _is_past_its_start(situation)
+    ):
         return None
-    seconds = it.job.spec.start_timeout_s
-    asked = (finding for kind, check in JUDGED if kind in SHOWN and (finding := check(it)) is not None)
-    shown = next(finding.told for finding in asked if finding.left_s <= 0)
-    trouble = _trouble(it, shown)
-    reason = Reason.START_TIMEOUT if trouble is None else trouble.told.reason
+    seconds = situation.job.spec.start_timeout_s
+    asked = (finding for kind, check in JUDGED if kind in SHOWN and (finding := check(situation)) is not None)
+    shown = next(finding.explanation for finding in asked if finding.left_s <= 0)
+    trouble = _trouble(situation, shown)
+    reason = Reason.START_TIMEOUT if trouble is None else trouble.explanation.reason
     why = shown.message
     if trouble is not None and trouble.gone_s is not None:
-        why = f"a moment ago: {trouble.told.message}"
+        why = f"a moment ago: {trouble.explanation.message}"
     words = f"no step within {seconds} s, as long as startTimeoutSeconds allows; {why}"
-    told = Told(reason=reason, message=one_line(words, LONGEST_MESSAGE))
-    return after(it, Wait(key=FIRST_STEP, seconds=seconds), told)
+    explanation = Explanation(reason=reason, message=one_line(words, LONGEST_MESSAGE))
+    return after(situation, Wait(key=FIRST_STEP, seconds=seconds), explanation)
 
 
-def _trouble(it: Situation, shown: Told) -> Trouble | None:
+def _trouble(situation: Situation, shown: Explanation) -> Trouble | None:
     """Return the cause that delays the first step, also if the kubelet does not report it for a moment."""
     if shown.reason not in _NO_TROUBLE:
-        return Trouble(told=shown)
-    last, now_s = it.times.record.troubles.get(it.seen.index), it.times.clock_s
+        return Trouble(explanation=shown)
+    last, now_s = situation.times.record.troubles.get(situation.seen.index), situation.times.clock_s
     if last is None:
         return None
     gone_s = now_s if last.gone_s is None else last.gone_s
     return replace(last, gone_s=gone_s) if now_s - gone_s <= MOMENT_S else None
 
 
-def _is_past_its_start(it: Situation) -> bool:
+def _is_past_its_start(situation: Situation) -> bool:
     """Return whether the trainer runs and does not report that its simulators still start."""
-    polled = it.seen.polled
-    return standing.runs(it) and (polled is None or polled.status.phase != STARTING)
+    polled = situation.seen.polled
+    return standing.runs(situation) and (polled is None or polled.status.phase != STARTING)
 
 
 def _first(holding: Sequence[tuple[Kind, Finding]], kind: Kind) -> Finding | None:
     return next((finding for each, finding in holding if each is kind), None)
 
 
-def _refused(it: Situation, shown: Finding) -> Finding:
+def _refused(situation: Situation, shown: Finding) -> Finding:
     """Return why a pod has to be replaced, and why the API server refuses to evict it."""
-    if not it.seen.denied:
+    if not situation.seen.denied:
         return shown
-    words = one_line(f"{shown.told.message}; it is not replaced yet: {it.seen.denied}", LONGEST_MESSAGE)
-    return replace(shown, told=Told(reason=shown.told.reason, message=words))
+    words = one_line(
+        f"{shown.explanation.message}; it is not replaced yet: {situation.seen.denied}", LONGEST_MESSAGE
+    )
+    return replace(shown, explanation=Explanation(reason=shown.explanation.reason, message=words))
 
 
-def _verdict(it: Situation, finding: Finding) -> Verdict:
-    phase = Phase.RUNNING if standing.runs(it) else Phase.PENDING
-    return Verdict(phase=finding.phase or phase, told=finding.told)
+def _verdict(situation: Situation, finding: Finding) -> Verdict:
+    phase = Phase.RUNNING if standing.runs(situation) else Phase.PENDING
+    return Verdict(phase=finding.phase or phase, explanation=finding.explanation)
 
 
 _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Reason.INTERRUPTED})

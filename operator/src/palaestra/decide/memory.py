@@ -21,19 +21,23 @@ def killed_for_memory(container: ContainerView) -> bool:
     return container.exit is not None and container.exit.reason == OUT_OF_MEMORY
 
 
-def memory_kills(it: Situation) -> tuple[MemoryKills, ...]:
+def memory_kills(situation: Situation) -> tuple[MemoryKills, ...]:
     """Return the kills by container, including those that are new in this observation.
 
     A kill is identified by its pod and the container's run in it. All kills in pods before the one that the
     status names are counted already.
     """
-    kills = {each.container: each for each in it.old.memory_kills}
-    named = [pod for pod in it.seen.pods if it.old.pod is not None and pod.uid == it.old.pod.uid]
-    for pod in (*named, *newer_pods(it.old, it.seen.pods)):
+    kills = {kill.container: kill for kill in situation.old.memory_kills}
+    named = [
+        pod
+        for pod in situation.seen.pods
+        if situation.old.pod is not None and pod.uid == situation.old.pod.uid
+    ]
+    for pod in (*named, *newer_pods(situation.old, situation.seen.pods)):
         for container in pod.containers:
             before = kills.get(container.name)
             if killed_for_memory(container) and not _known(before, pod, container):
-                kills[container.name] = _one_more(before, pod, container, it.now)
+                kills[container.name] = _one_more(before, pod, container, situation.now)
     return tuple(kills.values())[:MOST_CONTAINERS]
 
 
@@ -65,9 +69,9 @@ def _one_more(
     )
 
 
-def kills_of(it: Situation, container: str) -> int:
+def kills_of(situation: Situation, container: str) -> int:
     """Return how often a container was seen to be killed because it ran out of memory."""
-    return next((each.times for each in memory_kills(it) if each.container == container), 1)
+    return next((kill.times for kill in memory_kills(situation) if kill.container == container), 1)
 
 
 def limit_of(limit: str | None) -> str:

@@ -26,4 +26,4 @@ def seconds_to(at: datetime | None, now: datetime) -> float | None:
 
 def first_of(waits_s: Iterable[float | None]) -> float | None:
     """Return the seconds until the first of some waits is over; None: none goes on."""
-    return min((each for each in waits_s if each is not None and each > 0), default=None)
+    return min((waits_ for waits_ in waits_s if waits_ is not None and waits_ > 0), default=None)

@@ -10,9 +10,9 @@ from dataclasses import replace
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
 from palaestra.decide.attempts import CAUSES, Attempt, first, stop_of, success
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code
-from palaestra.decide.situation import Finding, Situation, after, told
+from palaestra.decide.situation import Finding, Situation, after, explain
 from palaestra.decide.times import Wait
 from palaestra.decide.troubles import how_it_failed
 from palaestra.observe.views import JobEnd, JobView, PodView
@@ -21,65 +21,67 @@ LAST_WORD_S = 30  # after the end of a Job, to wait until the end of its pod is 
 _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
 
 
-def job_is_complete(it: Situation) -> Finding | None:
+def job_is_complete(situation: Situation) -> Finding | None:
     """The Job is complete, and so is the training."""
-    job = it.seen.job
+    job = situation.seen.job
     if job is None or job.end is not JobEnd.COMPLETE:
         return None
-    why = told(Reason.SUCCEEDED, what=success(it.seen.termination))
-    return replace(_ended(it, job, why), phase=Phase.SUCCEEDED)
+    why = explain(Reason.SUCCEEDED, what=success(situation.seen.termination))
+    return replace(_ended(situation, job, why), phase=Phase.SUCCEEDED)
 
 
-def stopped(it: Situation) -> Finding | None:
+def stopped(situation: Situation) -> Finding | None:
     """The operator stopped it; the mark on the Job has the reason."""
-    job = it.seen.job
+    job = situation.seen.job
     why = stop_of(job) if job is not None else None
-    return None if job is None or why is None else _ended(it, job, why)
+    return None if job is None or why is None else _ended(situation, job, why)
 
 
-def would_end_the_same(it: Situation) -> Finding | None:
+def would_end_the_same(situation: Situation) -> Finding | None:
     """The Job has failed, and the last attempt ended by itself for a cause that has a name."""
-    job, pod = it.seen.job, it.seen.pod
+    job, pod = situation.seen.job, situation.seen.pod
     if job is None or job.end is None:
         return None
     name = pod.name if pod is not None else ""
-    last = Attempt(it=it, number=it.counted.attempt, name=name, pod=pod, code=_code(it, job))
+    last = Attempt(
+        situation=situation, number=situation.counted.attempt, name=name, pod=pod, code=_code(situation, job)
+    )
     why = first(CAUSES, last)
-    return None if why is None else _ended(it, job, why)
+    return None if why is None else _ended(situation, job, why)
 
 
-def backoff_limit_spent(it: Situation) -> Finding | None:
+def backoff_limit_spent(situation: Situation) -> Finding | None:
     """The Job has failed: it was tried as often as `backoffLimit` allows."""
-    job = it.seen.job
+    job = situation.seen.job
     if job is None or job.end_reason != "BackoffLimitExceeded":
         return None
-    how = how_it_failed(it, it.seen.pod) if it.seen.pod else "its pod is gone"
-    return _ended(it, job, told(Reason.BACKOFF_LIMIT_SPENT, pods=job.failures, how=how))
+    how = how_it_failed(situation, situation.seen.pod) if situation.seen.pod else "its pod is gone"
+    return _ended(situation, job, explain(Reason.BACKOFF_LIMIT_SPENT, pods=job.failures, how=how))
 
 
-def job_failed(it: Situation) -> Finding | None:
+def job_failed(situation: Situation) -> Finding | None:
     """The Job has failed for another cause; the reason has the Job's own message."""
-    job = it.seen.job
+    job = situation.seen.job
     if job is None or job.end is None:
         return None
     words = ": ".join(word for word in (job.end_reason, job.end_message) if word)
-    return _ended(it, job, told(Reason.JOB_FAILED, words=words or "it does not say why"))
+    return _ended(situation, job, explain(Reason.JOB_FAILED, words=words or "it does not say why"))
 
 
-def _ended(it: Situation, job: JobView, why: Told) -> Finding:
+def _ended(situation: Situation, job: JobView, why: Explanation) -> Finding:
     """Return an end, after the end of the pod was seen too or `LAST_WORD_S` passed.
 
     Two watches have different delays, so the Job's end may be seen before that of the pod, which has the
     termination message.
     """
-    if job.stopped is not None or it.pod is None:
-        return Finding(told=why, phase=Phase.FAILED)
+    if job.stopped is not None or situation.pod is None:
+        return Finding(explanation=why, phase=Phase.FAILED)
     wait = Wait(key=("last word", job.uid), seconds=LAST_WORD_S)
-    return replace(after(it, wait, why), phase=Phase.FAILED)
+    return replace(after(situation, wait, why), phase=Phase.FAILED)
 
 
-def _code(it: Situation, job: JobView) -> int | None:
-    pod: PodView | None = it.seen.pod
+def _code(situation: Situation, job: JobView) -> int | None:
+    pod: PodView | None = situation.seen.pod
     code = exit_code(pod) if pod is not None else None
     if code is not None or job.end_reason != "PodFailurePolicy":
         return code

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.suspending import to_resume
 from palaestra.observe.reading import part
 from palaestra.observe.shortening import Lacking
@@ -24,7 +24,7 @@ from palaestra_sim.errors import WorldError
 class Hold:
     """A cause that keeps a job from being planned; if it is `final`, nothing can remove it."""
 
-    told: Told
+    explanation: Explanation
     final: bool = False
 
 
@@ -104,8 +104,8 @@ def unfinished(job: TrainingJob, observed: Observed) -> tuple[ReplicaObserved, .
     """Return the replicas that have not ended by the status; none if the job has ended."""
     if job.status.phase in TERMINAL:
         return ()
-    ended = {each.index for each in job.status.replicas if each.phase in TERMINAL}
-    return tuple(each for each in observed.replicas if each.index not in ended)
+    ended = {replica.index for replica in job.status.replicas if replica.phase in TERMINAL}
+    return tuple(replica for replica in observed.replicas if replica.index not in ended)
 
 
 def pod_metadata_is_allowed(job: TrainingJob, layout: ClusterLayout) -> Hold | None:
@@ -141,12 +141,12 @@ def no_queue_without_kueue(job: TrainingJob, observed: Observed) -> Hold | None:
 
 def sources_are_there(job: TrainingJob, observed: Observed) -> Hold | None:
     """Everything that the spec names exists."""
-    return next((found for each in references(job) if (found := _missing(each, observed))), None)
+    return next((found for reference in references(job) if (found := _missing(reference, observed))), None)
 
 
 def sources_are_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
     """A TrainingJob must not give its author access to objects that they could not read before."""
-    return next((found for each in references(job) if (found := _closed(each, observed))), None)
+    return next((found for reference in references(job) if (found := _closed(reference, observed))), None)
 
 
 def sources_are_still_for_jobs(job: TrainingJob, observed: Observed) -> Hold | None:
@@ -192,7 +192,7 @@ HOLDS: tuple[Check, ...] = (
 
 
 def _hold(reason: Reason, *, final: bool = False, **facts: object) -> Hold:
-    return Hold(told=Told(reason=reason, message=say(reason, **facts)), final=final)
+    return Hold(explanation=Explanation(reason=reason, message=say(reason, **facts)), final=final)
 
 
 def complete(job: TrainingJob, observed: Observed) -> bool:
@@ -206,15 +206,15 @@ def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str
     """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts."""
     there = {name for _, name in observed.present} | {job.spec.storage.existing_claim}
     return {
-        each.index: each.job.volumes if each.job is not None else frozenset()
-        for each in unfinished(job, observed)
-        if each.job is None or not each.job.volumes <= there
+        replica.index: replica.job.volumes if replica.job is not None else frozenset()
+        for replica in unfinished(job, observed)
+        if replica.job is None or not replica.job.volumes <= there
     }
 
 
 def resuming(job: TrainingJob, observed: Observed) -> bool:
     """Return whether a Job is to be resumed."""
-    return any(to_resume(job, each.job) for each in unfinished(job, observed))
+    return any(to_resume(job, replica.job) for replica in unfinished(job, observed))
 
 
 def _at_acceptance(job: TrainingJob, layout: ClusterLayout) -> ClusterLayout:

@@ -28,76 +28,76 @@ LONGEST_NAME = 63  # of a simulator; those in a plan have 23 characters at most
 LONGEST_FAULT = 200
 
 
-def progress(it: Situation, phase: Phase) -> dict[str, object]:
+def progress(situation: Situation, phase: Phase) -> dict[str, object]:
     """Return the fields of a replica's status that its trainer has reported.
 
     A trainer that has not read its run directory yet reports step 0, whatever was learned before.
     """
-    polled = it.seen.polled.status if it.seen.polled and phase not in TERMINAL else None
-    ended_with = it.seen.termination
+    polled = situation.seen.polled.status if situation.seen.polled and phase not in TERMINAL else None
+    ended_with = situation.seen.termination
     told_last = ended_with or polled
-    fields: dict[str, object] = {"steps_per_second": None, "last_progress": last_progress(it)}
+    fields: dict[str, object] = {"steps_per_second": None, "last_progress": last_progress(situation)}
     if told_last is not None and (step := _step(told_last)) is not None:
         fields["step"] = step
-        fields["success_rate"] = _figure(told_last.success_rate, it.old.success_rate)
-        fields["success_interval"] = _interval(told_last.success_interval) or it.old.success_interval
-        fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or it.old.last_checkpoint
+        fields["success_rate"] = _figure(told_last.success_rate, situation.old.success_rate)
+        fields["success_interval"] = _interval(told_last.success_interval) or situation.old.success_interval
+        fields["last_checkpoint"] = _checkpoint(told_last.last_checkpoint) or situation.old.last_checkpoint
     if polled is not None and ended_with is None:
         fields |= {
             "target": min(polled.target, MOST_COUNT),
-            "mean_return": _figure(polled.mean_return, it.old.mean_return),
+            "mean_return": _figure(polled.mean_return, situation.old.mean_return),
             "steps_per_second": _figure(polled.steps_per_second, None),
             "simulators": _simulators(polled),
-            **_spent(it, polled),
+            **_spent(situation, polled),
         }
     return fields
 
 
-def last_progress(it: Situation) -> datetime | None:
+def last_progress(situation: Situation) -> datetime | None:
     """Return when the step count of the current attempt last moved, or an evaluation did.
 
     None if it is not known to have begun to train. A step of an environment alone is no progress, because the
     trainer may learn nothing from it.
     """
-    same_attempt = it.old.pod is not None and it.counted.pod == it.old.pod
-    known = it.old.last_progress if same_attempt else None
-    wait = standstill(it)
-    if wait is None or it.seen.polled is None:
+    same_attempt = situation.old.pod is not None and situation.counted.pod == situation.old.pod
+    known = situation.old.last_progress if same_attempt else None
+    wait = standstill(situation)
+    if wait is None or situation.seen.polled is None:
         return known
-    status = it.seen.polled.status
+    status = situation.seen.polled.status
     step = _step(status)
-    moved = (step is not None and step != it.old.step) or status.phase == EVALUATING
+    moved = (step is not None and step != situation.old.step) or status.phase == EVALUATING
     if known is not None and not moved:
         return known
-    return after(it.now, -int(it.waited_s(wait)))
+    return after(situation.now, -int(situation.waited_s(wait)))
 
 
-def standstill(it: Situation) -> Wait | None:
+def standstill(situation: Situation) -> Wait | None:
     """Return the wait for the next step, of learning or of an evaluation; None if it does not train.
 
     If the trainer reports how long ago an environment stepped, the wait began then. A trainer of an older
     release reports the time by its own clock, which is compared only with its earlier reports.
     """
-    polled = it.seen.polled
-    if polled is None or not it.trains or it.pod is None:
+    polled = situation.seen.polled
+    if polled is None or not situation.trains or situation.pod is None:
         return None
     status = polled.status
     evaluates = status.phase == EVALUATING
     step = f"evaluates, {status.last_progress}" if evaluates else f"step {_step(status)}"
     begun_s = polled.at_s - (status.last_progress_age_s or 0.0)
-    return Wait(key=("stalled", it.pod.uid, step), seconds=0.0, begun_s=begun_s)
+    return Wait(key=("stalled", situation.pod.uid, step), seconds=0.0, begun_s=begun_s)
 
 
-def _step(told: TrainerStatus | Termination) -> int | None:
+def _step(report: TrainerStatus | Termination) -> int | None:
     """Return the step of a run; None if its trainer does not know it yet."""
-    return None if told.attempt is None and told.step == 0 else min(told.step, MOST_COUNT)
+    return None if report.attempt is None and report.step == 0 else min(report.step, MOST_COUNT)
 
 
-def _spent(it: Situation, polled: TrainerStatus) -> dict[str, object]:
+def _spent(situation: Situation, polled: TrainerStatus) -> dict[str, object]:
     """Return what the run has spent so far; {} if the trainer's release does not report it."""
     if not polled.goodput:
         return {}
-    before = it.old.goodput or Goodput()
+    before = situation.old.goodput or Goodput()
     seconds = {
         cause: min(int(spent), MOST_COUNT)
         for cause, spent in polled.goodput.items()
@@ -106,7 +106,7 @@ def _spent(it: Situation, polled: TrainerStatus) -> dict[str, object]:
     faults = {kind: min(times, MOST_COUNT) for kind, times in polled.faults.items()}
     return {
         "goodput": before.model_copy(update=seconds),
-        "faults": (it.old.faults or Faults()).model_copy(update=faults),
+        "faults": (situation.old.faults or Faults()).model_copy(update=faults),
         "steps_lost": min(polled.steps_lost, MOST_COUNT),
     }
 
@@ -114,16 +114,18 @@ def _spent(it: Situation, polled: TrainerStatus) -> dict[str, object]:
 def _simulators(polled: TrainerStatus) -> tuple[SimulatorStatus, ...]:
     return tuple(
         SimulatorStatus(
-            name=one_line(each.name, LONGEST_NAME) or "unnamed",
-            role=Role(each.role),
-            state=SidecarState(each.state),
-            restarts=min(each.restarts, MOST_COUNT),
-            last_fault=None if each.last_fault is None else one_line(each.last_fault, LONGEST_FAULT),
-            flapping=each.flapping,
-            given_up=each.given_up,
-            standby=each.standby,
+            name=one_line(simulator.name, LONGEST_NAME) or "unnamed",
+            role=Role(simulator.role),
+            state=SidecarState(simulator.state),
+            restarts=min(simulator.restarts, MOST_COUNT),
+            last_fault=None
+            if simulator.last_fault is None
+            else one_line(simulator.last_fault, LONGEST_FAULT),
+            flapping=simulator.flapping,
+            given_up=simulator.given_up,
+            standby=simulator.standby,
         )
-        for each in polled.simulators
+        for simulator in polled.simulators
     )
 
 
@@ -139,5 +141,9 @@ def _figure(new: float | None, old: float | None) -> float | None:
     return old if new is None else round(new, 4)
 
 
-def _interval(told: protocol.SuccessInterval | None) -> SuccessInterval | None:
-    return None if told is None else SuccessInterval(low=told.low, high=told.high, episodes=told.episodes)
+def _interval(interval: protocol.SuccessInterval | None) -> SuccessInterval | None:
+    return (
+        None
+        if interval is None
+        else SuccessInterval(low=interval.low, high=interval.high, episodes=interval.episodes)
+    )

@@ -9,7 +9,7 @@ from palaestra.api.lines import one_line
 from palaestra.api.reasons import LONGEST_MESSAGE, Reason
 from palaestra.api.status import TERMINAL
 from palaestra.decide.attempts import Attempt, of_pod, why
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code, newer_pods
 from palaestra.decide.progress import LONGEST_NAME
 from palaestra.decide.situation import Situation, Verdict
@@ -19,37 +19,50 @@ from palaestra.observe.views import PodView
 from palaestra_protocol.pod.status import MOST_FAULTS, MOST_LINE, MOST_LINES, FaultRecord
 
 
-def last_attempt(it: Situation, end: Verdict | None = None) -> LastAttempt | None:
+def last_attempt(situation: Situation, end: Verdict | None = None) -> LastAttempt | None:
     """Return the record of the newest ended attempt; None if no attempt has ended.
 
     `end` is the verdict on the replica, if it has ended; it describes the attempt whose pod is gone.
     """
-    known, newest = it.old.last_attempt, it.seen.pod
-    attempt = of_pod(it, newest, it.counted.attempt) if newest and has_ended(newest) else _replaced(it)
+    known, newest = situation.old.last_attempt, situation.seen.pod
+    attempt = (
+        of_pod(situation, newest, situation.counted.attempt)
+        if newest and has_ended(newest)
+        else _replaced(situation)
+    )
     if attempt is not None and not (attempt.pod is None and _knows(known, attempt.number)):
         return _record(attempt, why(attempt))
-    if end is not None and newest is None and it.counted.attempt and not _knows(known, it.counted.attempt):
-        number, name = it.counted.attempt, it.counted.pod.name if it.counted.pod else ""
-        return _record(Attempt(it=it, number=number, name=name, pod=None, code=None), end.told)
+    if (
+        end is not None
+        and newest is None
+        and situation.counted.attempt
+        and not _knows(known, situation.counted.attempt)
+    ):
+        number, name = situation.counted.attempt, situation.counted.pod.name if situation.counted.pod else ""
+        return _record(
+            Attempt(situation=situation, number=number, name=name, pod=None, code=None), end.explanation
+        )
     return known
 
 
-def late_word(it: Situation) -> LastAttempt | None:
+def late_word(situation: Situation) -> LastAttempt | None:
     """Return the record of the last attempt of a replica whose end was seen before that of its pod.
 
     If the pod disappears without a termination message, the record has the replica's own end. The caches of
     Jobs and pods are updated in any order, and the record must not depend on it.
     """
-    known, newest, named = it.old.last_attempt, it.seen.pod, it.old.pod
-    if named is None or _knows(known, it.old.attempt):
+    known, newest, named = situation.old.last_attempt, situation.seen.pod, situation.old.pod
+    if named is None or _knows(known, situation.old.attempt):
         return known
-    if newest is None and it.old.phase in TERMINAL:
-        gone = Attempt(it=it, number=it.old.attempt, name=named.name, pod=None, code=None)
-        reason = Reason(it.old.reason or Reason.JOB_FAILED)
-        return _record(gone, Told(reason=reason, message=it.old.message or ""))
+    if newest is None and situation.old.phase in TERMINAL:
+        gone = Attempt(
+            situation=situation, number=situation.old.attempt, name=named.name, pod=None, code=None
+        )
+        reason = Reason(situation.old.reason or Reason.JOB_FAILED)
+        return _record(gone, Explanation(reason=reason, message=situation.old.message or ""))
     if newest is None or newest.uid != named.uid or not has_ended(newest):
         return known
-    attempt = of_pod(it, newest, it.old.attempt)
+    attempt = of_pod(situation, newest, situation.old.attempt)
     return _record(attempt, why(attempt))
 
 
@@ -62,22 +75,22 @@ def _knows(known: LastAttempt | None, number: int) -> bool:
     return known is not None and known.attempt >= number
 
 
-def _replaced(it: Situation) -> Attempt | None:
+def _replaced(situation: Situation) -> Attempt | None:
     """Return the attempt before the newest pod, if that pod is seen for the first time."""
-    named, newer = it.old.pod, newer_pods(it.old, it.seen.pods)
+    named, newer = situation.old.pod, newer_pods(situation.old, situation.seen.pods)
     if not newer:
         return None
     if len(newer) > 1:
-        return of_pod(it, newer[-2], it.counted.attempt - 1)
+        return of_pod(situation, newer[-2], situation.counted.attempt - 1)
     if named is None:
         return None
-    pod = next((each for each in it.seen.pods if each.uid == named.uid), None)
+    pod = next((pod for pod in situation.seen.pods if pod.uid == named.uid), None)
     if pod is not None:
-        return of_pod(it, pod, it.old.attempt)
-    return Attempt(it=it, number=it.old.attempt, name=named.name, pod=None, code=None)
+        return of_pod(situation, pod, situation.old.attempt)
+    return Attempt(situation=situation, number=situation.old.attempt, name=named.name, pod=None, code=None)
 
 
-def _record(attempt: Attempt, told: Told) -> LastAttempt:
+def _record(attempt: Attempt, explanation: Explanation) -> LastAttempt:
     word = attempt.word
     restarts = word.restarts if word is not None else None
     if restarts is None:
@@ -85,8 +98,8 @@ def _record(attempt: Attempt, told: Told) -> LastAttempt:
     return LastAttempt(
         attempt=attempt.number,
         exit_code=attempt.code,
-        reason=told.reason.value,
-        message=one_line(told.message, LONGEST_MESSAGE),
+        reason=explanation.reason.value,
+        message=one_line(explanation.message, LONGEST_MESSAGE),
         log=_log(attempt),
         faults=tuple(_faults(word.faults if word is not None else ())),
         restarts=min(restarts or 0, MOST_COUNT),
@@ -95,7 +108,7 @@ def _record(attempt: Attempt, told: Told) -> LastAttempt:
 
 def _counted_restarts(attempt: Attempt) -> int:
     """Return the counted restarts of simulators in an attempt whose trainer does not report them."""
-    now, before = attempt.it.counted, attempt.it.old
+    now, before = attempt.situation.counted, attempt.situation.old
     for counts in (now, before):
         if counts.pod is not None and counts.pod.name == attempt.name:
             return counts.simulator_restarts
@@ -109,13 +122,13 @@ def _log(attempt: Attempt) -> tuple[str, ...]:
         lines = attempt.word.log
     elif attempt.pod is not None:
         lines = tuple(left_by(attempt.pod).splitlines())
-    told = (one_line(line, MOST_LINE) for line in lines)
-    return tuple(line for line in told if line)[-MOST_LINES:]
+    shortened = (one_line(line, MOST_LINE) for line in lines)
+    return tuple(line for line in shortened if line)[-MOST_LINES:]
 
 
 def _faults(records: tuple[FaultRecord, ...]) -> list[Fault]:
     """Return the last faults, without those whose time is not a valid date."""
-    timed = [(each, at) for each in records if (at := as_time(each.time)) is not None]
+    timed = [(record, at) for record in records if (at := as_time(record.time)) is not None]
     return [
         Fault(
             time=at,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from palaestra.api.reasons import Reason
 from palaestra.decide.progress import standstill
-from palaestra.decide.situation import Check, Finding, Situation, after, found, told
+from palaestra.decide.situation import Check, Finding, Situation, after, explain, found
 from palaestra.decide.times import Wait
 from palaestra.decide.troubles import mark_of
 from palaestra.observe.pods import dropped
@@ -18,53 +18,55 @@ STALL_GRACE_S = 120  # time for the trainer's own watchdog to end it
 FORGOTTEN_S = 300  # a node needs seconds to start the trainer: its image is already there, for the ROS master
 
 
-def marked(it: Situation) -> Finding | None:
+def marked(situation: Situation) -> Finding | None:
     """The pod is marked for replacement and still runs."""
-    if it.pod is None or it.pod.gone_by is not None:
+    if situation.pod is None or situation.pod.gone_by is not None:
         return None
-    mark = mark_of(it, it.pod)
-    return None if mark is None else Finding(told=mark)
+    mark = mark_of(situation, situation.pod)
+    return None if mark is None else Finding(explanation=mark)
 
 
-def restart_policy_dropped(it: Situation) -> Finding | None:
+def restart_policy_dropped(situation: Situation) -> Finding | None:
     """Sidecars became ordinary init containers: such a pod never starts its trainer."""
-    pod = it.pod
+    pod = situation.pod
     names = dropped(pod) if pod is not None else ()
     if pod is None or not names or pod.gone_by is not None:
         return None
     return found(Reason.RESTART_POLICY_DROPPED, pod=pod.name, containers=", ".join(names))
 
 
-def trainer_never_started(it: Situation) -> Finding | None:
+def trainer_never_started(situation: Situation) -> Finding | None:
     """All sidecars run, but the node does not start the trainer."""
-    pod = it.pod
+    pod = situation.pod
     if pod is None or pod.trainer is None or not pod.sidecars or pod.gone_by is not None:
         return None
-    up = all(each.running_since and each.started for each in pod.sidecars)
+    up = all(sidecar.running_since and sidecar.started for sidecar in pod.sidecars)
     if not up or pod.trainer.waiting != "PodInitializing":
         return None
-    reason = told(Reason.TRAINER_NOT_STARTED, pod=pod.name, seconds=FORGOTTEN_S)
-    return after(it, Wait(key=("trainer", pod.uid), seconds=FORGOTTEN_S), reason)
+    reason = explain(Reason.TRAINER_NOT_STARTED, pod=pod.name, seconds=FORGOTTEN_S)
+    return after(situation, Wait(key=("trainer", pod.uid), seconds=FORGOTTEN_S), reason)
 
 
-def stalled(it: Situation) -> Finding | None:
+def stalled(situation: Situation) -> Finding | None:
     """The trainer answers, its step count does not move, and its watchdog has not ended it."""
-    wait = standstill(it)
-    if wait is None or it.pod is None or it.pod.gone_by is not None or not it.fresh:
+    wait = standstill(situation)
+    if wait is None or situation.pod is None or situation.pod.gone_by is not None or not situation.fresh:
         return None
-    seconds = it.job.spec.stall_deadline_seconds
+    seconds = situation.job.spec.stall_deadline_seconds
     what = f"no step was learned from for more than {seconds} s"
-    return after(it, replace(wait, seconds=seconds + STALL_GRACE_S), told(Reason.STALLED, what=what))
+    return after(
+        situation, replace(wait, seconds=seconds + STALL_GRACE_S), explain(Reason.STALLED, what=what)
+    )
 
 
-def replaced_too_often(it: Situation) -> Finding | None:
+def replaced_too_often(situation: Situation) -> Finding | None:
     """A pod has to be replaced, but as many were replaced as `backoffLimit` allows."""
-    job = it.seen.job
+    job = situation.seen.job
     times = job.replaced.times if job is not None and job.replaced is not None else 0
-    if it.suspended or marked(it) is not None or times < it.job.spec.backoff_limit:
+    if situation.suspended or marked(situation) is not None or times < situation.job.spec.backoff_limit:
         return None
-    causes = (cause for check in REPLACED if (cause := check(it)) is not None)
-    return min(causes, key=lambda each: each.left_s, default=None)
+    causes = (cause for check in REPLACED if (cause := check(situation)) is not None)
+    return min(causes, key=lambda cause: cause.left_s, default=None)
 
 
 REPLACED: tuple[Check, ...] = (restart_policy_dropped, trainer_never_started, stalled)

@@ -18,30 +18,30 @@ class Decided:
     course: Course = field(default_factory=Course)
 
 
-def decided(it: Situation) -> Decided:
+def decided(situation: Situation) -> Decided:
     """Return what follows for a replica that had not ended."""
-    verdict, course = judge(it)
-    return Decided(status=_status(it, verdict), course=course)
+    verdict, course = judge(situation)
+    return Decided(status=_status(situation, verdict), course=course)
 
 
-def _status(it: Situation, verdict: Verdict) -> ReplicaStatus:
-    old, reason = it.old, verdict.told.reason.value
+def _status(situation: Situation, verdict: Verdict) -> ReplicaStatus:
+    old, reason = situation.old, verdict.explanation.reason.value
     changed = (old.phase, old.reason) != (verdict.phase, reason) or old.since is None
-    counts = it.counted
+    counts = situation.counted
     return old.model_copy(
         update={
             "phase": verdict.phase,
             "reason": reason,
-            "message": verdict.told.message,
-            "since": it.now if changed else old.since,
+            "message": verdict.explanation.message,
+            "since": situation.now if changed else old.since,
             "attempt": counts.attempt,
             "pod": counts.pod,
             "restarts": counts.restarts,
             "simulator_restarts": counts.simulator_restarts,
             "furthest_step": counts.furthest_step,
             "fruitless": counts.fruitless,
-            "last_attempt": last_attempt(it, verdict if verdict.phase in TERMINAL else None),
-            "memory_kills": memory_kills(it),
-            **progress(it, verdict.phase),
+            "last_attempt": last_attempt(situation, verdict if verdict.phase in TERMINAL else None),
+            "memory_kills": memory_kills(situation),
+            **progress(situation, verdict.phase),
         }
     )

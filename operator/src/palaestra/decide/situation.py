@@ -7,7 +7,7 @@ from datetime import datetime
 from palaestra.api import SimulatorGroup, TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import Phase, ReplicaStatus
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import Counted
 from palaestra.decide.preparing import Hold
 from palaestra.decide.times import Times, Wait
@@ -88,13 +88,13 @@ class Finding:
     """The result of a check.
 
     Attributes:
-        told: the reason and its message.
+        explanation: the reason and its message.
         left_s: seconds until it holds; 0 or less: it holds now.
         wait: the wait to keep until the next reconcile; None: there is none.
         phase: the phase of the replica; None: by the state of its trainer's container.
     """
 
-    told: Told
+    explanation: Explanation
     left_s: float = 0.0
     wait: Wait | None = None
     phase: Phase | None = None
@@ -105,31 +105,31 @@ class Verdict:
     """The phase of a replica, and the reason."""
 
     phase: Phase
-    told: Told
+    explanation: Explanation
 
 
 Check = Callable[[Situation], Finding | None]
 
 
-def told(reason: Reason, **facts: object) -> Told:
+def explain(reason: Reason, **facts: object) -> Explanation:
     """Return a reason with its message."""
-    return Told(reason=reason, message=say(reason, **facts))
+    return Explanation(reason=reason, message=say(reason, **facts))
 
 
 def found(reason: Reason, **facts: object) -> Finding:
     """Return a finding that holds at once."""
-    return Finding(told=told(reason, **facts))
+    return Finding(explanation=explain(reason, **facts))
 
 
-def after(it: Situation, wait: Wait, why: Told) -> Finding:
+def after(situation: Situation, wait: Wait, why: Explanation) -> Finding:
     """Return a finding that holds once a wait is over."""
-    return Finding(told=why, left_s=it.left_s(wait), wait=wait)
+    return Finding(explanation=why, left_s=situation.left_s(wait), wait=wait)
 
 
 def first_waiting(pod: PodView | None, reasons: frozenset[str]) -> ContainerView | None:
     """Return the first container that waits for one of these reasons of the kubelet."""
     containers = pod.containers if pod is not None else ()
-    return next((each for each in containers if each.waiting in reasons), None)
+    return next((container for container in containers if container.waiting in reasons), None)
 
 
 def _members(job: TrainingJob) -> list[tuple[SimulatorGroup, int]]:

@@ -8,19 +8,19 @@ from typing import Any
 from palaestra.api import TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus, Status
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 from palaestra.decide.situation import Verdict
 from palaestra.observe.views import Observed
 
 
 def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
     """Return the phase of the job, and the reason."""
-    phases = Counter(each.phase for each in replicas)
-    if all(each.phase in TERMINAL for each in replicas):
+    phases = Counter(replica.phase for replica in replicas)
+    if all(replica.phase in TERMINAL for replica in replicas):
         return _ended(replicas)
     if phases[Phase.RUNNING]:
         what = f"{phases[Phase.RUNNING]} of {len(replicas)} replicas train"
-        return Verdict(phase=Phase.RUNNING, told=Told(reason=Reason.TRAINING, message=what))
+        return Verdict(phase=Phase.RUNNING, explanation=Explanation(reason=Reason.TRAINING, message=what))
     if phases[Phase.SUSPENDED] and not phases[Phase.PENDING]:
         return as_first(replicas, Phase.SUSPENDED)
     return as_first(replicas, Phase.PENDING)
@@ -28,7 +28,7 @@ def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
 
 def active(phase: Phase, replicas: Sequence[ReplicaStatus]) -> bool:
     """Return whether a job is active: it has not ended, and not all of its replicas are suspended."""
-    suspended = all(each.phase in TERMINAL | {Phase.SUSPENDED} for each in replicas)
+    suspended = all(replica.phase in TERMINAL | {Phase.SUSPENDED} for replica in replicas)
     return phase not in TERMINAL and not suspended
 
 
@@ -36,16 +36,16 @@ def started(old: Status, observed: Observed) -> datetime | None:
     """Return when the job's first pod was started, by its node's clock."""
     if old.start_time is not None:
         return old.start_time
-    begun = [pod for each in observed.replicas for pod in each.pods if pod.started is not None]
+    begun = [pod for replica in observed.replicas for pod in replica.pods if pod.started is not None]
     first = min(begun, key=lambda pod: pod.created, default=None)
     return None if first is None else first.started
 
 
 def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, Any]:
     """Return the columns of `kubectl get tj`, from the replica with the fewest steps and from the worst."""
-    up = sum(each.phase in {Phase.RUNNING, Phase.SUCCEEDED} for each in replicas)
-    steps = [each.step for each in replicas if each.step is not None]
-    rates = [each.success_rate for each in replicas if each.success_rate is not None]
+    up = sum(replica.phase in {Phase.RUNNING, Phase.SUCCEEDED} for replica in replicas)
+    steps = [replica.step for replica in replicas if replica.step is not None]
+    rates = [replica.success_rate for replica in replicas if replica.success_rate is not None]
     return {
         "running": f"{up}/{job.spec.replicas}",
         "step": min(steps, default=None),
@@ -54,12 +54,12 @@ def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, An
 
 
 def _ended(replicas: Sequence[ReplicaStatus]) -> Verdict:
-    failed = [each for each in replicas if each.phase is Phase.FAILED]
+    failed = [replica for replica in replicas if replica.phase is Phase.FAILED]
     if not failed:
         what = f"{len(replicas)} of {len(replicas)} replicas succeeded"
-        return Verdict(phase=Phase.SUCCEEDED, told=Told(reason=Reason.SUCCEEDED, message=what))
+        return Verdict(phase=Phase.SUCCEEDED, explanation=Explanation(reason=Reason.SUCCEEDED, message=what))
     first = failed[0]
-    told = Told(reason=Reason(first.reason or Reason.JOB_FAILED), message=first.message or "")
+    explanation = Explanation(reason=Reason(first.reason or Reason.JOB_FAILED), message=first.message or "")
     if len(replicas) > 1:
         message = say(
             Reason.SOME_REPLICAS_FAILED,
@@ -68,14 +68,18 @@ def _ended(replicas: Sequence[ReplicaStatus]) -> Verdict:
             index=first.index,
             message=f"{first.reason}: {first.message}",
         )
-        alike = len(failed) == len(replicas) and len({each.reason for each in failed}) == 1
-        told = Told(reason=told.reason if alike else Reason.SOME_REPLICAS_FAILED, message=message)
-    return Verdict(phase=Phase.FAILED, told=told)
+        alike = len(failed) == len(replicas) and len({replica.reason for replica in failed}) == 1
+        explanation = Explanation(
+            reason=explanation.reason if alike else Reason.SOME_REPLICAS_FAILED, message=message
+        )
+    return Verdict(phase=Phase.FAILED, explanation=explanation)
 
 
 def as_first(replicas: Sequence[ReplicaStatus], phase: Phase) -> Verdict:
     """Return the reason of the first replica in this phase."""
-    first = next(each for each in replicas if each.phase is phase)
+    first = next(replica for replica in replicas if replica.phase is phase)
     of = f"replica {first.index}: " if len(replicas) > 1 else ""
-    told = Told(reason=Reason(first.reason or Reason.STARTING), message=f"{of}{first.message or ''}")
-    return Verdict(phase=phase, told=told)
+    explanation = Explanation(
+        reason=Reason(first.reason or Reason.STARTING), message=f"{of}{first.message or ''}"
+    )
+    return Verdict(phase=phase, explanation=explanation)

@@ -38,8 +38,12 @@ def seen_generation(job: TrainingJob, observed: Observed) -> int | None:
     It stays at the old value while a Job without the annotation is not yet as the spec asks; otherwise a
     patch that was refused or held back would look done.
     """
-    jobs = (each.job for each in observed.replicas if each.job is not None and each.job.stopped is None)
-    waits = any(each.suspend_set is None and to_set(job, each) for each in jobs)
+    jobs = (
+        replica.job
+        for replica in observed.replicas
+        if replica.job is not None and replica.job.stopped is None
+    )
+    waits = any(known.suspend_set is None and to_set(job, known) for known in jobs)
     return job.status.observed_generation if waits else job.metadata.generation
 
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from palaestra.decide.conditions import Told
+from palaestra.decide.conditions import Explanation
 
 WaitKey = tuple[int | str, ...]  # the replica, then `Wait.key`
 
@@ -35,11 +35,11 @@ class Trouble:
     """A cause that delays a replica's first step.
 
     Attributes:
-        told: the reason and its message.
+        explanation: the reason and its message.
         gone_s: when a reconcile first did not find it, on the monotonic clock; None: it is still there.
     """
 
-    told: Told
+    explanation: Explanation
     gone_s: float | None = None
 
 

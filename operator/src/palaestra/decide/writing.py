@@ -57,15 +57,15 @@ def _without_progress(status: Mapping[str, Any]) -> dict[str, Any]:
     rest = _without(status, _OF_JOB)
     for name, kept in (("replicas", _rest), ("conditions", _without_amounts)):
         if isinstance(items := rest.get(name), list):
-            rest[name] = [kept(each) for each in items]
+            rest[name] = [kept(item) for item in items]
     return rest
 
 
-def _without_amounts(told: Any) -> Any:
+def _without_amounts(reported: Any) -> Any:
     """Return a condition or replica; if it waits in a queue, without the amounts in its message."""
-    if not isinstance(told, Mapping) or told.get("reason") != Reason.QUEUED:
-        return told
-    return {**told, "message": _AMOUNT.sub("", str(told.get("message")))}
+    if not isinstance(reported, Mapping) or reported.get("reason") != Reason.QUEUED:
+        return reported
+    return {**reported, "message": _AMOUNT.sub("", str(reported.get("message")))}
 
 
 def _rest(replica: Any) -> Any:

@@ -38,7 +38,7 @@ def examine(site: Site) -> Iterator[Finding]:
             continue
         found = list(_findings(what, check, site))
         yield from found
-        if any(each.verdict is Verdict.WRONG for each in found):
+        if any(finding.verdict is Verdict.WRONG for finding in found):
             skipped |= POINTLESS.get(check, frozenset())
 
 

@@ -57,7 +57,7 @@ def judged_images(container: Object) -> Finding:
         _chosen(container, TRAINER_IMAGE, release.trainer),
         _chosen(container, STUB_IMAGE, release.stub),
     )
-    tags = [each for each in named if DIGEST not in each]
+    tags = [image for image in named if DIGEST not in image]
     if not tags:
         return right("images", "are named by digest")
     return warning(
@@ -116,7 +116,7 @@ def operator_rights(site: Site) -> Iterator[Finding]:
 def metrics(site: Site) -> Iterator[Finding]:
     """Tell whether an operator answers with its metrics, asked by way of the API server."""
     pods = site.api.list(PODS, site.operator_namespace, labels=f"{OPERATOR_LABEL}=true")
-    running = [each for each in pods if each["status"].get("phase") == "Running"]
+    running = [pod for pod in pods if pod["status"].get("phase") == "Running"]
     if not running:
         remedy = _remedy(site, _deployment(site))
         yield wrong("metrics", f"no operator runs in {site.operator_namespace}", remedy)
@@ -152,7 +152,9 @@ def trainer_image(site: Site) -> str:
 def _chosen(container: Object, option: str, otherwise: str) -> str:
     """Return the value of an option of the operator's command line."""
     given = container.get("command", ())
-    return next((each.removeprefix(option) for each in given if each.startswith(option)), otherwise)
+    return next(
+        (argument.removeprefix(option) for argument in given if argument.startswith(option)), otherwise
+    )
 
 
 def _deployment(site: Site) -> Object | None:
@@ -168,7 +170,7 @@ def _container(deployment: Object) -> Object:
 
 
 def _port(pod: Object) -> int:
-    ports = [port for each in pod["spec"]["containers"] for port in each.get("ports", ())]
+    ports = [port for container in pod["spec"]["containers"] for port in container.get("ports", ())]
     return next(int(port["containerPort"]) for port in ports if port.get("name") == PORT_NAME)
 
 

@@ -29,7 +29,7 @@ def answers(site: Site) -> Iterator[Finding]:
 
 def nodes(site: Site) -> Iterator[Finding]:
     """Tell whether the oldest kubelet knows sidecar containers."""
-    versions = [each["status"]["nodeInfo"]["kubeletVersion"] for each in site.api.list(NODES)]
+    versions = [node["status"]["nodeInfo"]["kubeletVersion"] for node in site.api.list(NODES)]
     if not versions:
         yield wrong("nodes", "there is none", "add a node, so that pods can run")
         return
@@ -116,7 +116,10 @@ def sidecars(site: Site) -> Iterator[Finding]:
 
 def judged_pod(made: Object) -> Finding:
     """Return what came of the trial pod's sidecar."""
-    found = {each["name"]: each.get("restartPolicy") for each in made["spec"].get("initContainers", ())}
+    found = {
+        container["name"]: container.get("restartPolicy")
+        for container in made["spec"].get("initContainers", ())
+    }
     if found.get("sidecar") == "Always":
         return right("sidecars", "stay as they are on their way to the nodes")
     return wrong(
@@ -147,14 +150,14 @@ def storage(site: Site) -> Iterator[Finding]:
     """Tell whether a claim that names no class gets a volume."""
     classes = site.api.list(STORAGE_CLASSES)
     default = [
-        each["metadata"]["name"]
-        for each in classes
-        if (each["metadata"].get("annotations") or {}).get(DEFAULT_CLASS) == "true"
+        class_["metadata"]["name"]
+        for class_ in classes
+        if (class_["metadata"].get("annotations") or {}).get(DEFAULT_CLASS) == "true"
     ]
     if default:
         yield right("storage class", f"{default[0]} is the default")
         return
-    names = ", ".join(each["metadata"]["name"] for each in classes)
+    names = ", ".join(class_["metadata"]["name"] for class_ in classes)
     yield wrong(
         "storage class",
         f"none is the default; there is {names}" if names else "there is none",

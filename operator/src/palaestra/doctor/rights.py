@@ -99,8 +99,8 @@ def missing(site: Site, rights: Iterable[Right], *, account: Account | None = No
     """Return which rights the person who asks, or an account, lacks in the namespace: `list pods`."""
     return [
         said
-        for each in rights
-        for said, attributes in each.asked(site.namespace)
+        for needed in rights
+        for said, attributes in needed.asked(site.namespace)
         if not allowed(site, attributes, account=account)
     ]
 

@@ -36,7 +36,7 @@ def check(request: Request) -> None:
     Raises:
         Refused: a check failed; the message has one line for each problem.
     """
-    if problems := [problem for each in CHECKS for problem in each(request)]:
+    if problems := [problem for check in CHECKS for problem in check(request)]:
         raise Refused("\n".join(problems))
 
 
@@ -78,7 +78,7 @@ def worlds_are_right(request: Request) -> Iterator[str]:
 
 def space_is_left(request: Request) -> Iterator[str]:
     """The disk has space for the run."""
-    folder = next(each for each in (request.runs, *request.runs.parents) if each.exists())
+    folder = next(parent for parent in (request.runs, *request.runs.parents) if parent.exists())
     if not os.access(folder, os.W_OK):
         yield f"{folder}: cannot be written; choose another folder with --dir"
     elif (free := shutil.disk_usage(folder).free) < LEAST_FREE:

@@ -95,8 +95,8 @@ async def _run_pod(planned: ReplicaPlan, setting: Setting, interrupt: Interrupt)
 def _logs(pod: Pod, setting: Setting, opened: contextlib.ExitStack) -> dict[str, Log]:
     folder = setting.directory / "logs"
     logs = {
-        each.name: Log(each.name, folder, setting.show if each.name in setting.shown else None)
-        for each in pod.containers
+        container.name: Log(container.name, folder, setting.show if container.name in setting.shown else None)
+        for container in pod.containers
     }
     for log in logs.values():
         opened.callback(log.close)

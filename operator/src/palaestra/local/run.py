@@ -54,14 +54,14 @@ def run(job: TrainingJob, options: Options) -> int:
         outcomes.append(_run_one(job, directory / str(replica), replica, options))
         if outcomes[-1].interrupted or outcomes[-1].exit_code == ExitCode.INTERRUPTED:
             break
-    return next((each.exit_code for each in outcomes if not each.finished), 0)
+    return next((outcome.exit_code for outcome in outcomes if not outcome.finished), 0)
 
 
 def check(job: TrainingJob, directory: Path, chosen: range, options: Options) -> None:
     """Do all checks that need no file to be written; raises the same errors as `run`."""
     planned = plan(job, layout(directory, options, Ports()), mounted=dict.fromkeys(chosen, ()))
-    for each in planned.replicas.values():
-        read_pod(each.job["spec"]["template"], uid="")
+    for replica in planned.replicas.values():
+        read_pod(replica.job["spec"]["template"], uid="")
     preflight.check(preflight.Request(job=job, runs=options.runs.absolute()))
 
 
@@ -135,7 +135,7 @@ def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tupl
     """Return the containers whose lines are shown: all, or the trainer if it cannot draw."""
     if options.verbose:
         pod = planned.job["spec"]["template"]["spec"]
-        return tuple(each["name"] for each in (*pod["initContainers"], *pod["containers"]))
+        return tuple(container["name"] for container in (*pod["initContainers"], *pod["containers"]))
     return () if on_terminal else (TRAINER,)
 
 

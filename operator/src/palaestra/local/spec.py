@@ -69,7 +69,7 @@ def read_pod(template: Mapping[str, Any], uid: str) -> Pod:
         raise Refused(f"container {others[0]['name']}: a pod is run here with one main container only")
     return Pod(
         uid=uid,
-        init=tuple(_container(each, uid) for each in spec.get("initContainers", ())),
+        init=tuple(_container(container, uid) for container in spec.get("initContainers", ())),
         main=_container(main, uid),
         grace_s=float(spec.get("terminationGracePeriodSeconds", GRACE_S)),
         mounts={

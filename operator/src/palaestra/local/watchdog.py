@@ -29,7 +29,7 @@ def kill_marked(prefix: str) -> int:
     """
     wanted = f"{MARKER}={prefix}".encode()
     with os.scandir("/proc") as entries:
-        return sum(_kill_if_marked(int(it.name), wanted) for it in entries if it.name.isdigit())
+        return sum(_kill_if_marked(int(entry.name), wanted) for entry in entries if entry.name.isdigit())
 
 
 def _kill_if_marked(pid: int, wanted: bytes) -> bool:

@@ -64,10 +64,10 @@ def _replica(job: TrainingJob, index: int, objects: Objects) -> ReplicaObserved:
         job=ours,
         obstacle=next((_obstacle(raw, name) for raw in named if job.metadata.uid not in owners(raw)), None),
         pods=pods,
-        in_the_way=tuple(each.name for each in others if not each.ended),
+        in_the_way=tuple(other.name for other in others if not other.ended),
         former=tuple(_former(job, index, objects)),
         polled=objects.polled.get(newest.uid) if newest and not newest.ended else None,
-        terminations={each.uid: word for each in pods if (word := _last_word(each)) is not None},
+        terminations={pod.uid: word for pod in pods if (word := _last_word(pod)) is not None},
         refused=_refused(ours, newest, objects) if ours else None,
         denied=one_line(objects.denied.get(index) or objects.denied.get(None) or "", MOST_TEXT),
         unmounted=_unmounted(newest, objects) if newest else "",
@@ -89,7 +89,11 @@ def _pods(
     Every user who can create pods can give them our labels, but only those that its Job owns are the
     replica's. Of an earlier Job, only the pod that the status names is known.
     """
-    known = {each.pod.uid for each in job.status.replicas if each.index == index and each.pod is not None}
+    known = {
+        replica.pod.uid
+        for replica in job.status.replicas
+        if replica.index == index and replica.pod is not None
+    }
     found: dict[str, PodView] = {}
     others: dict[str, PodView] = {}
     for raw in objects.pods:
@@ -99,7 +103,7 @@ def _pods(
             made = view.uid in known or (ours is not None and ours.uid in owners(raw))
             (found if made else others)[view.uid] = view
     found.pop("", None)
-    in_order = sorted(found.values(), key=lambda it: (it.created, not it.ended, it.name))
+    in_order = sorted(found.values(), key=lambda pod: (pod.created, not pod.ended, pod.name))
     return tuple(in_order), tuple(others.values())
 
 

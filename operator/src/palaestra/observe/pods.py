@@ -42,9 +42,9 @@ def pod_view(raw: Raw) -> PodView:
 def dropped(view: PodView) -> tuple[str, ...]:
     """Return the containers that should be sidecars but are plain init containers."""
     return tuple(
-        each.name
-        for each in view.containers
-        if each.kind is ContainerKind.INIT and each.name.startswith(SIDECARS)
+        container.name
+        for container in view.containers
+        if container.kind is ContainerKind.INIT and container.name.startswith(SIDECARS)
     )
 
 
@@ -75,10 +75,10 @@ def _containers(raw: Raw) -> tuple[ContainerView, ...]:
         if isinstance(each.get("name"), str)
     }
     planned = [
-        *((each, _kind(each)) for each in parts(raw, "spec", "initContainers")),
-        *((each, ContainerKind.MAIN) for each in parts(raw, "spec", "containers")),
+        *((container, _kind(container)) for container in parts(raw, "spec", "initContainers")),
+        *((container, ContainerKind.MAIN) for container in parts(raw, "spec", "containers")),
     ]
-    return tuple(_container(each, kind, states) for each, kind in planned)
+    return tuple(_container(container, kind, states) for container, kind in planned)
 
 
 def _kind(planned: dict[str, Any]) -> ContainerKind:

@@ -58,13 +58,15 @@ def as_time(value: str) -> datetime | None:
 
 def owners(raw: Any) -> frozenset[str]:
     """Return the uids of an object's owners."""
-    uids = (each.get("uid") for each in parts(raw, "metadata", "ownerReferences"))
+    uids = (owner.get("uid") for owner in parts(raw, "metadata", "ownerReferences"))
     return frozenset(uid for uid in uids if isinstance(uid, str) and uid)
 
 
 def condition(raw: Any, kind: str) -> dict[str, Any]:
     """Return the condition of this type in the status of `raw`; empty if there is none."""
-    return next((each for each in parts(raw, "status", "conditions") if each.get("type") == kind), {})
+    return next(
+        (condition for condition in parts(raw, "status", "conditions") if condition.get("type") == kind), {}
+    )
 
 
 def holds(raw: Any, kind: str) -> bool:

@@ -81,11 +81,11 @@ def _pod_spec(raw: Mapping[str, Any]) -> dict[str, Any]:
     kept = _some(spec, ("nodeName",))
     volumes = spec.get("volumes") if isinstance(spec, Mapping) else None
     if isinstance(volumes, list):
-        claims = [_some(each, ("persistentVolumeClaim",)) for each in volumes]
-        kept["volumes"] = [each for each in claims if each]
+        claims = [_some(volume, ("persistentVolumeClaim",)) for volume in volumes]
+        kept["volumes"] = [claim for claim in claims if claim]
     for field in ("initContainers", "containers"):
         items = spec.get(field) if isinstance(spec, Mapping) else None
-        kept[field] = [_some(each, _CONTAINER) for each in items] if isinstance(items, list) else []
+        kept[field] = [_some(item, _CONTAINER) for item in items] if isinstance(items, list) else []
     return kept
 
 

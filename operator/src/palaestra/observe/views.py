@@ -168,12 +168,14 @@ class PodView:
     @property
     def trainer(self) -> ContainerView | None:
         """Return its main container; None if the pod has none."""
-        return next((each for each in self.containers if each.kind is ContainerKind.MAIN), None)
+        return next(
+            (container for container in self.containers if container.kind is ContainerKind.MAIN), None
+        )
 
     @property
     def sidecars(self) -> tuple[ContainerView, ...]:
         """Return the ROS master's container and those of the simulators."""
-        return tuple(each for each in self.containers if each.kind is ContainerKind.SIDECAR)
+        return tuple(container for container in self.containers if container.kind is ContainerKind.SIDECAR)
 
 
 class JobEnd(StrEnum):

@@ -62,23 +62,23 @@ class Caches:
 
     def start(self) -> None:
         """Start all watches."""
-        for each in self._all():
-            each.start()
+        for reflector in self._all():
+            reflector.start()
 
     def stop(self, deadline_s: float) -> None:
         """Stop all watches; one that does not stop within `deadline_s` ends with the process."""
-        for each in self._all():
-            each.stop(0.0)
+        for reflector in self._all():
+            reflector.stop(0.0)
         self._jobs.stop(deadline_s)
 
     def wait_synced(self, deadline_s: float) -> bool:
         """Return whether everything was read once, `deadline_s` from now at the latest."""
         ends = time.monotonic() + deadline_s
-        return all(each.wait_synced(max(0.0, ends - time.monotonic())) for each in self._all())
+        return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._all())
 
     def missing(self) -> tuple[str, ...]:
         """Return the plurals of the kinds that were not read yet."""
-        return tuple(each.plural for each in self._all() if not each.synced)
+        return tuple(reflector.plural for reflector in self._all() if not reflector.synced)
 
     def known(self) -> Collection[Key]:
         """Return the keys of all TrainingJobs."""

@@ -38,9 +38,9 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
         found = None
     if found != raw["metadata"]["resourceVersion"]:
         raise Outdated(f"TrainingJob {name} is not as in the cache")
-    created = (each for each in actions if isinstance(each, Create) and of(each.object) == JOBS)
-    begun = {str(each.replica): each.object for each in created}
-    stops = [each for each in actions if isinstance(each, Stop | Replace)]
+    created = (action for action in actions if isinstance(action, Create) and of(action.object) == JOBS)
+    begun = {str(creation.replica): creation.object for creation in created}
+    stops = [action for action in actions if isinstance(action, Stop | Replace)]
     pods = api.list(PODS, namespace, labels=f"{JOB_LABEL}={name}") if begun or stops else []
     for pod in pods:
         if _occupies(pod, begun) or any(_is_news(pod, stop, raw) for stop in stops):

@@ -84,9 +84,9 @@ class Definition:
         """
         if self._knows_new:
             return status
-        there = {text(each, "type") for each in parts(stored, "conditions")}
+        there = {text(condition, "type") for condition in parts(stored, "conditions")}
         refused = _NEW if self.outdated else _NEW - there
-        kept = [each for each in status["conditions"] if each["type"] not in refused]
+        kept = [condition for condition in status["conditions"] if condition["type"] not in refused]
         return {**status, "conditions": kept}
 
     def _follow(self, stopping: threading.Event, every_s: float) -> None:

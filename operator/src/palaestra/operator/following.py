@@ -35,45 +35,45 @@ class Followed:
     ) -> None:
         self.plural = resource.plural
         self._reflectors = tuple(
-            Reflector(api, resource, namespace=each, labels=labels, keep=keep, changed=changed)
-            for each in namespaces or (None,)
+            Reflector(api, resource, namespace=namespace, labels=labels, keep=keep, changed=changed)
+            for namespace in namespaces or (None,)
         )
 
     @property
     def synced(self) -> bool:
         """Return whether a whole list of each namespace was read, at least once."""
-        return all(each.synced for each in self._reflectors)
+        return all(reflector.synced for reflector in self._reflectors)
 
     def start(self) -> None:
         """Start the watches; once."""
-        for each in self._reflectors:
-            each.start()
+        for reflector in self._reflectors:
+            reflector.start()
 
     def stop(self, deadline_s: float) -> None:
         """End the watches, and wait for them until `deadline_s`."""
-        for each in self._reflectors:
-            each.stop(0.0)
+        for reflector in self._reflectors:
+            reflector.stop(0.0)
         ends = time.monotonic() + deadline_s
-        for each in self._reflectors:
-            each.stop(max(0.0, ends - time.monotonic()))
+        for reflector in self._reflectors:
+            reflector.stop(max(0.0, ends - time.monotonic()))
 
     def wait_synced(self, deadline_s: float) -> bool:
         """Return whether everything was read once, `deadline_s` from now at the latest."""
         ends = time.monotonic() + deadline_s
-        return all(each.wait_synced(max(0.0, ends - time.monotonic())) for each in self._reflectors)
+        return all(reflector.wait_synced(max(0.0, ends - time.monotonic())) for reflector in self._reflectors)
 
     def get(self, namespace: str, name: str) -> Object | None:
         """Return an object, None if there is none."""
-        found = (each.store.get(namespace, name) for each in self._reflectors)
+        found = (reflector.store.get(namespace, name) for reflector in self._reflectors)
         return next((obj for obj in found if obj is not None), None)
 
     def holds(self, namespace: str, name: str) -> bool:
         """Return whether there is such an object, without reading it."""
-        return any(each.store.holds(namespace, name) for each in self._reflectors)
+        return any(reflector.store.holds(namespace, name) for reflector in self._reflectors)
 
     def select(self, namespace: str | None, labels: Mapping[str, str]) -> list[Object]:
         """Return the objects with these labels; namespace None: in all watched namespaces."""
-        return [obj for each in self._reflectors for obj in each.store.select(namespace, labels)]
+        return [obj for reflector in self._reflectors for obj in reflector.store.select(namespace, labels)]
 
     def keys(self) -> set[Key]:
         """Return namespace and name of all objects."""

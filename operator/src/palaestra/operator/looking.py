@@ -89,7 +89,7 @@ class Looking:
         """
         key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
-        strangers = self._strangers.among(key, uid, {each["metadata"]["name"] for each in jobs})
+        strangers = self._strangers.among(key, uid, {job["metadata"]["name"] for job in jobs})
         refusals = self._refusals.of(key, uid, jobs, pods)
         admissions = self._admissions.of(key, uid, jobs, pods)
         objects = Objects(
@@ -100,7 +100,7 @@ class Looking:
             policies=self._caches.children(NETWORK_POLICIES, key),
             events=list(refusals.facts.values()),
             unadmitted=admissions.facts,
-            unasked=admissions.unasked | {each for each, _ in refusals.unasked},
+            unasked=admissions.unasked | {key for key, _ in refusals.unasked},
             polled=self._polled(),
             denied=self._denials.known(key, uid),
             switchers=self._switchers.of(key, uid, job, jobs),
@@ -144,7 +144,7 @@ class Looking:
         if complete(job, observed) and not resuming(job, observed):
             return observed, None
         namespace, queued = job.metadata.namespace, job.spec.scheduling.queue_name is not None
-        sources = {each: self._source(namespace, each) for each in references(job)}
+        sources = {reference: self._source(namespace, reference) for reference in references(job)}
         kueue = queued and self._has_kueue()
         again_s = RECHECK_S if sources or (queued and not kueue) else None
         return replace(observed, sources=sources, kueue=kueue), again_s
@@ -169,4 +169,4 @@ class Looking:
 
 def earliest(*seconds: float | None) -> float | None:
     """Return the shortest of several waits; None: there is none."""
-    return min((each for each in seconds if each is not None), default=None)
+    return min((second for second in seconds if second is not None), default=None)

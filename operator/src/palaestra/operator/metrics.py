@@ -62,7 +62,7 @@ class Metrics:
         if status["phase"] == Phase.RUNNING and not _has_run(old):
             waited = _running_since(status) - _time(job["metadata"]["creationTimestamp"])
             self._time_to_running.observe(max(waited.total_seconds(), 0.0))
-        before = {each["index"]: each for each in old.get("replicas", ())}
+        before = {replica["index"]: replica for replica in old.get("replicas", ())}
         for replica in status.get("replicas", ()):
             self._count_replica(before.get(replica["index"], {}), replica)
 
@@ -141,17 +141,17 @@ def _by_phase(jobs: Iterable[tuple[str, str]]) -> Values:
     """Return how many jobs of each namespace are in each phase."""
     counted = Count(jobs)
     namespaces = sorted({namespace for namespace, _ in counted})
-    return {(each, phase): counted[each, phase] for each in namespaces for phase in Phase}
+    return {(namespace, phase): counted[namespace, phase] for namespace in namespaces for phase in Phase}
 
 
 def _has_run(status: Object) -> bool:
     """Return whether a job was running before, by its phase and by the starts of its trainers."""
-    begun = (each.get("attempt", 0) > 1 or "target" in each for each in status.get("replicas", ()))
+    begun = (replica.get("attempt", 0) > 1 or "target" in replica for replica in status.get("replicas", ()))
     return status.get("phase") == Phase.RUNNING or any(begun)
 
 
 def _running_since(status: Object) -> datetime:
-    times = {each["type"]: each["lastTransitionTime"] for each in status["conditions"]}
+    times = {condition["type"]: condition["lastTransitionTime"] for condition in status["conditions"]}
     return _time(times[ConditionType.RUNNING])
 
 

@@ -87,8 +87,8 @@ class Schedule:
 
     def follow(self, targets: Collection[Target], now_s: float) -> list[Target]:
         """Poll these targets from now on; return those that are dropped."""
-        wanted = {each.uid: each for each in targets}
-        gone = [each.target for uid, each in self._entries.items() if wanted.get(uid) != each.target]
+        wanted = {target.uid: target for target in targets}
+        gone = [entry.target for uid, entry in self._entries.items() if wanted.get(uid) != entry.target]
         for target in gone:
             del self._entries[target.uid]
         for uid in wanted.keys() - self._entries.keys():

@@ -31,7 +31,7 @@ class Strangers(Memory[str, tuple[float, Object]]):
 
     def meet(self, key: Key, uid: str, name: str) -> Object | None:
         """Return and remember the Job whose name a TrainingJob needs; None: it is gone."""
-        others = {each: met for each, met in self.known(key, uid).items() if each != name}
+        others = {other: met for other, met in self.known(key, uid).items() if other != name}
         try:
             found = trimmed(self._api.get(JOBS, key[0], name))
         except NotFound:

@@ -69,9 +69,9 @@ class Telling:
         if decision.status is not None:
             status = self._accepted(raw.get("status"), as_data(decision.status))
             written = self._write(key, raw, fitted(raw, status), clock_s)
-        for each in decision.events:
-            if each.reason != Reason.PLANNED or not denied.keys() & {None, each.replica}:
-                self._record(raw, each)
+        for event in decision.events:
+            if event.reason != Reason.PLANNED or not denied.keys() & {None, event.replica}:
+                self._record(raw, event)
         return written
 
     def _record(self, raw: Object, event: Happening) -> None:

@@ -76,7 +76,10 @@ def _key(obj: Object) -> Key:
 
 def _trains(pod: Object) -> bool:
     """Return whether the trainer's container runs."""
-    states = {text(each, "name"): part(each, "state") for each in parts(pod, "status", "containerStatuses")}
+    states = {
+        text(container, "name"): part(container, "state")
+        for container in parts(pod, "status", "containerStatuses")
+    }
     return "running" in states.get(TRAINER, {}) and "deletionTimestamp" not in pod["metadata"]
 
 

@@ -11,9 +11,9 @@ _WORDS = frozenset(reason.value for reason in WAITING)
 def waits(job: Object) -> tuple[str, ...]:
     """Return the reason of each replica that waits, or that runs without a step so far."""
     return tuple(
-        text(each, "reason")
-        for each in parts(job, "status", "replicas")
-        if text(each, "reason") in _WORDS and _before_training(each)
+        text(replica, "reason")
+        for replica in parts(job, "status", "replicas")
+        if text(replica, "reason") in _WORDS and _before_training(replica)
     )
 
 

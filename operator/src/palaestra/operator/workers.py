@@ -56,23 +56,23 @@ class Workers:
 
     def start(self) -> None:
         """Start the threads; they work while the gate is set."""
-        for each in self._threads:
-            each.start()
+        for thread in self._threads:
+            thread.start()
 
     def stop(self, deadline_s: float) -> None:
         """Close the queue and wait at most `deadline_s` for work in progress."""
         self._queue.close()
         ends = time.monotonic() + deadline_s
-        for each in self._threads:
-            if each.ident is not None:
-                each.join(max(0.0, ends - time.monotonic()))
+        for thread in self._threads:
+            if thread.ident is not None:
+                thread.join(max(0.0, ends - time.monotonic()))
 
     def trouble(self) -> str | None:
         """Return the problem of a thread that only a restart solves; None: there is none."""
         now = time.monotonic()
-        for each in self._threads:
-            if now - self._began.get(each.name, now) > STUCK_S:
-                return f"{each.name} is stuck"
+        for thread in self._threads:
+            if now - self._began.get(thread.name, now) > STUCK_S:
+                return f"{thread.name} is stuck"
         return None
 
     def _run(self) -> None:

@@ -51,7 +51,7 @@ class ReplicaPlan:
     def objects(self) -> tuple[Object, ...]:
         """Return them in the order of their creation: a Job's pods need the other two."""
         found = (self.config_map, self.claim, self.job)
-        return tuple(each for each in found if each is not None)
+        return tuple(part for part in found if part is not None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,7 +68,7 @@ class Plan:
     def objects(self) -> tuple[Object, ...]:
         """Return all of them in the order of their creation: no pod is there before its policy."""
         policy = () if self.network_policy is None else (self.network_policy,)
-        return (*policy, *(each for replica in self.replicas.values() for each in replica.objects))
+        return (*policy, *(obj for replica in self.replicas.values() for obj in replica.objects))
 
 
 def plan(

@@ -139,7 +139,7 @@ def _common(
     places = replica.places(container)
     env = {
         **_environment(replica, container, planned.threads(quantities)),
-        **{each.name: _variable(each) for each in own},
+        **{variable.name: _variable(variable) for variable in own},
     }
     return {
         "env": [{"name": name, **value} for name, value in env.items()],

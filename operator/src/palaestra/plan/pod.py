@@ -69,21 +69,21 @@ def _scheduling(replica: Replica) -> dict[str, Any]:
     taken = ("priorityClassName", "nodeSelector", "tolerations", "affinity", "runtimeClassName")
     fields = {name: given[name] for name in taken if given.get(name)}
     if spec.image_pull_secrets:
-        fields["imagePullSecrets"] = [{"name": each.name} for each in spec.image_pull_secrets]
+        fields["imagePullSecrets"] = [{"name": secret.name} for secret in spec.image_pull_secrets]
     return fields
 
 
 def _sizes(replica: Replica) -> dict[str, str]:
     """Return the size of each simulator's shared memory by the name of its volume."""
     return {
-        shared_memory(each.container): twice(MEMORY_SIZE) if each.group.standby else MEMORY_SIZE
-        for each in replica.simulators
+        shared_memory(simulator.container): twice(MEMORY_SIZE) if simulator.group.standby else MEMORY_SIZE
+        for simulator in replica.simulators
     }
 
 
 def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
     """Return an empty volume for every mount that has no other: each container has its own."""
-    mounted = {mount["name"] for each in containers for mount in each["volumeMounts"]}
+    mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
     return [{"name": name, "emptyDir": _empty(name, memory)} for name in sorted(mounted - {"config", "run"})]
 
 

@@ -47,7 +47,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "stallDeadlineSeconds": spec.stall_deadline_seconds,
         "command": list(spec.trainer.command) or None,
         "statusAddress": status_address(replica),
-        "simulators": [_simulator(replica, each, files) for each in replica.simulators],
+        "simulators": [_simulator(replica, simulator, files) for simulator in replica.simulators],
     }
     return {field: value for field, value in training.items() if value is not None}
 

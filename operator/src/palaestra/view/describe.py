@@ -16,7 +16,7 @@ Row = tuple[str, str]
 
 def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
     """Return the lines about a job, without unknown values."""
-    lines = lines_of([(f"{name}:", told) for name, told in _facts(job, created, now) if told])
+    lines = lines_of([(f"{name}:", value) for name, value in _facts(job, created, now) if value])
     lines += ["", "Conditions:", *_indented(_conditions(job.status.conditions, now))]
     for replica in job.status.replicas:
         lines += ["", *_replica(replica, now)]
@@ -29,13 +29,14 @@ def happened(happenings: Sequence[Happening], now: datetime) -> list[str]:
         return ["none that the cluster still has"]
     rows = [
         (
-            short((now - each.time).total_seconds()) + (f" (x{each.count})" if each.count > 1 else ""),
-            "Warning" if each.warning else "Normal",
-            each.reason,
-            f"{each.about} ({each.container})" if each.container else each.about,
-            " ".join(each.message.split()),
+            short((now - happening.time).total_seconds())
+            + (f" (x{happening.count})" if happening.count > 1 else ""),
+            "Warning" if happening.warning else "Normal",
+            happening.reason,
+            f"{happening.about} ({happening.container})" if happening.container else happening.about,
+            " ".join(happening.message.split()),
         )
-        for each in happenings
+        for happening in happenings
     ]
     return lines_of([("AGE", "TYPE", "REASON", "ABOUT", "MESSAGE"), *rows])
 
@@ -51,7 +52,12 @@ def _facts(job: TrainingJob, created: datetime, now: datetime) -> Iterator[Row]:
     yield "Ended", ago(status.completion_time, now)
     yield "Algorithm", f"{trainer.algorithm.name}, {trainer.steps:,} steps, seed {job.spec.seed}"
     yield "Environment", trainer.environment.id
-    yield "Simulators", ", ".join(f"{each.name}: {each.count} x {each.role}" for each in job.spec.simulators)
+    yield (
+        "Simulators",
+        ", ".join(
+            f"{simulator.name}: {simulator.count} x {simulator.role}" for simulator in job.spec.simulators
+        ),
+    )
     yield "Queue", job.spec.scheduling.queue_name or ""
     if storage.ephemeral:
         yield "Storage", "in the pod, deleted with it"
@@ -65,13 +71,13 @@ def _facts(job: TrainingJob, created: datetime, now: datetime) -> Iterator[Row]:
 def _conditions(conditions: Iterable[Condition], now: datetime) -> list[str]:
     rows = [
         (
-            each.type,
-            each.status,
-            short((now - each.last_transition_time).total_seconds()),
-            each.reason,
-            each.message,
+            condition.type,
+            condition.status,
+            short((now - condition.last_transition_time).total_seconds()),
+            condition.reason,
+            condition.message,
         )
-        for each in conditions
+        for condition in conditions
     ]
     return lines_of([("TYPE", "STATUS", "SINCE", "REASON", "MESSAGE"), *rows]) if rows else ["none yet"]
 
@@ -79,7 +85,7 @@ def _conditions(conditions: Iterable[Condition], now: datetime) -> list[str]:
 def _replica(replica: ReplicaStatus, now: datetime) -> list[str]:
     heading = f"Replica {replica.index}: {replica.phase}"
     heading += f", attempt {replica.attempt}, pod {replica.pod.name}" if replica.pod else ""
-    lines = lines_of([(f"{name}:", told) for name, told in _progress(replica, now) if told] or [("", "")])
+    lines = lines_of([(f"{name}:", value) for name, value in _progress(replica, now) if value] or [("", "")])
     if replica.simulators:
         lines += ["Simulators:", *_indented(_simulators(replica))]
     if replica.last_attempt is not None:
@@ -88,7 +94,7 @@ def _replica(replica: ReplicaStatus, now: datetime) -> list[str]:
 
 
 def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
-    yield "Why", ": ".join(each for each in (replica.reason, replica.message) if each)
+    yield "Why", ": ".join(part for part in (replica.reason, replica.message) if part)
     yield "Step", progress(replica)
     if replica.success_rate is not None:
         yield "Success rate", _success(replica.success_rate, replica.success_interval)
@@ -103,7 +109,7 @@ def _progress(replica: ReplicaStatus, now: datetime) -> Iterator[Row]:
         slow = counts.pop("slow")
         yield "Faults", _counts(counts)
         yield "Slow steps", f"{slow:,} (not faults)" if slow else ""
-    yield "Memory kills", ", ".join(f"{each.container} {each.times}" for each in replica.memory_kills)
+    yield "Memory kills", ", ".join(f"{kill.container} {kill.times}" for kill in replica.memory_kills)
     yield "Steps lost", f"{replica.steps_lost:,}" if replica.steps_lost else ""
     yield "Time spent", _shares(replica.goodput) if replica.goodput else ""
 
@@ -112,14 +118,14 @@ def progress(replica: ReplicaStatus) -> str:
     """Return a replica's step, speed and remaining time; empty while the step is unknown."""
     if replica.step is None:
         return ""
-    told = f"{replica.step:,}"
+    text = f"{replica.step:,}"
     if replica.target:
-        told += f" of {replica.target:,} ({replica.step / replica.target:.0%})"
+        text += f" of {replica.target:,} ({replica.step / replica.target:.0%})"
     if replica.steps_per_second:
-        told += f", {replica.steps_per_second:.0f} a second"
+        text += f", {replica.steps_per_second:.0f} a second"
         if replica.target and replica.target > replica.step:
-            told += f", about {short((replica.target - replica.step) / replica.steps_per_second)} to go"
-    return told
+            text += f", about {short((replica.target - replica.step) / replica.steps_per_second)} to go"
+    return text
 
 
 def _success(rate: float, interval: SuccessInterval | None) -> str:
@@ -142,10 +148,19 @@ def _shares(goodput: Goodput) -> str:
 
 def _simulators(replica: ReplicaStatus) -> list[str]:
     rows = []
-    for each in replica.simulators:
-        state = "given up" if each.given_up else "flapping" if each.flapping else each.state
-        fault = each.last_fault or NOTHING
-        rows.append((each.name, Role(each.role), state, str(each.restarts), each.standby or NOTHING, fault))
+    for simulator in replica.simulators:
+        state = "given up" if simulator.given_up else "flapping" if simulator.flapping else simulator.state
+        fault = simulator.last_fault or NOTHING
+        rows.append(
+            (
+                simulator.name,
+                Role(simulator.role),
+                state,
+                str(simulator.restarts),
+                simulator.standby or NOTHING,
+                fault,
+            )
+        )
     return lines_of([("NAME", "ROLE", "STATE", "RESTARTS", "STANDBY", "LAST FAULT"), *rows])
 
 

@@ -14,8 +14,8 @@ def short(seconds: float) -> str:
         if left >= size or parts:
             parts.append((left // size, unit))
             left %= size
-    told = [f"{count}{unit}" for count, unit in parts[:2] if count]
-    return "".join(told) or "0s"
+    named = [f"{count}{unit}" for count, unit in parts[:2] if count]
+    return "".join(named) or "0s"
 
 
 def ago(moment: datetime | None, now: datetime) -> str:

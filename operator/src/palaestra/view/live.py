@@ -41,10 +41,10 @@ def live(job: TrainingJob, history: History, now: datetime) -> Group:
 def _replica(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> list[RenderableType]:
     heading = Text.assemble(f"replica {replica.index}  ", (replica.phase, _colour(replica.phase)))
     heading.append(f"  attempt {replica.attempt}" if replica.attempt else "")
-    told = ": ".join(each for each in (replica.reason, replica.message) if each)
+    why = ": ".join(part for part in (replica.reason, replica.message) if part)
     parts: list[RenderableType] = [heading]
-    if told:
-        parts.append(Text(told, style="dim"))
+    if why:
+        parts.append(Text(why, style="dim"))
     if replica.step is not None:
         parts += [_bar(replica.step, replica.target), Text(progress(replica))]
     return [*parts, _figures(replica, figures, now)]
@@ -60,17 +60,17 @@ def _bar(step: int, target: int | None) -> Table:
 
 def _figures(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> Table:
     grid = Table.grid(padding=(0, 2))
-    rates = sparkline([each.steps_per_second for each in figures], lowest=0.0)
-    success = sparkline([each.success_rate for each in figures], lowest=0.0, highest=1.0)
-    returns = sparkline([each.mean_return for each in figures])
+    rates = sparkline([figure.steps_per_second for figure in figures], lowest=0.0)
+    success = sparkline([figure.success_rate for figure in figures], lowest=0.0, highest=1.0)
+    returns = sparkline([figure.mean_return for figure in figures])
     rows = (
         ("success", _shown(replica.success_rate, "{:.0%}"), success),
         ("return", _shown(replica.mean_return, "{:.4g}"), returns),
         ("steps/s", _shown(replica.steps_per_second, "{:.0f}"), rates),
     )
-    for name, told, line in rows:
-        if told:
-            grid.add_row(name, told, Text(line, style="cyan"))
+    for name, value, line in rows:
+        if value:
+            grid.add_row(name, value, Text(line, style="cyan"))
     if replica.last_checkpoint:
         grid.add_row("checkpoint", ago(replica.last_checkpoint.time, now))
     if replica.simulators:
@@ -83,7 +83,7 @@ def _shown(value: float | None, form: str) -> str:
 
 
 def _simulators(replica: ReplicaStatus) -> str:
-    ready = sum(each.state == "ready" and not each.given_up for each in replica.simulators)
+    ready = sum(simulator.state == "ready" and not simulator.given_up for simulator in replica.simulators)
     return f"{ready}/{len(replica.simulators)}, {replica.restarts.simulator} restarts"
 
 

@@ -219,7 +219,7 @@ class TrainerStatus:
             "mean_return": known(self.mean_return),
             "success_rate": known(self.success_rate),
             "steps_per_second": known(self.steps_per_second),
-            "simulators": [each.to_json() for each in self.simulators[:MOST_SIMULATORS]],
+            "simulators": [simulator.to_json() for simulator in self.simulators[:MOST_SIMULATORS]],
             "last_checkpoint": None if checkpoint is None else checkpoint.to_json(),
             "last_progress": self.last_progress,
             "attempt": self.attempt,

@@ -78,7 +78,7 @@ def shut_down(simulators: Sequence[Simulator]) -> None:
 def run(simulators: Sequence[Simulator]) -> None:
     """Run all simulators, each in its own thread, until a shutdown has ended them."""
     first, *others = simulators
-    threads = [threading.Thread(target=each.run, name="simulator", daemon=True) for each in others]
+    threads = [threading.Thread(target=other.run, name="simulator", daemon=True) for other in others]
     for thread in threads:
         thread.start()
     first.run()

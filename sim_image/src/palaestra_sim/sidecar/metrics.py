@@ -38,11 +38,11 @@ class _Simulators(Collector):
         used = {slot: simulator.usage() for slot, simulator in them}
         states = {slot: simulator.state for slot, simulator in them}  # read once: it may change meanwhile
         return {
-            families.UP: {(slot,): it.pid is not None for slot, it in states.items()},
+            families.UP: {(slot,): state.pid is not None for slot, state in states.items()},
             families.STATES: {
                 (slot, state): it.state is state for slot, it in states.items() for state in SidecarState
             },
-            families.STARTS: {(slot,): it.starts for slot, it in states.items()},
+            families.STARTS: {(slot,): state.starts for slot, state in states.items()},
             families.EXITS: {
                 (slot, kind): times for slot, simulator in them for kind, times in simulator.faults.items()
             },

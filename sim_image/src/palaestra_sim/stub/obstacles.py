@@ -180,7 +180,7 @@ class Neighbourhood:
     def _look(self, key: int, column: int, row: int) -> tuple[Obstacle, ...]:
         x = (column + 0.5) * self.SIDE_M - 512.0
         y = (row + 0.5) * self.SIDE_M - 512.0
-        found = tuple(it for it in self._obstacles if it.gap(x, y) <= self._margin)
+        found = tuple(obstacle for obstacle in self._obstacles if obstacle.gap(x, y) <= self._margin)
         if len(self._squares) >= self.LIMIT:
             self._squares.clear()
         self._squares[key] = found

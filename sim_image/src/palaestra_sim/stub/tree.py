@@ -42,7 +42,7 @@ class SceneTree:
         self._fields: dict[tuple[int, str], Field] = {}
         self.nodes: list[SceneNode] = []
         self._reading = Reading(simulation.world, "world")
-        self._robots = {it.parts.node.span[0]: it for it in simulation.robots}
+        self._robots = {robot.parts.node.span[0]: robot for robot in simulation.robots}
         self.root = self._new_node(None, None)
         self.root.inside["children"] = [
             self._grow(node, self.root, jointed=False) for node in simulation.world.nodes
@@ -88,7 +88,9 @@ class SceneTree:
         for name in path.split("."):
             if found is None or not name:
                 return None
-            found = next((it for it in found.descendants() if it.def_name == name), None)
+            found = next(
+                (descendant for descendant in found.descendants() if descendant.def_name == name), None
+            )
         return found
 
     def of_number(self, number: int) -> SceneNode | None:
@@ -97,7 +99,7 @@ class SceneTree:
 
     def of_robot(self, robot: Robot) -> SceneNode:
         """Return the node of a robot."""
-        return next(it for it in self.nodes if it.robot is robot)
+        return next(node for node in self.nodes if node.robot is robot)
 
     def of_device(self, robot: Robot, name: str) -> SceneNode | None:
         """Return the node of a robot's device by its name in the world file."""

@@ -118,7 +118,9 @@ def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
 
 
 def _accepts(signature: inspect.Signature, name: str) -> bool:
-    anything = any(it.kind is inspect.Parameter.VAR_KEYWORD for it in signature.parameters.values())
+    anything = any(
+        parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in signature.parameters.values()
+    )
     return anything or name in _named(signature)
 
 

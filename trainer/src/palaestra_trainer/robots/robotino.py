@@ -94,7 +94,7 @@ class Robotino(RobotinoAbc):
         volts = [sensor.value for sensor in self._infrared]
         if None in volts:
             raise self._no_reading()
-        return np.array([metres(each) for each in volts], dtype=np.float32)
+        return np.array([metres(volt) for volt in volts], dtype=np.float32)
 
     def bumped(self) -> bool:
         """Return whether the bumper touches something."""

@@ -102,7 +102,9 @@ def run(
             )
         )
         return ExitCode.DONE
-    progress = Progress(configuration.steps, [(it.name, it.role) for it in configuration.simulators])
+    progress = Progress(
+        configuration.steps, [(simulator.name, simulator.role) for simulator in configuration.simulators]
+    )
     attempt = Attempt(configuration, directory, progress, around)
     end = attempt.play()
     for line in end.message.splitlines():

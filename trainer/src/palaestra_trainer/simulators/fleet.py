@@ -140,7 +140,10 @@ def rest(keepers: Sequence[Keeper]) -> None:
 def groups_of(configuration: Configuration) -> dict[str, Group]:
     """Return the groups of a configuration's simulators, by name."""
     sizes = Counter(simulator.group for simulator in configuration.simulators)
-    return {it.group: Group(sizes[it.group], it.min_simulators) for it in configuration.simulators}
+    return {
+        simulator.group: Group(sizes[simulator.group], simulator.min_simulators)
+        for simulator in configuration.simulators
+    }
 
 
 def care_of(simulator: SimulatorConfiguration) -> Care:

@@ -163,5 +163,8 @@ def _quantiles(values: Sequence[float]) -> Values:
 
 
 def _by_state(simulators: Sequence[SimulatorStatus]) -> Values:
-    counted = Counter((it.role, families.GIVEN_UP if it.given_up else it.state) for it in simulators)
+    counted = Counter(
+        (simulator.role, families.GIVEN_UP if simulator.given_up else simulator.state)
+        for simulator in simulators
+    )
     return {(role, state): counted[role, state] for role, state in families.SIMULATORS.combinations()}

@@ -69,8 +69,10 @@ class Course:
         """Return the fault that keeps the stub from starting, if any; else how long it has to wait."""
         number = self._schedule.life.number
         found = self._schedule.at(Event.START, number)
-        refused = next((it for it in found if isinstance(it, StartRefused)), None)
-        delays = (self._schedule.delay_s(it, number) for it in found if isinstance(it, SlowStart))
+        refused = next((finding for finding in found if isinstance(finding, StartRefused)), None)
+        delays = (
+            self._schedule.delay_s(finding, number) for finding in found if isinstance(finding, SlowStart)
+        )
         return refused, sum(delays)
 
     def request(self, robot: str, path: str) -> Ruling:
@@ -89,13 +91,13 @@ class Course:
     def message(self, path: str) -> Ruling:
         """Return what becomes of a message of the topic `path`; one with a leading slash is nobody's own."""
         number = self._counts[Event.STEP]
-        faults = [it for it in self._messages if _matches(path, it.topic)]
+        faults = [message for message in self._messages if _matches(path, message.topic)]
         if not faults:
             return UNHARMED
         return Ruling(
-            lost=any(isinstance(it, Lost) for it in faults),
-            delay_s=sum(self._schedule.delay_s(it, number) for it in faults if isinstance(it, Late)),
-            damages=tuple(it for it in faults if isinstance(it, Damage)),
+            lost=any(isinstance(fault, Lost) for fault in faults),
+            delay_s=sum(self._schedule.delay_s(fault, number) for fault in faults if isinstance(fault, Late)),
+            damages=tuple(fault for fault in faults if isinstance(fault, Damage)),
         )
 
     def closed(self, robot: str) -> None:

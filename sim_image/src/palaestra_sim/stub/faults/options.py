@@ -35,7 +35,7 @@ class Ordered:
 
     def __str__(self) -> str:
         life = f"life {self.life}" if self.counted else f"--fault-life {self.life}, drawn"
-        return f"{' '.join(it.text for it in self.faults)} (seed {self.seed}, {life})"
+        return f"{' '.join(fault.text for fault in self.faults)} (seed {self.seed}, {life})"
 
 
 def add_options(add: Callable[..., Any]) -> None:
@@ -70,7 +70,7 @@ def read_options(options: argparse.Namespace, environment: Mapping[str, str]) ->
 
 
 def _check(faults: tuple[Fault, ...], *, counted: bool) -> None:
-    texts = [it.text for it in faults]
+    texts = [fault.text for fault in faults]
     for fault in faults:
         if texts.count(fault.text) > 1:
             raise FaultError(f"fault {fault.text}: is there twice; leave one")

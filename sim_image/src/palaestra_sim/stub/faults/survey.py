@@ -62,8 +62,8 @@ def survey(world_path: Path) -> Survey:
         node.enable_all(simulator.simulation.basic_step_ms)
     return Survey(
         simulator=_HASH.sub("", nodes[0].name) if nodes else "",
-        services=frozenset().union(*(it.services for it in nodes)),
-        topics=frozenset().union(*(it.topics for it in nodes)),
+        services=frozenset().union(*(node.services for node in nodes)),
+        topics=frozenset().union(*(node.topics for node in nodes)),
     )
 
 
