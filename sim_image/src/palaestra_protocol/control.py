@@ -1,15 +1,15 @@
-"""What a trainer asks of a sidecar, and what the sidecar tells of its simulator.
+"""The requests of a trainer to a sidecar, and the sidecar's answers about its simulator.
 
     POST /start   {}                    begin to start it; answered at once
     POST /ready   {}                    it has answered a real round trip
     POST /stop    {"deadline_s": 5.0}   it will end; it is killed after that many seconds
     GET  /state
 
-A sidecar that has a standby takes the same for its second simulator at /standby/start, /standby/ready,
-/standby/stop and /standby/state. Which of the two is played in is the trainer's affair.
+A sidecar with a standby has the same requests for its second simulator at /standby/start, /standby/ready,
+/standby/stop and /standby/state. The trainer decides which of the two it uses.
 
-Each is answered with a `SimulatorState`: 200, or 409 when the state does not allow the request. A
-body that is wrong is answered with 400 and {"error": "<field>: <fact>"}.
+The answer is a `SimulatorState` with status 200, or 409 if the state does not allow the request. For a wrong
+body it is 400 with {"error": "<field>: <fact>"}.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = [
     "decoded",
 ]
 
-STANDBY = "/standby"  # what stands before a path that is about the second simulator
+STANDBY = "/standby"  # prefix of the paths for the second simulator
 MOST_DEADLINE_S = 3600.0
 MOST_PATH = 4096
 MOST_ROBOTS = 32
@@ -44,7 +44,7 @@ MOST_PID = 2**22  # Source: PID_MAX_LIMIT of Linux
 
 
 class SidecarState(StrEnum):
-    """Where a simulator stands."""
+    """The states of a simulator."""
 
     IDLE = "idle"
     STARTING = "starting"
@@ -55,7 +55,7 @@ class SidecarState(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotName:
-    """How a robot of the world is called.
+    """The names of a robot in the world.
 
     `robot` is its Robot.name, `ros_name` the name of its ROS node, `supervisor` whether it may change
     the scene.
@@ -92,8 +92,8 @@ class RobotName:
 class LastExit:
     """How the simulator last ended: with a code, or by a signal such as "SIGBUS".
 
-    Neither: it could not be started, or nobody saw its end. `expected` is true if the end was asked
-    for; otherwise it was a fault.
+    If neither is set, it could not be started, or its end was not seen. `expected` is true if the end was
+    announced; otherwise it was a fault.
     """
 
     code: int | None
@@ -121,19 +121,19 @@ class LastExit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorState:
-    """What a sidecar tells of its simulator.
+    """A sidecar's report on its simulator.
 
     Attributes:
-        state: where the simulator stands.
+        state: of the simulator.
         driver: stub, webots or command.
-        world: the path of the world it runs.
+        world: the path of its world.
         robots: the robots of that world that speak ROS.
         pid: of the simulator's first process; None while none runs.
-        starts: how often it was started, in this life of the sidecar.
-        faults: how often it ended without having been asked to.
-        last_exit: how it last ended; None: never yet.
-        detail: why it is in this state, in a sentence for people; "": there is nothing to say.
-        rss_bytes: the memory that its processes use, told by GET while it is ready; None: not told.
+        starts: how often it was started since the sidecar started.
+        faults: how often it ended without an announcement.
+        last_exit: how it last ended; None: it has not ended yet.
+        detail: why it is in this state, in a sentence for people; "": no comment.
+        rss_bytes: the memory of its processes, in the answer to GET while it is ready; None: not included.
     """
 
     state: SidecarState
@@ -148,7 +148,7 @@ class SimulatorState:
     rss_bytes: int | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, texts cut to what a reader takes."""
+        """Return it as JSON data, with texts cut to the lengths that a reader accepts."""
         return {
             "state": self.state.value,
             "driver": clipped(self.driver, MOST_NAME),
@@ -208,7 +208,7 @@ class StopRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlainRequest:
-    """A request that says nothing but its name: start, ready."""
+    """A request without parameters: start, ready."""
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:

@@ -1,11 +1,11 @@
-"""Read JSON that comes from a process one does not trust.
+"""Read JSON from an untrusted process.
 
-A pod runs programs that its author chose, so what it answers may be anything: of the wrong type,
-endless, or text that no other program takes. Every value is read by one method that knows its type
-and its bounds, and everything else is a `ProtocolError`. Fields that nobody asked for are ignored in
-answers, so that a newer release may add some, and refused in requests, where they are mistakes.
+A pod runs programs that its author chose, so its answer may be of a wrong type, endless, or not encodable.
+Each value is read by a method that checks its type and its bounds; any other value is a `ProtocolError`.
+Unknown fields are ignored in answers, because a newer release may add some. In requests they are refused,
+because there they are mistakes.
 
-What is written stays within the same bounds: `clipped` and `known` make it so.
+Writers keep the same bounds with `clipped` and `known`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from typing import TypeVar, cast
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
-MOST_BYTES = 2**19  # of one answer; every field at its longest, in the longest escapes, fits
+MOST_BYTES = 2**19  # of one answer; enough for all fields at maximum length, with the longest escapes
 MOST_COUNT = 2**53  # integers that every JSON reader keeps exactly
 MOST_NAME = 255
 MOST_TEXT = 500
@@ -32,14 +32,14 @@ _TYPES = {dict: "an object", list: "a list", str: "text", bool: "true or false",
 
 
 class ProtocolError(ValueError):
-    """What was received is not what was agreed; the message names the field and the fact."""
+    """A message does not follow the protocol; the text names the field and the fact."""
 
 
 def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
     """Return the JSON value of `data`.
 
     Raises:
-        ProtocolError: it is longer than `most_bytes`, or no JSON.
+        ProtocolError: it is longer than `most_bytes`, or is not JSON.
     """
     if len(data) > most_bytes:
         raise ProtocolError(f"body: {len(data)} bytes are more than {most_bytes}")
@@ -50,23 +50,23 @@ def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
 
 
 def clipped(text: str, most: int = MOST_TEXT) -> str:
-    """Return `text`, at most `most` characters of it, as any reader of UTF-8 takes it."""
+    """Return the first `most` characters of `text`, with characters that UTF-8 cannot encode replaced."""
     return text[:most].encode("utf-8", "replace").decode()
 
 
 def known(value: float | None) -> float | None:
-    """Return `value`, or None for what JSON cannot say: infinities and not-a-number."""
+    """Return `value`; None for infinities and not-a-number, which JSON does not have."""
     return value if value is not None and math.isfinite(value) else None
 
 
 class Fields:
-    """The fields of one JSON object, each read as what it has to be.
+    """The fields of one JSON object, each read by its type.
 
-    Every method raises ProtocolError when the field is missing or anything else.
+    Every method raises ProtocolError if the field is missing or has another type or value.
 
     Args:
-        content: what `json.loads` gave.
-        path: where the object stands, "" at the top, as "simulators[1]".
+        content: the result of `json.loads`.
+        path: of the object, such as "simulators[1]"; "" at the top.
     """
 
     def __init__(self, content: object, path: str = "") -> None:
@@ -82,7 +82,7 @@ class Fields:
                 raise self._error(clipped(name, MOST_NAME), "is not a field of this request")
 
     def has(self, name: str) -> bool:
-        """Return whether the field is there and not null."""
+        """Return whether the field is present and not null."""
         return self._content.get(name) is not None
 
     def text(self, name: str, most: int = MOST_TEXT, least: int = 0) -> str:
@@ -134,18 +134,18 @@ class Fields:
         return value
 
     def time(self, name: str) -> str:
-        """Return a time as RFC 3339 writes it."""
+        """Return a time in RFC 3339."""
         text = self.text(name, MOST_NAME)
         if not _RFC3339.fullmatch(text) or not _exists(text):
             raise self._error(name, "is no time such as 2025-01-31T12:00:00Z")
         return text
 
     def part(self, name: str, read: Callable[[object, str], T]) -> T:
-        """Return an object within this one, as `read` reads it."""
+        """Return an object within this one, read by `read`."""
         return read(self._value(name), self._at(name))
 
     def parts(self, name: str, read: Callable[[object, str], T], most: int) -> tuple[T, ...]:
-        """Return a list of at most `most` entries, as `read` reads each."""
+        """Return a list of at most `most` entries, each read by `read`."""
         value = self._value(name)
         if not isinstance(value, list):
             raise self._error(name, f"{_kind(value)} is no list")
@@ -167,7 +167,7 @@ class Fields:
 
 
 def _text(value: object, path: str, most: int, least: int = 0) -> str:
-    """Return `value`, which stands at `path`, if it is text of `least` to `most` characters."""
+    """Return the `value` at `path` if it is text of `least` to `most` characters."""
     if not isinstance(value, str):
         raise ProtocolError(f"{path}: {_kind(value)} is no text")
     if not least <= len(value) <= most:
@@ -178,7 +178,7 @@ def _text(value: object, path: str, most: int, least: int = 0) -> str:
 
 
 def _kind(value: object) -> str:
-    """Return what a JSON value is, in words; never the value: it may be endless."""
+    """Return the type of a JSON value in words, without the value, which may be endless."""
     return _TYPES.get(type(value), "a number")
 
 

@@ -1,10 +1,10 @@
 """The HTTP server of operator, trainer and sidecar: a table of routes, and a bound for everything.
 
-A connection is one request. It has a deadline, a number of bytes, and a place among a bounded number of
-others; a connection beyond that number is closed at once. A slow or endless request is closed unanswered.
-Errors are JSON, {"error": "<field>: <fact>"}: 404 for a path that is not served, 405 for a method that its
-path does not take, 411 for a POST without Content-Length, 413 for a body that is too long. No request is
-logged: probes and scrapes come every few seconds.
+Each connection has one request, with a deadline and a largest size; a slow or endless request is closed
+without an answer. The number of connections is limited, and one beyond it is closed at once. Errors are
+JSON, {"error": "<field>: <fact>"}. 404 is for an unknown path and 405 for a wrong method, 411 for a POST
+without Content-Length and 413 for a body that is too long. No request is logged, because probes and scrapes
+come every few seconds.
 """
 
 import io
@@ -98,7 +98,7 @@ class Server(socketserver.ThreadingTCPServer):
 
     Args:
         address: where to listen.
-        routes: what is served.
+        routes: its paths.
         name: of the program, for the header `Server` and the thread.
         deadline_s: for reading a request, and again for writing the answer.
 

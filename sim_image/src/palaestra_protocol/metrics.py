@@ -1,11 +1,11 @@
-"""What a family of metrics is, as data.
+"""Families of metrics, as data.
 
-Each program declares its families in one table; its /metrics and docs/metrics.md are made from that. So
-the page cannot differ from what is served, and how many series a program has can be computed.
+Each program declares its families in one table, from which its /metrics and docs/metrics.md are generated. So
+the page always equals the served metrics, and the number of a program's series can be computed.
 
-What happens thousands of times a second is counted in plain Python (`Tally`) and read when somebody asks:
-that takes a tenth of a microsecond, where `prometheus_client`'s histograms need half of one, and more than
-one to find a label's.
+Frequent events, thousands a second, are counted in plain Python (`Tally`) and read at a scrape. That takes a
+tenth of a microsecond. A histogram of `prometheus_client` takes half a microsecond, and more than one to find
+a label's child.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label:
-    """A label, and what bounds it.
+    """A label, and the limit of its values.
 
     Attributes:
         name: as in PromQL.
-        values: all that it may have; none: they depend on job or cluster.
-        bound: what there is one value for, in words, where that is not each of `values`.
+        values: all possible ones; empty: they depend on job or cluster.
+        bound: the thing that has one value each, in words, if `values` is empty.
     """
 
     name: str
@@ -50,10 +50,10 @@ class Family:
     """The metrics of one name.
 
     Attributes:
-        name: as served, with its unit.
+        name: as exported, with its unit.
         meaning: the help text.
-        labels: none: there is one value.
-        buckets: upper bounds of a histogram, ascending; that of the last bucket, infinity, is left out.
+        labels: empty: there is one value.
+        buckets: upper bounds of a histogram, ascending, without the last one, infinity.
     """
 
     name: str
@@ -64,25 +64,25 @@ class Family:
 
     @property
     def label_names(self) -> tuple[str, ...]:
-        """Names of the labels, in order."""
+        """Return the names of the labels, in order."""
         return tuple(label.name for label in self.labels)
 
     def combinations(self) -> Iterator[tuple[str, ...]]:
-        """Yield every combination of label values; none where some are not known beforehand."""
+        """Yield every combination of label values; none if a label's values are not known beforehand."""
         yield from product(*(label.values for label in self.labels))
 
     def series(self, sizes: Mapping[str, int]) -> int:
-        """Return how many series the family has at most, with `sizes` for the bounds of its labels."""
+        """Return the maximum number of series, with `sizes` for the bounds of the labels."""
         values = prod(sizes[label.bound] if label.bound else len(label.values) for label in self.labels)
         samples = sum(1 for _ in self.tally().samples()) if self.kind is Kind.HISTOGRAM else 1
         return values * samples
 
     def tally(self) -> Tally:
-        """Return a tally with the histogram's buckets, of nothing yet."""
+        """Return an empty tally with the histogram's buckets."""
         return Tally(self.buckets)
 
     def metric(self, values: Values) -> Metric:
-        """Return the family with these values; one that is missing is not known."""
+        """Return the family with these values; unknown values are left out."""
         made = Metric(self.name.removesuffix("_total"), self.meaning, self.kind)
         for given, value in values.items():
             labels = dict(zip(self.label_names, given, strict=True))
@@ -103,12 +103,12 @@ def gauge(name: str, meaning: str, *labels: Label) -> Family:
 
 
 def histogram(name: str, meaning: str, buckets: tuple[float, ...], *labels: Label) -> Family:
-    """Return a family that tells how many values were how large."""
+    """Return a family that counts values by size."""
     return Family(name=name, kind=Kind.HISTOGRAM, meaning=meaning, labels=labels, buckets=buckets)
 
 
 class Tally:
-    """How many of the observed values fell into each bucket; written by one thread, read by any.
+    """The count of observed values in each bucket; written by one thread, read by any.
 
     Attributes:
         total: sum of the values.
@@ -127,11 +127,11 @@ class Tally:
         self.total += value
 
     def samples(self) -> Iterator[tuple[str, dict[str, str], float]]:
-        """Yield what a histogram is told as: the end of its name, a label more, and the value."""
+        """Yield the samples of a histogram: the suffix of the name, an additional label, and the value."""
         counts = list(accumulate(self._counts))
         for bound, count in zip((*self._bounds, "+Inf"), counts, strict=True):
             yield "_bucket", {"le": str(bound)}, count
-        if self._bounds[0] >= 0:  # a sum that may fall is none. Source: OpenMetrics 1.0, "Histogram"
+        if self._bounds[0] >= 0:  # else the sum may fall. Source: OpenMetrics 1.0, "Histogram"
             yield "_count", {}, counts[-1]
             yield "_sum", {}, self.total
 

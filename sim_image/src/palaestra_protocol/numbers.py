@@ -1,4 +1,4 @@
-"""Numbers that people type behind options of a program: what each may be is refused there, not later."""
+"""Parsers for the numbers of command-line options; they refuse invalid numbers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MOST_PORT = 65535
 
 
 def whole(least: int = 0, most: int | None = None) -> Callable[[str], int]:
-    """Return what reads a whole number from `least` to `most`, for argparse's `type`."""
+    """Return a parser of whole numbers from `least` to `most`, for argparse's `type`."""
 
     def read(text: str) -> int:
         try:
@@ -26,7 +26,7 @@ def whole(least: int = 0, most: int | None = None) -> Callable[[str], int]:
 
 
 def seconds(text: str) -> float:
-    """Return a time that somebody can wait, for argparse's `type`: finite, and more than nothing."""
+    """Return a time in seconds, for argparse's `type`: finite and above 0."""
     number = _finite(text)
     if number <= 0.0:
         raise ArgumentTypeError(f"{text} is refused; give more than 0")
@@ -34,7 +34,7 @@ def seconds(text: str) -> float:
 
 
 def milliseconds(text: str) -> float:
-    """Return a delay, for argparse's `type`: finite, and 0 for none."""
+    """Return a delay, for argparse's `type`: finite; 0 for no delay."""
     number = _finite(text)
     if number < 0.0:
         raise ArgumentTypeError(f"{text} is refused; give 0 or more")

@@ -18,18 +18,18 @@ from collections.abc import Iterable
 
 
 class SimError(Exception):
-    """Whatever this package raises on purpose."""
+    """The base class of this package's errors."""
 
 
 class WorldError(SimError, ValueError):
-    """A world file is wrong, so retrying cannot help; the person who wrote it can.
+    """A world file is wrong; its author has to correct it, and retrying cannot help.
 
     Attributes:
-        world: the name that the file is known by.
+        world: the name of the file in messages.
         line: of the place, counted from 1.
         column: of the place, in characters, counted from 1.
-        fact: what is there.
-        remedy: what to write instead.
+        fact: the mistake at this place.
+        remedy: the text to write instead.
     """
 
     def __init__(self, world: str, line: int, column: int, fact: str, remedy: str) -> None:
@@ -45,7 +45,7 @@ class WorldError(SimError, ValueError):
 
 
 class WorldRefusedError(WorldError):
-    """Several things of a world are wrong; the message has one line for each kind, with all its places.
+    """A world has several mistakes; the message has one line for each kind, with all its places.
 
     Attributes:
         errors: one for each place, in the order of the file. The other attributes are those of the first.
@@ -54,12 +54,12 @@ class WorldRefusedError(WorldError):
     def __init__(self, errors: tuple[WorldError, ...]) -> None:
         first = errors[0]
         super().__init__(first.world, first.line, first.column, first.fact, first.remedy)
-        self.args = (errors,)  # what a copy is made from
+        self.args = (errors,)  # the arguments of a copy
         self.errors = errors
 
     @property
     def summary(self) -> str:
-        """One line for where only one is shown."""
+        """Return one line, for output that shows only one."""
         return f"{self.world}: {len(self.errors)} places are refused, the first is {self.errors[0]}"
 
     def __str__(self) -> str:
@@ -70,8 +70,8 @@ class WorldRefusedError(WorldError):
 
 
 def refusal(errors: Iterable[WorldError]) -> WorldError | None:
-    """Return one error that stands for all of a world; None if there are none."""
-    by_text = {str(error): error for error in errors}  # a node that is used twice is refused once
+    """Return one error for all errors of a world; None if there are none."""
+    by_text = {str(error): error for error in errors}  # an error in a node that is used twice counts once
     found = sorted(by_text.values(), key=lambda error: (error.line, error.column))
     if len(found) > 1:
         return WorldRefusedError(tuple(found))
@@ -79,7 +79,7 @@ def refusal(errors: Iterable[WorldError]) -> WorldError | None:
 
 
 def _in_one_line(errors: list[WorldError]) -> str:
-    """Return one line for errors that differ in their places only."""
+    """Return one line for errors that differ only in their places."""
     first = errors[0]
     if len(errors) == 1:
         return str(first)

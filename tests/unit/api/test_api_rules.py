@@ -223,7 +223,7 @@ BROKEN = {
     ),
 }
 
-# Their neighbours that are right: the same fields, in accord.
+# Their neighbors that are right: the same fields, in accord.
 KEPT = {
     "no evaluation at all": {
         "simulators": [{"name": "collect", "role": "Collect"}],

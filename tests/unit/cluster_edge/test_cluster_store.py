@@ -95,6 +95,6 @@ def test_an_object_whose_job_label_changes_is_returned_as_it_was_before():
     store = Store()
     store.put(make_object(job="x"))
 
-    assert store.relabelled(make_object(job="x", role="y")) is None
-    assert store.relabelled(make_object("b", job="y")) is None
-    assert store.relabelled(make_object(job="y")) == make_object(job="x")
+    assert store.relabeled(make_object(job="x", role="y")) is None
+    assert store.relabeled(make_object("b", job="y")) is None
+    assert store.relabeled(make_object(job="y")) == make_object(job="x")

@@ -163,7 +163,7 @@ def test_a_completion_time_is_the_operators_own(training, last_word, server_s):
 
 
 def kill(scene, pod, run):
-    """Let the kernel kill the trainer's neighbour in a run of its container; it runs again."""
+    """Let the kernel kill the trainer's neighbor in a run of its container; it runs again."""
     scene.container(pod, "sim-collect-0", running=True, restarts=run + 1)
     ended = {"exitCode": 137, "reason": "OOMKilled", "finishedAt": scene.node_stamp()}
     for each in pod["status"]["initContainerStatuses"]:

@@ -104,7 +104,7 @@ def test_a_container_that_starts_again_finds_its_own_links(source, tmp_path) -> 
 
 
 def test_the_world_of_a_standby_lies_beside_the_first_ones(source, tmp_path) -> None:
-    """Both find the same neighbours, and neither overwrites the other."""
+    """Both find the same neighbors, and neither overwrites the other."""
     world = source(NEIGHBOURS)
     (world.parent / "textures").mkdir()
 

@@ -73,7 +73,7 @@ def test_values_of_the_world_file_and_defaults_are_read(robot, field):
     assert xyz(get("supervisor/field/get_vec3f", field=field("TARGET", "translation"), index=7))[0] == 1.5
 
 
-def test_colours_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
+def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
     """The services' types, not the fields'."""
     start(
         world(

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.obstacles import Block, Disc, Neighbourhood
+from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 
 places = st.floats(-3, 3)
 nearby = st.floats(-1.5, 1.5)  # from the middle of an obstacle, so that most touch it
@@ -149,18 +149,18 @@ def test_a_robot_whose_middle_is_in_a_block_leaves_by_the_nearest_face(x, y, nor
     y=st.floats(-600, 600),
     reach=st.floats(0, 2),
 )
-def test_a_neighbourhood_forgets_nothing_in_reach(obstacles, x, y, reach):
+def test_a_neighborhood_forgets_nothing_in_reach(obstacles, x, y, reach):
     """It may tell too many, never too few."""
-    near = Neighbourhood(obstacles, reach).near(x, y)
+    near = Neighborhood(obstacles, reach).near(x, y)
 
     assert [it for it in obstacles if it.gap(x, y) <= reach and it not in near] == []
 
 
-def test_a_neighbourhood_is_bounded():
+def test_a_neighborhood_is_bounded():
     """A robot that drives away for ever must not fill the memory."""
-    neighbourhood = Neighbourhood([Disc(0.0, 0.0, 1.0)], 0.5)
+    neighborhood = Neighborhood([Disc(0.0, 0.0, 1.0)], 0.5)
 
-    for i in range(2 * Neighbourhood.LIMIT):
-        neighbourhood.near(i * 0.2, 0.0)
+    for i in range(2 * Neighborhood.LIMIT):
+        neighborhood.near(i * 0.2, 0.0)
 
-    assert len(neighbourhood._squares) <= Neighbourhood.LIMIT
+    assert len(neighborhood._squares) <= Neighborhood.LIMIT

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from palaestra_sim.stub.motors import Motor, MotorSpec
-from palaestra_sim.stub.obstacles import Block, Disc, Neighbourhood
+from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 from palaestra_sim.stub.physics import WHEELS, Body, twist, wheel_speeds
 
 STEP_S = 0.032
@@ -24,7 +24,7 @@ def build():
         for wheel in wheels:
             wheel.set_position(math.inf)
         body = Body(RADIUS, wheels)
-        body.face(Neighbourhood(obstacles, RADIUS), others)
+        body.face(Neighborhood(obstacles, RADIUS), others)
 
         def go(vx, vy, omega, steps):
             for wheel, speed in zip(wheels, wheel_speeds(vx, vy, omega), strict=True):
@@ -301,7 +301,7 @@ def test_a_robot_never_ends_inside_anything(commands):
     obstacles = [*walls, Disc(0.6, 0.6, 0.1)]
     wheels = [Motor(MotorSpec(name=name, max_velocity_rad_s=137.46)) for name in WHEELS]
     body = Body(RADIUS, wheels)
-    body.face(Neighbourhood(obstacles, RADIUS), ())
+    body.face(Neighborhood(obstacles, RADIUS), ())
     for wheel in wheels:
         wheel.set_position(math.inf)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.obstacles import Disc, Neighbourhood
+from palaestra_sim.stub.obstacles import Disc, Neighborhood
 from palaestra_sim.stub.rays import Fan, LookupTable
 
 ROWS = [(0.1, 3.0, 0.0), (0.2, 2.0, 0.0), (0.4, 1.0, 0.0)]
@@ -87,7 +87,7 @@ def test_noise_has_the_spread_that_the_table_says():
 def fan_of(obstacles):
     """Two rays on the rim of a robot: ahead and to the left."""
     fan = Fan([(0.2, 0.0, 1.0, 0.0), (0.0, 0.2, 0.0, 1.0)], [0.4, 0.4])
-    fan.face(Neighbourhood(obstacles, fan.reach_m), ())
+    fan.face(Neighborhood(obstacles, fan.reach_m), ())
     return fan
 
 
@@ -114,7 +114,7 @@ def test_rays_meet_robots_that_drive():
     """Where these are now, not where they were when the scene was read."""
     other = Disc(5.0, 0.0, 0.2)
     fan = Fan([(0.2, 0.0, 1.0, 0.0)], [0.4])
-    fan.face(Neighbourhood((), fan.reach_m), [other])
+    fan.face(Neighborhood((), fan.reach_m), [other])
     assert fan.cast((0.0, 0.0, 1.0, 0.0)) == [0.4]
 
     other.x = 0.7

@@ -164,7 +164,7 @@ class Reflector:
     def _put(self, obj: Object) -> None:
         try:
             kept = self._keep(obj)
-            before = self.store.relabelled(kept)
+            before = self.store.relabeled(kept)
             different = self.store.put(kept)
             if before is not None:  # the job that owned it by its old label has lost it
                 self._changed(before)

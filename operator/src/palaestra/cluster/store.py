@@ -33,7 +33,7 @@ class Store:
         self._index = index
         self._lock = threading.Lock()
         self._kept: dict[str, dict[str, Kept]] = defaultdict(dict)
-        self._labelled: dict[Key, set[str]] = defaultdict(set)
+        self._labeled: dict[Key, set[str]] = defaultdict(set)
 
     def __len__(self) -> int:
         with self._lock:
@@ -84,10 +84,10 @@ class Store:
             self._forget(namespace, name)
             self._kept[namespace][name] = kept
             if self._index in kept.labels:
-                self._labelled[namespace, kept.labels[self._index]].add(name)
+                self._labeled[namespace, kept.labels[self._index]].add(name)
             return True
 
-    def relabelled(self, obj: Object) -> Object | None:
+    def relabeled(self, obj: Object) -> Object | None:
         """Return a copy of the stored object of this name, if its label `palaestra.dev/job` is another."""
         namespace, name = key_of(obj)
         label = (obj["metadata"].get("labels") or {}).get(self._index)
@@ -105,7 +105,7 @@ class Store:
         kept = self._kept.get(namespace, {})
         if self._index not in labels:
             return kept.items()
-        names = self._labelled.get((namespace, labels[self._index]), set())
+        names = self._labeled.get((namespace, labels[self._index]), set())
         return [(name, kept[name]) for name in names]
 
     def _forget(self, namespace: str, name: str) -> Kept | None:
@@ -113,9 +113,9 @@ class Store:
         kept = inside.pop(name, None)
         if kept and self._index in kept.labels:
             key = (namespace, kept.labels[self._index])
-            self._labelled[key].discard(name)
-            if not self._labelled[key]:
-                del self._labelled[key]
+            self._labeled[key].discard(name)
+            if not self._labeled[key]:
+                del self._labeled[key]
         if not inside:
             self._kept.pop(namespace, None)
         return kept

@@ -29,7 +29,7 @@ def live(job: TrainingJob, history: History, now: datetime) -> Group:
     """Return the drawing of a job; figures are as old as its status, ages are relative to `now`."""
     status = job.status
     phase = str(status.phase or "not reconciled by an operator yet")
-    heading = Text.assemble((job.metadata.name, "bold"), "  ", (phase, _colour(status.phase)))
+    heading = Text.assemble((job.metadata.name, "bold"), "  ", (phase, _color(status.phase)))
     heading.append(f"  {status.running} replicas" if status.running else "")
     heading.append(f"  started {ago(status.start_time, now)}" if status.start_time else "")
     parts: list[RenderableType] = [heading, Text(why(status), style="dim")]
@@ -39,7 +39,7 @@ def live(job: TrainingJob, history: History, now: datetime) -> Group:
 
 
 def _replica(replica: ReplicaStatus, figures: tuple[Figures, ...], now: datetime) -> list[RenderableType]:
-    heading = Text.assemble(f"replica {replica.index}  ", (replica.phase, _colour(replica.phase)))
+    heading = Text.assemble(f"replica {replica.index}  ", (replica.phase, _color(replica.phase)))
     heading.append(f"  attempt {replica.attempt}" if replica.attempt else "")
     why = ": ".join(part for part in (replica.reason, replica.message) if part)
     parts: list[RenderableType] = [heading]
@@ -87,5 +87,5 @@ def _simulators(replica: ReplicaStatus) -> str:
     return f"{ready}/{len(replica.simulators)}, {replica.restarts.simulator} restarts"
 
 
-def _colour(phase: Phase | None) -> str:
+def _color(phase: Phase | None) -> str:
     return COLOURS[phase] if phase else "dim"

@@ -1,7 +1,7 @@
-"""What a trainer tells of its run: `/status` while it runs, its last word, and its exit code.
+"""A trainer's reports: `/status` while it runs, and its last word, which is the termination message.
 
-The operator reads all three out of a pod that it does not trust, so reading is strict and bounded;
-writing stays within the bounds, so that a trainer's long error message never hides its status.
+The operator reads both from a pod that it does not trust, so readers are strict and bounded. Writers keep the
+bounds, so that a long error message of a trainer never hides its status.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ __all__ = [
 T = TypeVar("T")
 
 MOST_SIMULATORS = 32
-MOST_FAULTS = 10  # the last ones, in a last word
-MOST_LINES = 10  # the last ones of the trainer's log, in a last word
+MOST_FAULTS = 10  # the newest ones, in a last word
+MOST_LINES = 10  # the last lines of the trainer's log, in a last word
 MOST_LINE = 200  # characters of such a line, and of the fact of such a fault
 MOST_REASON = 2000
 MOST_TERMINATION_BYTES = 4096  # Source: Kubernetes cuts a container's termination message there
@@ -76,7 +76,7 @@ class CheckpointStatus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SuccessInterval:
-    """Where the true success rate of a policy lies, by the episodes that were played: a 95 % interval.
+    """The 95 % confidence interval of a policy's success rate, from the episodes that were played.
 
     Attributes:
         low: its lower bound, 0 to 1.
@@ -109,16 +109,16 @@ class SuccessInterval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorStatus:
-    """One simulator, as its trainer sees it.
+    """One simulator, from its trainer's view.
 
     Attributes:
-        name: group and number, as collect-0.
+        name: group and number, such as collect-0.
         role: Collect or Evaluate.
         state: one of the states of a sidecar.
         restarts: after faults, in this attempt; recycling is not counted.
         last_fault: in a sentence; None: no fault in this attempt.
-        flapping: whether it breaks again and again, and not once.
-        given_up: whether its budget of restarts is spent, and the run goes on without it.
+        flapping: whether it fails again and again.
+        given_up: whether its budget of restarts is spent, so that the run continues without it.
         standby: starting or ready, the state of its spare; None: it has none.
     """
 
@@ -166,7 +166,7 @@ class SimulatorStatus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainerStatus:
-    """Where a run stands.
+    """The progress and state of a run.
 
     Attributes:
         step: valid environment steps learned from, over all attempts.
@@ -177,18 +177,18 @@ class TrainerStatus:
             reports no success.
         success_interval: around `success_rate`; None: as there, or a trainer of an older release. Absent,
             not null.
-        steps_per_second: lately; None: not known.
+        steps_per_second: recently; None: unknown.
         simulators: each of them.
         last_checkpoint: the newest; None: none yet.
         last_progress: when an environment last stepped (RFC 3339); None: never yet.
-        last_progress_age_s: seconds since then by the trainer's monotonic clock, which no change of the
-            time of day moves; None: never yet, or a trainer of an older release. Absent, not null.
+        last_progress_age_s: seconds since then by the trainer's monotonic clock, which does not depend on
+            the wall clock; None: never yet, or a trainer of an older release. Absent, not null.
         phase: what the trainer does now, in one word.
         attempt: number of this attempt by the run directory's record, from 1; None: not recorded yet.
         faults: how many of each `FaultKind`, over all attempts.
         goodput: seconds spent on each `Cause`, over all attempts.
-        steps_lost: valid steps that were played in vain, over all attempts: after the checkpoint that a
-            resumed attempt went on from, or in an episode of training or evaluation that a fault cut.
+        steps_lost: valid steps that were lost, over all attempts: after the checkpoint from which an attempt
+            resumed, or in an episode of training or evaluation that a fault cut short.
     """
 
     step: int
@@ -209,7 +209,7 @@ class TrainerStatus:
     steps_lost: int = 0
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data; a number that is not finite is not known."""
+        """Return it as JSON data; a number that is not finite counts as unknown."""
         checkpoint, age_s = self.last_checkpoint, known(self.last_progress_age_s)
         content = {
             "step": self.step,
@@ -263,11 +263,11 @@ class TrainerStatus:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultRecord:
-    """One fault of one simulator, as a last word tells it.
+    """One fault of one simulator, in a last word.
 
     Attributes:
         time: when it was noticed (RFC 3339).
-        simulator: group and number, as collect-0.
+        simulator: group and number, such as collect-0.
         kind: one of `FaultKind`.
         fact: what happened, in a sentence.
         step: how many valid environment steps the run had then.
@@ -308,7 +308,7 @@ class FaultRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Termination:
-    """A trainer's last word: the truth of a run that does not hang on having been asked in time.
+    """A trainer's last word, which reaches the operator even if no poll came in time.
 
     Attributes:
         step: valid environment steps learned from.
@@ -318,7 +318,7 @@ class Termination:
         success_interval: around `success_rate`; None: as there. Absent, not null.
         last_checkpoint: the newest; None: none.
         attempt: number of this attempt by the run directory's record, from 1; None: not recorded.
-        restarts: of simulators after faults, in this attempt; None: not told.
+        restarts: of simulators after faults, in this attempt; None: not reported.
         log: the last lines of the trainer's log, the newest last; at most ten.
         faults: the last ones of this attempt, the newest last; at most ten.
     """
@@ -336,7 +336,7 @@ class Termination:
     def to_message(self) -> str:
         """Return the termination message: JSON of at most 4096 bytes.
 
-        To fit, the oldest lines and faults are left out; when there is none left, the reason is cut.
+        To fit, the oldest lines and faults are dropped; if none is left, the reason is cut.
         """
         word = self
         while (excess := _length(word.to_json()) - MOST_TERMINATION_BYTES) > 0:
@@ -344,7 +344,7 @@ class Termination:
         return json.dumps(word.to_json())
 
     def shorter(self, excess: int) -> Self:
-        """Return what comes nearer to a message with `excess` bytes less, and is worth most to a reader."""
+        """Return a shorter copy: drop the oldest log line or fault, else cut the reason by `excess` bytes."""
         content = self.to_json()
         if self.log and _length(content["log"]) >= _length(content["faults"]):
             return replace(self, log=self.log[-MOST_LINES:][1:])
@@ -353,7 +353,7 @@ class Termination:
         return replace(self, reason=content["reason"][: -(excess // _LONGEST_ESCAPE + 1)])
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as JSON data, texts and lists cut to what a reader takes."""
+        """Return it as JSON data, with texts and lists cut to the lengths that a reader accepts."""
         checkpoint = self.last_checkpoint
         content = {
             "step": self.step,
@@ -375,7 +375,7 @@ class Termination:
         """Return what `to_message` wrote.
 
         Raises:
-            ProtocolError: it is anything else, such as the end of a log, or longer.
+            ProtocolError: it is anything else, such as the end of a log, or too long.
         """
         return cls.from_json(decoded(message.encode("utf-8", "replace"), MOST_TERMINATION_BYTES))
 
@@ -401,14 +401,14 @@ class Termination:
 
 
 def _length(content: object) -> int:
-    """Return how many bytes `content` takes as JSON, which is ASCII as we write it."""
+    """Return the length of `content` in bytes as JSON in ASCII."""
     return len(json.dumps(content))
 
 
 def _table(
     fields: Fields, name: str, rows: Iterable[StrEnum], read: Callable[[Fields, str], T]
 ) -> dict[str, T]:
-    """Return an object's values by name, those of `rows` that are there; a newer release may have more."""
+    """Return an object's values for the names in `rows` that it has; a newer release may have more."""
     if not fields.has(name):
         return {}
     table = fields.part(name, Fields)

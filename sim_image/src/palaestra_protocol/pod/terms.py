@@ -1,14 +1,14 @@
-"""The words that a trainer and an operator have in common: ends, faults, causes, roles."""
+"""The enumerations that trainer and operator share: exit codes, kinds of faults, causes of time, roles."""
 
 from enum import IntEnum, StrEnum
 
 
 class ExitCode(IntEnum):
-    """How a trainer ends; anything else is unexpected and may be tried again.
+    """The exit codes of a trainer; after any other code a retry may help.
 
-    DONE: the run has ended. CONFIGURATION: it is wrong, don't retry. INTERRUPTED: by a signal, and
-    a checkpoint was written. FAULT_BUDGET: a simulator failed too often, don't retry. DIVERGED: the
-    learner did, don't retry. STALLED: no environment step for too long, retry.
+    DONE: the run has ended. CONFIGURATION: it is wrong; do not retry. INTERRUPTED: a signal ended it after a
+    checkpoint. FAULT_BUDGET: a simulator failed too often; do not retry. DIVERGED: the learner diverged; do
+    not retry. STALLED: no environment step for too long; retry.
     """
 
     DONE = 0
@@ -20,7 +20,7 @@ class ExitCode(IntEnum):
 
 
 class FaultKind(StrEnum):
-    """What a simulator did wrong; SLOW is counted only, and mended by nobody."""
+    """The kinds of a simulator's faults; SLOW is only counted, without a restart."""
 
     DEAD = "dead"
     HUNG = "hung"
@@ -29,13 +29,12 @@ class FaultKind(StrEnum):
 
 
 class Cause(StrEnum):
-    """What a trainer's time was spent on; every second of an attempt has exactly one of these.
+    """The use of a trainer's time; every second of an attempt has exactly one cause.
 
-    STEPPING: simulators computed a step that training waited for. TRANSPORT: the rest of a step:
-    asking, reading, the environment. LEARNING: all that the algorithm does besides. EVALUATING,
-    CHECKPOINTING: as named. STARTING: until the first step. RECOVERING: every simulator was broken, or
-    a resumed run was brought back to where it had been. RECYCLING: a healthy simulator was being
-    restarted, as planned; older releases count it as recovering.
+    STEPPING: training waited for a step of the simulators. TRANSPORT: the rest of a step: requests, reading,
+    the environment. LEARNING: the rest of the algorithm. EVALUATING, CHECKPOINTING: as named. STARTING: until
+    the first step. RECOVERING: every simulator was broken, or a resumed run was restored to its last state.
+    RECYCLING: a planned restart of a healthy simulator; older releases count it as recovering.
     """
 
     STEPPING = "stepping"
@@ -49,7 +48,7 @@ class Cause(StrEnum):
 
 
 class StandbyState(StrEnum):
-    """Whether a simulator's spare could take its place now."""
+    """Whether a simulator's spare could replace it now."""
 
     STARTING = "starting"
     READY = "ready"

@@ -1,7 +1,7 @@
-"""ROS 1 as trainer and simulator speak it.
+"""ROS 1 for trainer and simulator; all modules except `sockets` are pure.
 
-tcpros       PURE: connection headers and frames, as bytes
-definitions  PURE: the types of the interface, as text
-rostypes     PURE: their md5 sums, and values to and from bytes
-sockets      how both ends set up their sockets
+- `tcpros`: connection headers and frames, as bytes
+- `definitions`: the types of the interface, as text
+- `rostypes`: their md5 sums, and values to and from bytes
+- `sockets`: the socket options of both ends
 """

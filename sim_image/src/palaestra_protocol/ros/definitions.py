@@ -1,7 +1,6 @@
-"""The definitions of the ROS types: the text of each `.msg` and `.srv` file, and what genmsg reads in it.
+"""The definitions of the ROS types: the text of each `.msg` and `.srv` file, and genmsg's specs of them.
 
-They stand in `definitions.txt`, so no ROS package with definitions has to be installed: a message inside
-another is looked up in the same table.
+They are in `definitions.txt`, also those of nested messages, so no ROS package has to be installed.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import Any
 import genmsg
 import genmsg.msg_loader
 
-_PARTING = "---"  # of request and response
+_PARTING = "---"  # between request and response
 
 
 def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -24,7 +23,7 @@ def type_names() -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def is_defined(name: str) -> bool:
-    """Return whether there is a definition of `package/Name`; builtin types such as `int32` have none."""
+    """Return whether `package/Name` has a definition; built-in types such as `int32` have none."""
     return name in _table()
 
 

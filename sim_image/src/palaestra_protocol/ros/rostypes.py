@@ -1,8 +1,8 @@
 """The ROS types of the interface: md5 sums, and values to and from bytes.
 
-genmsg computes the md5 sums that peers compare and genpy writes the classes that serialise. Classes are made
-in memory when first asked for: Debian's own packages hold few of these types, and genpy's dynamic loader
-would leave files behind after a SIGKILL.
+genmsg computes the md5 sums that peers compare, and genpy generates the classes that serialize. Each class is
+made in memory at its first use: Debian's packages have few of these types, and genpy's dynamic loader would
+leave files behind after a SIGKILL.
 
 Messages of fixed-size numbers alone (every motor command and step) skip genpy for one precompiled struct.
 """
@@ -55,7 +55,7 @@ class Codec(Protocol):
         ...
 
     def frame(self, fields: Mapping[str, Any]) -> bytes:
-        """Return the same behind their length, as TCPROS wants them."""
+        """Return the bytes of a message after their length, as TCPROS requires."""
         ...
 
     def decode(self, payload: bytes | memoryview) -> Any:

@@ -1,14 +1,14 @@
-"""How both ends of a ROS connection set up their sockets."""
+"""The socket options of both ends of a ROS connection."""
 
 import socket
 
-# For `socket.setsockopt`. Small messages go at once; and without BBR, which many machines use by default: its
-# model of the path, and a timer for each connection, cost more than what they could bring to a few bytes.
+# For `socket.setsockopt`. Small messages are sent at once. BBR, the default of many machines, is off: its
+# model of the path, and a timer for each connection, cost more than they gain for a few bytes.
 OPTIONS = (
     (socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),
     (socket.IPPROTO_TCP, socket.TCP_CONGESTION, b"reno"),
 )
 
 # To be read at first: what a step needs is shorter, and Python has blocks of up to 512 bytes at hand, which
-# all connections use in turn. What is longer comes with the next read.
+# all connections use in turn. The rest of a longer one comes with the next read.
 FIRST_BYTES = 448

@@ -1,4 +1,4 @@
-"""The package webots_ros in a folder: whole or not at all, and never in the place of another's."""
+"""Write the package webots_ros into a folder, atomically, and never over a package of another origin."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from palaestra_sim.message_package.files import MANIFEST, NAME, package_files
 
 
 def write(folder: Path) -> Path:
-    """Return the path of the package, written into `folder`; one of an earlier release is replaced.
+    """Write the package into `folder`, in place of one of an earlier release, and return its path.
 
-    A process that is killed leaves the earlier package, the new one, or none, never a part.
+    If the process is killed, the folder has the earlier package, the new one, or none, but never a part.
 
     Raises:
         ForeignPackageError: the folder has a webots_ros that Palaestra did not write.
@@ -33,7 +33,7 @@ def write(folder: Path) -> Path:
 
 
 def make_importable(package: Path, packages_of_python: Path) -> None:
-    """Let the Python that has `packages_of_python` on its path import the package, unless it has another."""
+    """Make the package importable for the Python with the folder `packages_of_python`, unless it has one."""
     lines = packages_of_python / f"{NAME}.pth"
     part = lines.with_suffix(".part")
     part.write_text(f"{package.resolve() / 'src'}\n")

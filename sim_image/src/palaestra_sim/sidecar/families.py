@@ -1,7 +1,7 @@
 """Every metric of a sidecar, by name; `palaestra_sim.sidecar.metrics` reads their values.
 
-They are about the simulator's process. How it plays is told by the trainer, who plays in it. Which
-simulator of which job this is is said by whoever scrapes, not here.
+They describe the simulator's process. The trainer exports the metrics of the episodes, and Prometheus adds
+the labels of job and simulator.
 """
 
 from palaestra_protocol.control import SidecarState
@@ -18,7 +18,7 @@ STATES = gauge("palaestra_simulator_state", "1 for the state that the simulator 
 STARTS = counter("palaestra_simulator_starts_total", "How often the simulator was started.", SLOT)
 EXITS = counter(
     "palaestra_simulator_unexpected_exits_total",
-    "Ends of the simulator that nobody had asked for: with a code, by a signal, or nobody knows how.",
+    "Unexpected ends of the simulator: with an exit code, by a signal, or unknown.",
     SLOT,
     KIND,
 )
@@ -28,7 +28,7 @@ PROCESSOR = counter(
 )
 BUILD = gauge(
     "palaestra_sidecar_build_info",
-    "Always 1; the label tells the release.",
+    "Always 1; the label is the release.",
     Label(name="version", bound="release"),
 )
 

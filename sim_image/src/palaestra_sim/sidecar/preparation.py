@@ -70,7 +70,7 @@ def _written(world: Path, work: Path, name: str, make: Callable[..., bytes]) -> 
         folder = work / _PROJECT / (world.absolute().parent.name or "worlds")
     try:
         if folder is not None:
-            _link_neighbours(world.absolute(), folder)
+            _link_neighbors(world.absolute(), folder)
         return _write_whole((folder or work) / name, generated)
     except OSError as error:
         raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
@@ -95,17 +95,17 @@ def described(source: bytes, name: str) -> tuple[RobotName, ...]:
     )
 
 
-def _link_neighbours(world: Path, folder: Path) -> None:
+def _link_neighbors(world: Path, folder: Path) -> None:
     """Link everything beside `world`, and beside its folder, to the same relative places around `folder`.
 
     Addresses of a Webots project reach no further: `textures/a.png`, `../protos/Robot.proto`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    for neighbour in world.parent.parent.iterdir():
-        if neighbour != world.parent:
-            _link(folder.parent / neighbour.name, neighbour)
-    for neighbour in world.parent.iterdir():
-        _link(folder / neighbour.name, neighbour)
+    for neighbor in world.parent.parent.iterdir():
+        if neighbor != world.parent:
+            _link(folder.parent / neighbor.name, neighbor)
+    for neighbor in world.parent.iterdir():
+        _link(folder / neighbor.name, neighbor)
 
 
 def _link(link: Path, target: Path) -> None:

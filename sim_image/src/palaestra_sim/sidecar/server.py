@@ -31,9 +31,9 @@ def bound(option: str, address: Address, routes: Routes) -> Server:
     """Return a server of these routes, which does not answer yet.
 
     Args:
-        option: the option that the address comes from, for messages.
-        address: where to listen.
-        routes: what is served.
+        option: the option with the address, for messages.
+        address: to listen on.
+        routes: its paths.
 
     Raises:
         SidecarError: the address is in use, or not of this machine.
@@ -46,7 +46,7 @@ def bound(option: str, address: Address, routes: Routes) -> Server:
 
 
 def control_routes(simulators: Sequence[Simulator]) -> Routes:
-    """Return what the control port can do; see `palaestra_protocol.control`."""
+    """Return the routes of the control port; see `palaestra_protocol.control`."""
     routes: dict[tuple[str, str], Route] = {}
     for above, simulator in zip(_ABOVE, simulators, strict=False):
         routes |= {
@@ -59,7 +59,7 @@ def control_routes(simulators: Sequence[Simulator]) -> Routes:
 
 
 def health_routes(simulators: Sequence[Simulator], registry: CollectorRegistry) -> Routes:
-    """Return what the health port can do: answer at all, tell the states, and the metrics."""
+    """Return the routes of the health port: health, states and metrics."""
     states = {
         ("GET", f"{above}/state"): _state(simulator)
         for above, simulator in zip(_ABOVE, simulators, strict=False)
@@ -78,7 +78,7 @@ def _state(simulator: Simulator) -> Route:
 
 
 def _plain(simulator: Simulator, event: Event) -> Route:
-    """Return the route of a request that says nothing but its name."""
+    """Return the route of a request without parameters."""
 
     def route(body: bytes) -> Response:
         try:
@@ -91,7 +91,7 @@ def _plain(simulator: Simulator, event: Event) -> Route:
 
 
 def _stop(simulator: Simulator) -> Route:
-    """Return the route of an announced end."""
+    """Return the route of an announced stop."""
 
     def route(body: bytes) -> Response:
         try:
@@ -104,7 +104,7 @@ def _stop(simulator: Simulator) -> Route:
 
 
 def _asked(ask: Callable[[], Answer]) -> Response:
-    """Return what the simulator's owner says to a request."""
+    """Return the answer of the simulator's owner to a request."""
     try:
         answer = ask()
     except NoAnswer as error:

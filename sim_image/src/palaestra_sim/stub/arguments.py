@@ -1,4 +1,4 @@
-"""What a robot's controllerArgs ask of its controller."""
+"""The controllerArgs of a robot that matter to the stub."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arguments:
-    """The arguments that matter here; the controller goes on in spite of unknown ones.
+    """The arguments that matter here; like Webots' controller, the stub ignores unknown ones.
 
     Attributes:
         name: the node's name and the prefix of all paths.

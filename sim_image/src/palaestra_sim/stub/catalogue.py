@@ -15,7 +15,7 @@ from palaestra_sim.world import Node, Value
 
 
 class FieldType(IntEnum):
-    """What one value of a field is; `get_type` adds 0x10 where there may be several."""
+    """The type of one value of a field; `get_type` adds 0x10 for a field of several values."""
 
     BOOL = 1
     INT32 = 2
@@ -50,7 +50,7 @@ _TYPES: Final = {name: type_ for type_, name in _NAMES.items()}
 
 
 class FieldKind(NamedTuple):
-    """The declaration of a field: what it holds, how many, and the default as written in a world."""
+    """The declaration of a field: its type, whether it has several values, and the default as in a world."""
 
     type: FieldType
     multiple: bool
@@ -188,5 +188,5 @@ def guessed_kind(value: Value) -> FieldKind:
     if value.bracketed:
         return FieldKind(FieldType.FLOAT, True)
     by_width = {2: FieldType.VEC2F, 3: FieldType.VEC3F, 4: FieldType.ROTATION}
-    # Nothing is wider than a rotation: more numbers are several values.
+    # A rotation is the widest value, so more numbers are several values.
     return FieldKind(by_width.get(len(items), FieldType.FLOAT), len(items) > max(by_width))

@@ -42,7 +42,7 @@ class Controller:
     """The controller of one robot, from `start` to `close`.
 
     Attributes:
-        blocked: whether a step is pending, so that every other request has to wait.
+        blocked: whether a step is pending, so that all other requests have to wait.
     """
 
     def __init__(self, host: Host, stepping: Stepping, tree: SceneTree, robot: Robot, node: Node) -> None:
@@ -109,7 +109,7 @@ class Controller:
         self.node.close()
 
     def publish(self) -> None:
-        """Send the messages of the last step, if they are not out yet."""
+        """Send the messages of the last step, if they were not sent yet."""
         if not self._publish_due:
             return
         self._publish_due = False
@@ -162,7 +162,7 @@ class Controller:
         return not (self._publish_due or busy)
 
     def _stepped(self, done: bool) -> None:  # noqa: FBT001 - what Stepping calls back
-        """Take the end of a step: answer it now, or after the real time that it has to take."""
+        """Handle the end of a step: answer now, or after the real time that the step has to take."""
         delay_s = self._delay_s() if done else 0.0
         if delay_s > 0.0:
             self.node.later(delay_s, lambda: self._finish(done))
@@ -180,11 +180,11 @@ class Controller:
             self.node.answer(self._call, {"success": done})
 
     def _delay_s(self) -> float:
-        """Return the real time that the step has to take beyond what it took."""
+        """Return the rest of the real time that the step has to take."""
         delay_s = self._options.step_sleep_s
         if self.simulation.mode is Mode.REAL_TIME:
             now_s = self._host_clock()
-            # A client that was away is owed one basic step, not all that it missed.
+            # After a pause of the client, only one basic step is made up, not all that it missed.
             owed_s = now_s - self._basic_ms / 1000.0
             self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
             delay_s = max(delay_s, self._paced_until_s - now_s)
@@ -192,7 +192,7 @@ class Controller:
 
 
 def _told(handler: Handler) -> Handler:
-    """Return the handler with our own errors turned into failures that the client reads."""
+    """Return the handler with our errors turned into failures that the client receives."""
 
     def handle(request: Any) -> Any:
         try:

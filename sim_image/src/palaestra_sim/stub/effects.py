@@ -1,6 +1,7 @@
-"""Which fields matter: a write that would be read back and change nothing is refused.
+"""Refuse writes of fields that have an effect in Webots but none in the stub.
 
-Webots would give it an effect, so a client that randomizes a world would train in one that stays the same.
+Otherwise a client that randomizes a world would read back its writes, but train in a world that stays the
+same.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _MOUNTED: Final = frozenset(kind.node for kind in DEVICES.values() if not kind.o
 
 
 def require_effect(node: SceneNode, field: str) -> None:
-    """Return if a write of the node's field `field` has the effect that it has in Webots.
+    """Check that a write of the node's field `field` has the same effect as in Webots.
 
     Raises:
         UnsimulatedError: it would have no effect.
@@ -47,10 +48,10 @@ def require_effect(node: SceneNode, field: str) -> None:
 
 
 def require_true_value(node: SceneNode, field: str) -> None:
-    """Return unless Webots would change a field as a joint moves.
+    """Check that Webots would not change a field when a joint moves.
 
     Raises:
-        UnsimulatedError: it would.
+        UnsimulatedError: it would change it.
     """
     if node.jointed and field in _PLACING:
         raise UnsimulatedError(
@@ -67,7 +68,7 @@ def _reaches_robot(node: SceneNode, field: str) -> bool:
 
 
 def _moves(node: SceneNode, field: str) -> bool:
-    """Say whether a node is moved by its place; rays and outlines of a robot keep theirs."""
+    """Return whether a write of a node's place moves it; rays and outlines of a robot do not move."""
     if field not in _PLACING or node.place is None or node.jointed:
         return False
     if node.robot is not None or not _on_robot(node):

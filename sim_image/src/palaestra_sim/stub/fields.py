@@ -4,7 +4,7 @@ The next read answers a written value at once; the simulation sees it when the n
 `translation` and `rotation` move things, `customData` reaches the robot, and a field that only draws has no
 effect in Webots either. Every other write is refused: it would be read back, and change nothing (`effects`).
 
-As in Webots, a value that the field cannot hold is ignored without an error.
+As in Webots, a value that is invalid for the field is ignored without an error.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Field:
 
     Attributes:
         handle: for clients; the tree sets it.
-        node: the node that has it.
+        node: its node.
         name: as in the world file.
-        kind: what it holds.
+        kind: its declaration.
     """
 
     def __init__(self, node: SceneNode, name: str, kind: FieldKind, simulation: Simulation) -> None:
@@ -45,7 +45,7 @@ class Field:
 
     @property
     def count(self) -> int:
-        """How many values it has: -1 for a field of exactly one, as `get_count` answers."""
+        """Return the number of values, like `get_count`: -1 for a field of exactly one."""
         return len(self._current()) if self.kind.multiple else -1
 
     def get(self, type_: FieldType, index: int = 0) -> Any:
@@ -54,7 +54,7 @@ class Field:
         A bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
 
         Raises:
-            NoValueError: the field holds another type, or nothing at that index.
+            NoValueError: the field has another type, or no value at that index.
             UnsimulatedError: Webots would change the value as a joint moves.
         """
         require_true_value(self.node, self.name)
@@ -83,7 +83,7 @@ class Field:
         self._simulation.before_next_step(self._take_effect)
 
     def insert(self, type_: FieldType, index: int, value: Any) -> bool:
-        """Insert a value before `index`, -1 for the end; False when that cannot be.
+        """Insert a value before `index`, -1 for the end; return False if that is impossible.
 
         Raises:
             UnsimulatedError: it would have no effect.
@@ -97,7 +97,7 @@ class Field:
         return True
 
     def remove(self, index: int) -> bool:
-        """Remove the value at `index`; False when there is none, or when it must stay.
+        """Remove the value at `index`; return False if there is none, or if it must stay.
 
         Raises:
             UnsimulatedError: it would have no effect.
@@ -114,7 +114,7 @@ class Field:
         require_effect(self.node, self.name)
 
     def _current(self) -> list[Any]:
-        """Return the values: as written last, else as the simulation has them."""
+        """Return the values: those written last, else those of the simulation."""
         node = self.node
         if self._writes == 0:
             if node.place is not None and self.name == "translation":
@@ -126,7 +126,7 @@ class Field:
         return self._values
 
     def _take_effect(self) -> None:
-        """Let the simulation see what was written; a later write of the same field wins."""
+        """Apply the written values to the simulation; of several writes the last one counts."""
         self._writes -= 1
         node = self.node
         if self._writes:
@@ -144,7 +144,7 @@ class Field:
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
-    """Return what the controller makes of a quaternion, with the fault of its RosMathUtils.
+    """Return the axis and angle that the controller computes from a quaternion, with its RosMathUtils bug.
 
     An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then. For the exact identity that is NaN,
     so a zero rotation that was read cannot be written back. If |w| > 1, the angle is NaN.

@@ -1,7 +1,7 @@
-"""Poses in space: what supervisor calls answer and what shapes are placed with.
+"""Poses in space, for the answers to supervisor calls and for the places of shapes.
 
-Rotations are 3 x 3 matrices as nine floats, row after row. The physics is planar and does not come
-here.
+Rotations are 3 x 3 matrices as nine floats, row after row. The physics is planar and does not use this
+module.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ class Pose(NamedTuple):
     rotation: Matrix = IDENTITY
 
     def after(self, inner: Pose) -> Pose:
-        """Return `inner`, which is given in this pose's frame, in the frame this pose is given in."""
+        """Return the pose `inner` of this pose's frame in the frame around this pose."""
         return Pose(self.carry(inner.position), multiply(self.rotation, inner.rotation))
 
     def carry(self, point: Vector) -> Vector:
-        """Return `point` of this pose's frame in the frame this pose is given in."""
+        """Return `point` of this pose's frame in the frame around this pose."""
         turned = turn(self.rotation, point)
         return (
             self.position[0] + turned[0],
@@ -71,7 +71,7 @@ def multiply(a: Matrix, b: Matrix) -> Matrix:
 
 
 def from_axis_angle(rotation: AxisAngle) -> Matrix:
-    """Return the rotation about an axis of any length but 0; about an axis of length 0: none."""
+    """Return the rotation about an axis of any length; for length 0, the identity."""
     x, y, z, angle_rad = rotation
     length = math.sqrt(x * x + y * y + z * z)
     if length == 0.0:

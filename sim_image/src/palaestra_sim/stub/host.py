@@ -1,6 +1,6 @@
-"""What a controller and its services ask of the running stub around them.
+"""The interface of the running stub for a controller and its services.
 
-The stub starts and ends controllers, so it imports them; they import this Protocol and not the stub.
+The stub starts and ends controllers, so it imports them; they import this Protocol instead of the stub.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Host(Protocol):
         ...
 
     def quit(self, status: int) -> None:
-        """End with that exit status, after the answer of the present call."""
+        """End with that exit status, after the answer to the current call."""
         ...
 
     def reload(self) -> None:

@@ -1,8 +1,8 @@
 """Motors, and the angles of their shafts.
 
-A motor is commanded as in Webots: a target position and a velocity. With a target of infinity it turns at
-that velocity; with a finite one it turns there, no faster than that velocity. Every command is taken
-without complaint, refused or not, because the ROS interface says success whatever happens.
+A motor has the commands of Webots: a target position and a velocity. With a target of infinity it turns at
+that velocity; with a finite one it turns to the target, at most at that velocity. An invalid command is
+ignored without an error, because the ROS interface always answers success.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class MotorSpec:
 
 
 class Motor:
-    """One motor: its commands, and how fast its shaft turns.
+    """One motor: its commands, and the speed of its shaft.
 
     Attributes:
-        speed_rad_s: how fast the shaft turns.
+        speed_rad_s: of the shaft.
         angle_rad: of the shaft, since the start or the last reset.
         changed: whether a command came since the physics looked; the physics sets it back.
         position_sensor: the name of the first PositionSensor of its joint, "" if there is none.
@@ -114,7 +114,7 @@ class Motor:
             self.available_torque_nm = torque_nm
 
     def demand(self, step_s: float) -> float:
-        """Return the speed in rad/s that the motor is after in the next `step_s` seconds."""
+        """Return the speed in rad/s that the motor demands in the next `step_s` seconds."""
         if math.isinf(self.target_rad):
             wanted = self.velocity_rad_s
         else:
@@ -128,5 +128,5 @@ class Motor:
 
     @property
     def steady(self) -> bool:
-        """Whether the shaft turns as commanded and will go on so until the next command."""
+        """Return whether the shaft turns at the commanded speed, which stays until the next command."""
         return math.isinf(self.target_rad) and self.speed_rad_s == self.velocity_rad_s

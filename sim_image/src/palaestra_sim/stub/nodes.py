@@ -1,4 +1,4 @@
-"""One node of the scene tree as a supervisor sees it: what it is, and what is inside it."""
+"""One node of the scene tree of a supervisor: its type, its place, and the nodes inside it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class SceneNode:
     """One node of the tree.
 
     Attributes:
-        number: what `get_id` answers; 0 is the root.
+        number: the answer of `get_id`; 0 is the root.
         handle: for clients; the tree sets it.
         source: the node in the world file; None for the root.
         parent: None for the root.

@@ -1,7 +1,7 @@
-"""What stands in the way of robots and rays, seen from above: discs and blocks.
+"""The obstacles of robots and rays, seen from above: discs and blocks.
 
-Each shape answers two questions: how deep a round robot is inside it, and how far rays travel until
-they meet it. Heights are settled before: whatever becomes a shape here is as high as the robots.
+Each shape computes how deep a round robot is inside it, and how far rays travel until they meet it. Heights
+are checked before: every shape here is as high as the robots.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
-# A ray in a robot's frame: x and y of its origin in metres, x and y of its unit direction.
+# A ray in a robot's frame: x and y of its origin in meters, x and y of its unit direction.
 Ray = tuple[float, float, float, float]
-# A contact: x and y of the unit normal that points at the robot, depth in metres.
+# A contact: x and y of the unit normal that points at the robot, depth in meters.
 Contact = tuple[float, float, float]
 
 _SAME_PLACE_M2 = 1e-24  # a square; those of still smaller distances lose their digits
@@ -22,7 +22,7 @@ class Obstacle(Protocol):
     """A shape on the floor."""
 
     def gap(self, x: float, y: float) -> float:
-        """Return the metres from a point to the shape; 0 or less inside it."""
+        """Return the meters from a point to the shape; 0 or less inside it."""
         ...
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
@@ -30,7 +30,7 @@ class Obstacle(Protocol):
         ...
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
-        """Shorten `reach` (metres, one a ray) to where the rays meet the shape.
+        """Shorten `reach` (meters, one a ray) to where the rays meet the shape.
 
         Args:
             frame: x, y, cos and sin of the robot's heading.
@@ -51,7 +51,7 @@ class Disc:
         self.radius = radius
 
     def gap(self, x: float, y: float) -> float:
-        """Return the metres from a point to the disc; negative inside it."""
+        """Return the meters from a point to the disc; negative inside it."""
         return math.hypot(x - self.x, y - self.y) - self.radius
 
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
@@ -99,7 +99,7 @@ class Block:
         self.half_y = size[1] / 2.0
 
     def gap(self, x: float, y: float) -> float:
-        """Return the metres from a point to the block; 0 inside it."""
+        """Return the meters from a point to the block; 0 inside it."""
         lx, ly = self._local(x, y)
         return math.hypot(max(abs(lx) - self.half_x, 0.0), max(abs(ly) - self.half_y, 0.0))
 
@@ -136,7 +136,7 @@ class Block:
         return dx * self.c + dy * self.s, dy * self.c - dx * self.s
 
     def _way_out(self, x: float, y: float, radius: float) -> Contact:
-        """Return the contact of a robot whose centre is inside: through the nearest face."""
+        """Return the contact of a robot whose center is inside: through the nearest face."""
         out_x = self.half_x - abs(x)
         out_y = self.half_y - abs(y)
         if out_x < out_y:
@@ -145,7 +145,7 @@ class Block:
 
 
 def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:
-    """Return how far a ray travels until it enters and leaves what lies between -half and half."""
+    """Return how far a ray travels until it enters and leaves the range from -half to half."""
     if direction == 0.0:
         return (-math.inf, math.inf) if -half <= origin <= half else (math.inf, -math.inf)
     first = (-half - origin) / direction
@@ -153,10 +153,10 @@ def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:
     return (first, second) if first < second else (second, first)
 
 
-class Neighbourhood:
-    """Which obstacles are within reach of a point, remembered by squares of the floor.
+class Neighborhood:
+    """The obstacles within reach of a point, cached by squares of the floor.
 
-    Most squares have none or one, so that the cost of a step does not grow with the world.
+    Most squares have none or one, so the cost of a step does not grow with the world.
     """
 
     __slots__ = ("_margin", "_obstacles", "_squares")

@@ -1,4 +1,4 @@
-"""What can be set about a stub, beside its world."""
+"""The options of a stub, besides its world."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StubOptions:
-    """How a stub behaves where Webots varies.
+    """The behavior of a stub in matters in which Webots varies.
 
     Attributes:
-        step_sleep_s: real time that every `time_step` takes at least, as a bigger world would.
-        lost_wakeup: whether the controller can lose a wake-up, as the real one does: the messages
-            of a step that is asked for before those of the step before are out, or within
-            `publish_delay_s` after, never come.
+        step_sleep_s: least real time of a `time_step`, to imitate a bigger world.
+        lost_wakeup: whether the controller can lose a wake-up, like the real one: if a step is requested
+            before the messages of the step before are sent, or within `publish_delay_s` after, its messages
+            never come.
         publish_delay_s: from the end of a step to its messages; 0 is right after the answer.
     """
 

@@ -2,16 +2,16 @@
 
 Kinematics and geometry are the Robotino 3's. Wheel 0 is at the rear, 1 front right, and 2 front left.
     w0 = (vy - L omega) / R,  w1 = (-k vx - vy / 2 - L omega) / R,  w2 = (k vx - vy / 2 - L omega) / R,
+
 with k = sqrt(3/4). Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c.
 
-How fast it speeds up: the motors' `acceleration` is -1 in the Robotino 3, so in Webots only torque
-and friction limit the wheels. The limits of base.c stand for that here: 10 m/s2, 6 m/s2 and 20 rad/s2
-along x, y and about z, all three axes slowed by the same factor, as `base_accelerate` there does.
-(10 N m at two of three wheels and 23 kg would give 12 m/s2.) A motor's own `acceleration` comes on
-top.
+Acceleration: the motors' `acceleration` is -1 in the Robotino 3, so in Webots only torque and friction
+limit the wheels. Here the limits of base.c replace them: 10 m/s2, 6 m/s2 and 20 rad/s2 along x, y and about
+z. All three axes are slowed by the same factor, as in its `base_accelerate`. (10 N m at two of three wheels
+and 23 kg would give 12 m/s2.) A motor's own `acceleration` is an additional limit.
 
-A robot is a cylinder. What it runs into pushes it out along the normal, so that it slides; its wheels
-spin on. No mass, no bounce, no friction but that. Everything is a function of the commands.
+A robot is a cylinder. An obstacle pushes it out along the normal, so that it slides while its wheels turn.
+There is no mass, no bounce and no other friction. Everything is a function of the commands.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from palaestra_sim.stub.motors import Motor
-from palaestra_sim.stub.obstacles import Disc, Neighbourhood
+from palaestra_sim.stub.obstacles import Disc, Neighborhood
 
 WHEEL_RADIUS_M: Final = 0.063
 WHEEL_DISTANCE_M: Final = 0.1826
@@ -81,7 +81,7 @@ class Body(Disc):
     def __init__(self, radius_m: float, wheels: Sequence[Motor]) -> None:
         super().__init__(0.0, 0.0, radius_m)
         self._wheels = tuple(wheels)
-        self._solids = Neighbourhood((), 0.0)
+        self._solids = Neighborhood((), 0.0)
         self._others: tuple[Body, ...] = ()
         self._step_s = 0.0
         self.place(0.0, 0.0, 0.0)
@@ -93,16 +93,16 @@ class Body(Disc):
         return self.x, self.y, self.c, self.s
 
     def driven_by(self, motor: Motor) -> bool:
-        """Say whether a motor turns one of the wheels."""
+        """Return whether a motor turns one of the wheels."""
         return motor in self._wheels
 
-    def face(self, solids: Neighbourhood, others: Sequence[Body]) -> None:
-        """Set what the body can run into."""
+    def face(self, solids: Neighborhood, others: Sequence[Body]) -> None:
+        """Set the obstacles of the body."""
         self._solids = solids
         self._others = tuple(others)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
-        """Put the robot down somewhere; its motion goes on."""
+        """Place the robot somewhere; its motion continues."""
         self.x = x
         self.y = y
         self.heading_rad = heading_rad
@@ -110,7 +110,7 @@ class Body(Disc):
         self.s = math.sin(heading_rad)
 
     def halt(self) -> None:
-        """Take all motion away; the motors begin again from rest."""
+        """Stop all motion; the motors begin again from rest."""
         self._vx = self._vy = self._omega = 0.0
         self.velocity = (0.0, 0.0, 0.0)
         self.touched = False
@@ -145,7 +145,7 @@ class Body(Disc):
         self._push_out()
 
     def _drive(self, step_s: float) -> None:
-        """Bring the wheels nearer to what their motors are after."""
+        """Change the speeds of the wheels toward those that their motors demand."""
         w0, w1, w2 = self._wheels
         d0 = w0.demand(step_s) - w0.speed_rad_s
         d1 = w1.demand(step_s) - w1.speed_rad_s
@@ -199,7 +199,7 @@ class Body(Disc):
         self.s = math.sin(heading)
 
     def _push_out(self) -> None:
-        """Push the robot out of whatever it is in, along the normals: what is left is sliding."""
+        """Push the robot out of obstacles along the normals; the remaining motion is sliding."""
         for _ in range(_PASSES):
             clear = True
             for solid in self._solids.near(self.x, self.y):

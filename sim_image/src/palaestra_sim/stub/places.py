@@ -1,7 +1,7 @@
-"""Where the nodes of a world stand: each in the frame of the node around it.
+"""The places of a world's nodes, each in the frame of the node around it.
 
-A place holds what a client reads and writes as `translation` and `rotation`. A robot's place is
-where its body is now; every other place stays where it was put.
+A place has the `translation` and `rotation` that clients read and write. A robot's place is the current
+pose of its body; every other place stays as written.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class Place:
 
     Attributes:
         parent: the place of the node around it; None at the top of the world.
-        translation: x, y, z in metres, in the parent's frame.
+        translation: x, y, z in meters, in the parent's frame.
         rotation: axis and angle in radians, in the parent's frame.
     """
 
@@ -29,7 +29,7 @@ class Place:
 
     @property
     def translation(self) -> Vector:
-        """X, y, z in metres, in the parent's frame."""
+        """X, y, z in meters, in the parent's frame."""
         return self._translation
 
     @translation.setter
@@ -57,7 +57,7 @@ class Place:
 
     @property
     def world_position(self) -> Vector:
-        """Where its origin is in the world, in metres."""
+        """Return the position of its origin in the world, in meters."""
         return self.translation if self.parent is None else self.world_pose.position
 
     def chain(self) -> Iterator[Place]:
@@ -68,12 +68,12 @@ class Place:
             place = place.parent
 
     def return_to_start(self) -> None:
-        """Go back to where the world file has it."""
+        """Return to the place in the world file."""
         self.translation, self.rotation = self._start
 
 
 class RobotPlace(Place):
-    """The frame of a robot with a body: it drives about, upright, at the height it was put at.
+    """The frame of a robot with a body, which drives upright, at the height at which it was placed.
 
     Its parent never moves or turns, so the body's pose is the place's.
     """

@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import pairwise
 
-from palaestra_sim.stub.obstacles import Neighbourhood, Obstacle, Ray
+from palaestra_sim.stub.obstacles import Neighborhood, Obstacle, Ray
 
-Row = tuple[float, float, float]  # distance in metres, response, noise as a fraction of the response
+Row = tuple[float, float, float]  # distance in meters, response, noise as a fraction of the response
 
 
 class LookupTable:
@@ -71,11 +71,11 @@ def lookup_table(*rows: Row) -> LookupTable:
 
 
 class Fan:
-    """All rays of one robot, cast together: the transformation into its frame is made once.
+    """All rays of one robot, cast together, so that its frame is computed once.
 
     Args:
         rays: in the robot's frame.
-        reach_m: the longest distance that matters, from each ray's origin.
+        reach_m: for each ray, the distance beyond which its value is constant.
     """
 
     __slots__ = ("_blank", "_others", "_reach", "_solids", "distances", "rays")
@@ -86,21 +86,21 @@ class Fan:
         self.distances = list(reach_m)
         farthest = max((x * x + y * y for x, y, _, _ in self.rays), default=0.0)
         self._reach = max(reach_m, default=0.0) + math.sqrt(farthest)
-        self._solids = Neighbourhood((), 0.0)
+        self._solids = Neighborhood((), 0.0)
         self._others: tuple[Obstacle, ...] = ()
 
     @property
     def reach_m(self) -> float:
-        """How far from the robot's centre a ray can end."""
+        """Return the longest distance of a ray's end from the robot's center."""
         return self._reach
 
-    def face(self, solids: Neighbourhood, others: Sequence[Obstacle]) -> None:
-        """Set what the rays can meet: what stands, and what drives."""
+    def face(self, solids: Neighborhood, others: Sequence[Obstacle]) -> None:
+        """Set the obstacles of the rays: standing ones and robots."""
         self._solids = solids
         self._others = tuple(others)
 
     def cast(self, frame: tuple[float, float, float, float]) -> list[float]:
-        """Return how far each ray travels in metres, from x, y, cos and sin of the heading.
+        """Return how far each ray travels in meters, from x, y, cos and sin of the heading.
 
         Rays that meet nothing have their full reach. The list is reused by the next call.
         """

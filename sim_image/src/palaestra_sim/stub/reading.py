@@ -20,7 +20,7 @@ ELSEWHERE: Final = "remove it, or run this world with driver webots"
 
 
 class Reading:
-    """A world that is being read: finds `DEF`s, takes numbers, collects errors."""
+    """A world that is being read: it finds `DEF`s, reads numbers, and collects errors."""
 
     def __init__(self, world: World, name: str) -> None:
         self.world = world
@@ -32,7 +32,7 @@ class Reading:
                 self._defs.setdefault(node.def_name, []).append(node)
 
     def refuse(self, node: Node, fact: str, remedy: str = ELSEWHERE) -> None:
-        """Note that `node` cannot be simulated."""
+        """Record that `node` cannot be simulated."""
         self._refused.append(self._source.error(node.span[0], fact, remedy))
 
     def conclude(self) -> None:
@@ -59,7 +59,7 @@ class Reading:
         return named[before - 1]
 
     def children(self, node: Node, field: str = "children") -> tuple[Node, ...]:
-        """Return the nodes of a field, as `resolved` does."""
+        """Return the nodes of a field, each `USE` resolved as in `resolved`."""
         return self.resolved(node.nodes(field))
 
     def resolved(self, nodes: Iterable[Node]) -> tuple[Node, ...]:
@@ -88,7 +88,7 @@ class Reading:
         return self.vector(node, field, (default,))[0]
 
     def translation(self, node: Node) -> Vector:
-        """Return `translation` in metres."""
+        """Return `translation` in meters."""
         x, y, z = self.vector(node, "translation", (0.0, 0.0, 0.0))
         return x, y, z
 

@@ -1,4 +1,4 @@
-"""One simulated robot: its motors and sensors, and the noise that is its own.
+"""One simulated robot: its motors, its sensors, and its noise.
 
 The seed of the noise comes in the robot's `customData`, either as a whole number (`"7"`) or as JSON
 (`'{"seed": 7}'`), and is taken when the world is loaded and at each `simulation_reset`. Anything
@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from palaestra_sim.stub.devices import DEVICES
 from palaestra_sim.stub.devices.kind import Sample, Source
 from palaestra_sim.stub.motors import Motor
-from palaestra_sim.stub.obstacles import Neighbourhood, Ray
+from palaestra_sim.stub.obstacles import Neighborhood, Ray
 from palaestra_sim.stub.physics import Body
 from palaestra_sim.stub.places import Place
 from palaestra_sim.stub.rays import Fan
@@ -61,14 +61,14 @@ class Robot:
         self.sow()
 
     def face(self, solids: Sequence[Shape], others: Sequence[Robot]) -> None:
-        """Set what this robot can run into and see."""
+        """Set the obstacles of this robot and its rays."""
         bodies = [it.body for it in others if it.body is not None and it.body.radius > 0.0]
         height = self.place.world_pose.position[2]
         if self.body is not None and self.body.radius > 0.0:
             in_the_way = _between(solids, self.parts.heights, height)
-            self.body.face(_neighbourhood(in_the_way, self.body.radius), bodies)
+            self.body.face(_neighborhood(in_the_way, self.body.radius), bodies)
         for fan, heights in self._fans:
-            fan.face(_neighbourhood(_between(solids, heights, height), fan.reach_m), bodies)
+            fan.face(_neighborhood(_between(solids, heights, height), fan.reach_m), bodies)
 
     def look(
         self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
@@ -96,12 +96,12 @@ class Robot:
         self.sow()
 
     def halt(self) -> None:
-        """Take all motion away."""
+        """Stop all motion."""
         if self.body is not None:
             self.body.halt()
 
     def sow(self) -> None:
-        """Begin the noise anew, with the seed that customData gives now."""
+        """Restart the noise with the seed that is now in customData."""
         self.seed = seed_of(self.custom_data, self.seed)
         self._random.seed(self.seed)
 
@@ -124,7 +124,7 @@ def seed_of(custom_data: str, otherwise: int) -> int:
 
 
 def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
-    """Return the shapes that reach into a range of heights; touching it (a floor) isn't reaching."""
+    """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
     low, high = heights[0] + shift, heights[1] + shift
     found = []
     for shape in solids:
@@ -134,5 +134,5 @@ def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float
     return found
 
 
-def _neighbourhood(shapes: Sequence[Shape], reach_m: float) -> Neighbourhood:
-    return Neighbourhood([shape.obstacle() for shape in shapes], reach_m)
+def _neighborhood(shapes: Sequence[Shape], reach_m: float) -> Neighborhood:
+    return Neighborhood([shape.obstacle() for shape in shapes], reach_m)

@@ -1,11 +1,11 @@
-"""From a Robot node to its body and devices.
+"""Read a Robot node: its body and its devices.
 
-A robot with a boundingObject is a round one on three omnidirectional wheels, whose motors are named as in the
-Robotino 3; one without is a supervisor that only watches. The outline that runs into things is the widest
-cylinder, body or bumper: without physics of its own, a bumper is part of the robot in Webots too.
+A robot with a boundingObject is round and has three omnidirectional wheels, whose motors have the names of
+the Robotino 3; a robot without one is a supervisor that only watches. Its outline for collisions is the
+widest cylinder, body or bumper. In Webots too, a bumper without physics of its own is part of the robot.
 
-Joints turn their motors' shafts and move nothing. So only a wheel, which touches nothing but the floor, may
-hang on one, or what is drawn only; a sensor or an outline that would have to move is refused.
+Joints turn their motors' shafts but move nothing. So only a wheel, which touches only the floor, or a part
+that is only drawn may be on a joint; a sensor or an outline that would have to move is refused.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ _ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joi
 _FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid"}
 _FIXED_REMEDY: Final = "fix it to the robot, or run this world with driver webots"
 
-Joint = Literal["wheel", "other"]  # what a part hangs on
+Joint = Literal["wheel", "other"]  # the kind of joint of a part
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class RobotParts:
-    """A robot as the world file has it.
+    """A robot of the world file.
 
     Attributes:
-        body: None when nothing can run into it.
+        body: None if nothing can collide with it.
         heights: z of the lower and upper end of the body, in the robot's frame.
         arguments: its controllerArgs; None when its controller is not "ros".
     """
@@ -55,7 +55,7 @@ class RobotParts:
 
 
 def read_robot(reading: Reading, node: Node, parent: Place | None, places: dict[int, Place]) -> RobotParts:
-    """Return the robot at `node`, and enter the frames of its parts in `places`."""
+    """Return the robot at `node`, and add the frames of its parts to `places`."""
     return _RobotReader(reading, node, parent, places).read()
 
 

@@ -1,4 +1,4 @@
-"""From a world file to the things that the stub simulates.
+"""Read the simulated contents of a world file.
 
 Nodes that are only drawn are skipped, upright ones with a boundingObject are obstacles, and robots drive. Any
 other node that would act in Webots, such as a PROTO or a loose crate, is refused with its place in the file.
@@ -15,7 +15,7 @@ from palaestra_sim.stub.robot_reader import RobotParts, read_robot
 from palaestra_sim.stub.shapes import Shape, bounding_shapes
 from palaestra_sim.world import Node, World
 
-# Seen by people and cameras only, or read elsewhere (WorldInfo).
+# Visible to people and cameras only, or read elsewhere (WorldInfo).
 DRAWN_ONLY: Final = frozenset(
     (
         "Background",
@@ -42,7 +42,7 @@ class Scene:
     Attributes:
         basic_step_ms: WorldInfo.basicTimeStep.
         random_seed: WorldInfo.randomSeed.
-        solids: what stands in the way.
+        solids: the obstacles.
         robots: in the order of the world file.
         places: the frame of every node that has one, by the first byte of the node.
     """
@@ -58,7 +58,7 @@ def read_scene(world: World, name: str = "world") -> Scene:
     """Return the contents of a world.
 
     Raises:
-        WorldError: it holds things that the stub cannot simulate; the error has all of them.
+        WorldError: it has things that the stub cannot simulate; the error has all of them.
     """
     reading = Reading(world, name)
     scene = Scene()

@@ -43,12 +43,12 @@ class Publisher(Protocol):
 
 
 class Node(Protocol):
-    """A ROS node with a name that paths are relative to.
+    """A ROS node; paths are relative to its name.
 
     Attributes:
         name: of the node.
-        blocked: whether requests have to wait; asked before each.
-        current_call: stands for the request that is being handled, for `answer`.
+        blocked: returns whether requests have to wait; called before each.
+        current_call: identifies the request that is being handled, for `answer`.
     """
 
     name: str
@@ -88,7 +88,7 @@ class Node(Protocol):
 
 
 def topic_name(name: str) -> str:
-    """Return a name as the controller writes it in paths: five characters become underscores."""
+    """Return a name in the form that the controller uses in paths: five characters become underscores."""
     return name.translate(_REPLACED)
 
 

@@ -7,8 +7,8 @@
     simulation.step(192)
     robot.sensors["ir1"].value
 
-Same world, same commands, same seed: same values, bit by bit. Time is what was stepped; nothing here
-looks at a clock.
+The same world, commands and seed give the same values, bit for bit. Time advances only by steps; no clock is
+read.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from palaestra_sim.world import World, parse
 
 
 class Mode(IntEnum):
-    """How the simulator runs; the numbers are those of `simulation_set_mode`, R2021a and later."""
+    """The modes of the simulator, with the numbers of `simulation_set_mode` in R2021a and later."""
 
     PAUSE = 0
     REAL_TIME = 1
@@ -100,19 +100,19 @@ class Simulation:
             sample()
 
     def before_next_step(self, change: Callable[[], None]) -> None:
-        """Have a change made when the next basic step begins, as writes to fields are."""
+        """Register a change, such as the write of a field, for the beginning of the next basic step."""
         self._pending.append(change)
 
     def reset(self) -> None:
-        """Have the world reset within the next basic step.
+        """Request a reset of the world within the next basic step.
 
-        Restored: time, poses of all solids and robots, motors, noise (with the seed that customData
-        gives then). Not restored: other fields that were written.
+        Restored: time, poses of all solids and robots, motors, noise (with the seed that is then in
+        customData). Not restored: other fields that were written.
         """
         self._reset_asked = True
 
     def reset_physics(self) -> None:
-        """Take all motion away, at once."""
+        """Stop all motion, at once."""
         for robot in self.robots:
             robot.halt()
 
@@ -121,11 +121,11 @@ class Simulation:
         self.quit_status = status
 
     def place_of(self, first_byte: int) -> Place | None:
-        """Return the place of the node that begins there in the world file, None if it has none."""
+        """Return the place of the node that begins at this byte of the world file; None if it has none."""
         return self.scene.places.get(first_byte)
 
     def moved(self, place: Place) -> None:
-        """Look again at where the solids stand, if any stands on `place`."""
+        """Update the places of the solids, if `place` is part of one of them."""
         if any(place in shape.place.chain() for shape in self.scene.solids):
             self._solids_moved = True
             self._arrange()

@@ -24,7 +24,7 @@ MakeNode = Callable[[str], Node]
 
 
 class Simulator:
-    """A stub simulator, once its world is known to be right.
+    """A stub simulator whose world has been checked.
 
     Args:
         world_path: the .wbt file, read at once and again at each reload.
@@ -36,7 +36,7 @@ class Simulator:
     Attributes:
         simulation: of the world that is loaded now.
         controllers: by ROS name, of the robots whose controller is "ros".
-        quit_status: what `simulation_quit` asked the process to exit with; None before.
+        quit_status: the exit status from `simulation_quit`; None before.
 
     Raises:
         WorldError: the file is wrong, or holds something that the stub cannot simulate.
@@ -70,7 +70,7 @@ class Simulator:
             self._start_controller(robot)
 
     def on_quit(self, callback: Callable[[int], None]) -> None:
-        """Set what is called with the exit status once a client asked for the end."""
+        """Set the function to call with the exit status after a client has asked for the end."""
         self._ended = callback
 
     def arguments(self, robot: Robot) -> Arguments:
@@ -109,12 +109,12 @@ class Simulator:
         return True
 
     def restart(self, robot: Robot) -> None:
-        """End the controller of one robot and start it anew, after the answer of the present call."""
+        """Restart the controller of one robot, after the answer to the current call."""
         if robot in self._arguments:
             self._soon(lambda: self._restart(robot))
 
     def close(self) -> None:
-        """End all controllers in good order."""
+        """Close all controllers."""
         self._stepping.end()
         for controller in list(self.controllers.values()):
             controller.close()

@@ -44,7 +44,7 @@ class _Wish:
 
 
 class Stepping:
-    """The steps that the controllers of one simulation ask for."""
+    """The steps that the controllers of one simulation have requested."""
 
     def __init__(self, simulation: Simulated) -> None:
         self._simulation = simulation
@@ -56,21 +56,21 @@ class Stepping:
         self._awaited.add(robot)
 
     def leave(self, robot: Robot) -> None:
-        """Wait for this robot no more; what it asked for is forgotten."""
+        """Stop waiting for this robot, and drop its request."""
         self._awaited.discard(robot)
         self._wishes.pop(robot, None)
         self.advance()
 
     def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
-        """Have `done(True)` called when the world has moved on by `duration_ms`, perhaps at once.
+        """Request a step; `done(True)` is called when the world has advanced by `duration_ms`, maybe at once.
 
-        `done(False)` says that the simulator ends.
+        If the simulator ends before, `done(False)` is called.
         """
         self._wishes[robot] = _Wish(duration_ms, done)
         self.advance()
 
     def advance(self) -> None:
-        """Move the world as far as it was asked to."""
+        """Advance the world as far as all requests allow."""
         while self._wishes and self._awaited <= self._wishes.keys() and self._may_move():
             duration_ms = min(wish.left_ms for wish in self._wishes.values())
             self._simulation.advance(duration_ms)

@@ -1,4 +1,4 @@
-"""The scene tree as a supervisor sees it: nodes found by DEF, number or device, and their fields.
+"""The scene tree of a supervisor: nodes found by DEF, number or device, and their fields.
 
 Handles are numbers that look like the addresses of Webots. They are valid for one load of a world; a service
 refuses a handle of another load. (In Webots such a handle is a dangling pointer: the controller may crash.

@@ -1,6 +1,6 @@
-"""Worlds: read a `.wbt` file, and make one for each simulator, with its own ROS names.
+"""Worlds: read a `.wbt` file, and generate one for each simulator, with its own ROS names.
 
-Pure: bytes in, bytes out. No clock, no network, no file but the worlds that ship.
+Pure: bytes in, bytes out. No clock, no network, and no file except the worlds that ship.
 
     parse(source)                              the tree of a world
     check(source)                              raises unless every simulator can have a world of it

@@ -1,9 +1,9 @@
 """Decide what the `controllerArgs` of one robot must be, as edits of the fewest bytes.
 
-A string of the list is kept as it is written, replaced, or taken out; nothing is reordered. Two
-ways of writing arguments that would not reach the controller as meant are put right: a bare
-string, as worlds up to R2020a have it, becomes a list; and one string that holds several options
-becomes one string for each, because Webots hands each string over as a single argument.
+Each string of the list is kept unchanged, replaced, or removed; the order stays. Two forms are corrected,
+because their arguments would not reach the controller. A bare string, as in worlds up to R2020a, becomes a
+list. A string with several options becomes one string for each option, because Webots passes each string as a
+single argument.
 """
 
 import re
@@ -14,19 +14,19 @@ from palaestra_sim.world.robots import CLOCK, NAME, SYNCHRONIZE
 from palaestra_sim.world.tokens import Token, quoted, unquoted
 from palaestra_sim.world.tree import Node, Value, World
 
-_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # the last one, with its line's end
+_UP_TO_COMMENT = re.compile(rb"\A.*#[^\n]*\n?", re.DOTALL)  # up to the last comment, with its line end
 _INDENT = re.compile(rb"\r?\n[ \t]*\Z")
 
 
 def asks_for_clock(robot: Node) -> bool:
-    """Say whether a robot's arguments hold a `--clock`."""
+    """Return whether a robot's arguments have a `--clock`."""
     return any(CLOCK in _options(text) for text in robot.texts("controllerArgs"))
 
 
 def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> tuple[Edit, ...]:
     """Return the edits that give a robot its `--name=` and `--synchronize`.
 
-    Of several `--clock` the first stays if `clock` says so; none is ever added.
+    With `clock`, the first of several `--clock` stays; none is ever added.
     """
     value = robot.fields.get("controllerArgs")
     if value is None:
@@ -48,7 +48,7 @@ def argument_edits(world: World, robot: Node, ros_name: str, *, clock: bool) -> 
 def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[bytes, ...]]:
     """Return, for each string of a list, the strings to write instead; one row for an empty list.
 
-    What is missing goes behind the name, or to the front with it.
+    Missing options follow the name; if the name is missing too, all go to the front.
     """
     name, synchronize = quoted(NAME + ros_name), quoted(SYNCHRONIZE)
     rows: list[list[bytes]] = []
@@ -74,14 +74,14 @@ def _rows(strings: list[Token], ros_name: str, *, clock: bool) -> list[tuple[byt
 
 
 def _options(text: str) -> list[str]:
-    """Return the options that one string holds: several only if each begins with `--`."""
+    """Return the options in one string: several only if each begins with `--`."""
     words = text.split()
     several = len(words) > 1 and all(word.startswith("--") for word in words)
     return words if several else [text]
 
 
 def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: bytes) -> Edit:
-    """Replace one string of a list; if by nothing, then with the blanks before it."""
+    """Replace one string of a list; if it is removed, the blanks before it are too."""
     start = token.start
     if not row:
         start -= len(_UP_TO_COMMENT.sub(b"", _gap_before(world, token)))
@@ -89,7 +89,7 @@ def _new_row(world: World, token: Token, row: tuple[bytes, ...], separator: byte
 
 
 def _new_list(value: Value, string: Token, ros_name: str, *, clock: bool) -> Edit:
-    """Replace a bare string by a list; an empty one says that there are no arguments."""
+    """Replace a bare string by a list; an empty string means that there are no arguments."""
     strings = [string] if unquoted(string) else []
     texts = tuple(chain(*_rows(strings, ros_name, clock=clock)))
     text = b"[" + b" ".join(texts) + b"]"

@@ -11,7 +11,7 @@ def builtin(name: str) -> bytes:
     """Return the source world that ships as `name`, such as "arena".
 
     Raises:
-        UnknownWorldError: there is none of that name; the message names those there are.
+        UnknownWorldError: there is no world of that name; the message names the existing ones.
     """
     path = builtin_path(name)
     if path is None:
@@ -21,7 +21,7 @@ def builtin(name: str) -> bytes:
 
 
 def builtin_path(name: str) -> Path | None:
-    """Return the file of the world that ships as `name`; None when there is none."""
+    """Return the file of the world that ships as `name`; None if there is none."""
     return _shipped().get(name)
 
 

@@ -1,7 +1,7 @@
-"""The worlds that can be read, but of which no simulator's world can be made.
+"""Checks for worlds that can be read, but from which no simulator's world can be generated.
 
-Each check looks for one thing and points at each place of it; one error has them all, in the order of the
-file. No check depends on the simulator: a world that passes once passes for all.
+Each check finds one kind of mistake, at all its places. One error has all of them, in the order of the file.
+No check depends on the simulator: a world that passes once passes for all.
 """
 
 import re
@@ -23,7 +23,7 @@ _ROS_REMAPPING = re.compile(r"__\w+:=")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """A world that names are to be written into, and its ROS robots."""
+    """A world for which names will be generated, and its ROS robots."""
 
     source: Source
     world: World
@@ -34,7 +34,7 @@ Check = Callable[[Candidate], Iterator[WorldError]]
 
 
 def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
-    """A world in which no controller is "ros" has nothing that a trainer could reach."""
+    """No controller is "ros", so a trainer can reach no robot of this world."""
     if candidate.robots:
         return
     others = [node for node in candidate.world.walk() if _is_robot(node)]
@@ -49,10 +49,10 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
-    """A `USE` stands for the same robot once more, with the same ROS name.
+    """A `USE` repeats a robot with the same ROS name.
 
-    Any DEF of that name counts, though a `USE` means the last one before it: such a world is
-    clearer with two names.
+    Any DEF of that name counts, although a `USE` means the last one before it; two names make such a world
+    clearer.
     """
     containers = {
         node.def_name: robot
@@ -68,7 +68,7 @@ def robot_used_twice(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
-    """Clients find a robot by its Robot.name, and its ROS name is made of it."""
+    """Two robots have the same Robot.name, by which clients find them and from which their ROS names come."""
     seen = set()
     for robot in candidate.robots:
         name = robot_name(robot)
@@ -79,7 +79,7 @@ def robots_of_one_name(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def arguments_that_are_no_strings(candidate: Candidate) -> Iterator[WorldError]:
-    """Arguments are strings; anything else was meant for another field."""
+    """An argument is not a string, so it was meant for another field."""
     for value in _argument_values(candidate):
         for token in candidate.world.inside(value):
             if token.kind != "string" and token.text not in (b"[", b"]"):
@@ -88,7 +88,7 @@ def arguments_that_are_no_strings(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def renamed_behind_its_name(candidate: Candidate) -> Iterator[WorldError]:
-    """A ROS remapping such as `__name:=x` would overrule the name that is written for the robot."""
+    """A ROS remapping such as `__name:=x` would overrule the generated name of the robot."""
     for value in _argument_values(candidate):
         for token in _strings(candidate.world, value):
             if _ROS_REMAPPING.match(unquoted(token)):
@@ -97,7 +97,7 @@ def renamed_behind_its_name(candidate: Candidate) -> Iterator[WorldError]:
 
 
 def relative_address(candidate: Candidate) -> Iterator[WorldError]:
-    """A world that is not a file has no folder that an address could start from."""
+    """An address is relative, but the world has no file and so no folder."""
     for token in _addresses(candidate.world):
         if not _ABSOLUTE.match(unquoted(token)):
             fact = f"{token.text.decode()} is relative to the file of the world, and this one has none"
@@ -122,7 +122,7 @@ def _argument_values(candidate: Candidate) -> Iterator[Value]:
 
 
 def _addresses(world: World) -> Iterator[Token]:
-    """Yield the tokens of all strings that say where something is.
+    """Yield the tokens of all strings that are addresses.
 
     A texture without a dot is the name of one that Webots has, such as "mountains".
     """
@@ -148,10 +148,10 @@ CHECKS: tuple[Check, ...] = (
     arguments_that_are_no_strings,
     renamed_behind_its_name,
 )
-"""What every world must pass."""
+"""The checks for every world."""
 
 CHECKS_WITHOUT_FILE: tuple[Check, ...] = (*CHECKS, relative_address)
-"""What a world must pass that doesn't come from a file with others beside it."""
+"""The additional checks for a world without a file, which has no files beside it."""
 
 
 def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidate:
@@ -169,14 +169,12 @@ def candidate(source: bytes, name: str, *, relative_addresses: bool) -> Candidat
 
 
 def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
-    """Return if a world can be made of the world `source` for every simulator.
+    """Check that a world can be generated from the world `source` for every simulator.
 
-    `name` is what errors call the world. `relative_addresses`: the world stays beside the files
-    that it names, so they need no full address.
+    `name` is the name of the world in errors. `relative_addresses`: the world stays beside the files that it
+    names, so they need no full address.
 
     Raises:
-        WorldError: the world can't be read, has no robot whose controller is "ros", repeats a robot or a
-            robot's name, has arguments that are no strings or overrule its name, or has a relative
-            address where none may be.
+        WorldError: the world cannot be read, or a check of this module fails.
     """
     candidate(source, name, relative_addresses=relative_addresses)

@@ -1,8 +1,8 @@
 """Change a few spans of a world and leave every other byte alone.
 
-An edit says which bytes it replaces, and which tokens it means to put there. After the change the
-result is cut into tokens again, and must be the old tokens with exactly those changes: whatever
-an edit does to its surroundings by accident is found here, not by a simulator.
+An edit has the bytes to replace, and the tokens that it intends to put there. After the change the result is
+cut into tokens again, and must have the old tokens with exactly those changes. So an accidental change of the
+surroundings is found here, not by a simulator.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from palaestra_sim.world.tokens import Token, tokenize
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edit:
-    """Replace the bytes from `start` to `end` by `text`, which holds `tokens`."""
+    """Replace the bytes from `start` to `end` by `text`, which consists of `tokens`."""
 
     start: int
     end: int
@@ -23,12 +23,12 @@ class Edit:
 
 
 def edited(source: Source, tokens: Sequence[Token], edits: Sequence[Edit]) -> bytes:
-    """Return the bytes of `source`, whose tokens are `tokens`, with `edits` made.
+    """Return the bytes of `source`, whose tokens are `tokens`, after the `edits`.
 
-    Edits are in source order and don't overlap; the bytes they replace hold whole tokens.
+    Edits are in source order and do not overlap; each replaces whole tokens.
 
     Raises:
-        WorldError: the result doesn't have the tokens that the edits meant.
+        WorldError: the result does not have the tokens that the edits intend.
     """
     pieces, at = [], 0
     for edit in edits:
@@ -55,10 +55,10 @@ def _meant(tokens: Sequence[Token], edits: Sequence[Edit]) -> list[bytes]:
 
 
 def _check(result: Source, meant: Sequence[bytes]) -> None:
-    """Refuse a result whose tokens are not those that were meant.
+    """Refuse a result whose tokens are not the intended ones.
 
-    Both end with the empty text, and nothing else is empty: so a row that is too short or too
-    long differs somewhere too.
+    Both sequences end with the empty text, and no other token is empty, so a sequence of another length
+    differs too.
     """
     for token, text in zip(tokenize(result), meant, strict=False):
         if token.text != text:

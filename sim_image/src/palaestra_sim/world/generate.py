@@ -1,6 +1,6 @@
-"""Make the world of one simulator: its source world with ROS names of its own.
+"""Generate the world of one simulator: its source world with ROS names of its own.
 
-What changes is the `controllerArgs` of every robot whose controller is "ros", and in there only
+Only the `controllerArgs` of robots whose controller is "ros" change, and of those only
 
     --name=          the robot's ROS name; added if there is none, and never two
     --synchronize    added, so that the simulation waits for its client to step it
@@ -8,7 +8,7 @@ What changes is the `controllerArgs` of every robot whose controller is "ros", a
                      of the world stays and the rest go, else all go. Two on one ROS master would
                      publish two times on one topic.
 
-All else stays as it is, byte for byte. A world made this way is made of itself again.
+All other bytes stay unchanged. The same generation from a generated world gives the same world.
 """
 
 from collections.abc import Sequence
@@ -29,13 +29,13 @@ def generate(
     name: str = "world",
     relative_addresses: bool = False,
 ) -> bytes:
-    """Return the world of one simulator, made of the world `source`.
+    """Return the world of one simulator, generated from the world `source`.
 
-    `clock`: this simulator may publish `/clock`, if its world asks for it; true for at most one
-    simulator of a ROS master. `name` and `relative_addresses` are as for `check`.
+    `clock`: this simulator may publish `/clock` if its world asks for it; true for at most one simulator of a
+    ROS master. `name` and `relative_addresses` are as for `check`.
 
     Raises:
-        WorldError: as `check` does.
+        WorldError: as for `check`.
     """
     found = candidate(source, name, relative_addresses=relative_addresses)
     names = [ros_name(identity, robot_name(robot)) for robot in found.robots]
@@ -43,13 +43,13 @@ def generate(
 
 
 def rename(source: bytes, suffix: str, *, name: str = "world", relative_addresses: bool = False) -> bytes:
-    """Return the world with `suffix` behind each ROS name that it has, and without any `--clock`.
+    """Return the world with `suffix` appended to each of its ROS names, and without any `--clock`.
 
-    For a second simulator of a world that is beside another on one ROS master. `name` and
-    `relative_addresses` are as for `check`.
+    It is for a second simulator of the same world on one ROS master. `name` and `relative_addresses` are as
+    for `check`.
 
     Raises:
-        WorldError: as `check` does; or a robot has no ROS name, or one that would become too long.
+        WorldError: as for `check`; or a robot has no ROS name, or its name would become too long.
     """
     found = candidate(source, name, relative_addresses=relative_addresses)
     return _named(found, [_longer(found, robot, suffix) for robot in found.robots], clock=False)

@@ -3,10 +3,10 @@
     <job>_r<replica>_<group>_<index><slot>_<robot>_<hash>
     move_to_target_r0_collect_1a_robotino_8c31f2
 
-The words are for people, and may be cut or have characters replaced; the hash is taken over
-the words as they were, so two names that look alike still differ. A name is legal in ROS 1
-(a letter first, then `[A-Za-z0-9_]`) and at most 63 bytes long: the `ros` controller copies it
-into a buffer of 64 without looking.
+The words are for people; they may be cut, and characters may be replaced. The hash is taken over the original
+words, so two names with the same words still differ. A name is legal in ROS 1 (a letter first, then
+`[A-Za-z0-9_]`) and at most 63 bytes long: the `ros` controller copies it into a buffer of 64 bytes without a
+check.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ from dataclasses import astuple, dataclass
 
 MAX_NAME_BYTES = 63
 HASH_DIGITS = 6
-# What is left of 63 bytes for a robot is at least 15, so that people can tell robots apart.
+# Of the 63 bytes, at least 15 are for the robot, so that people can distinguish robots.
 _MAX_PREFIX = 40
 _MAX_GROUP = 16
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
@@ -24,7 +24,7 @@ _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunIdentity:
-    """Which simulator a world is for: one of a group, of a replica, of a job.
+    """The simulator of a world: one of a group, of a replica, of a job.
 
     `uid` is the job's UID, "" outside a cluster. `slot` is "a", or "b" for a standby beside it.
     """
@@ -41,7 +41,7 @@ class RunIdentity:
 def name_prefix(identity: RunIdentity) -> str:
     """Return the readable part before the robot, such as `move_to_target_r0_collect_1a`.
 
-    All robots of a simulator share it. At most 40 bytes: a long job gives way first. It isn't
+    All robots of a simulator share it. It has at most 40 bytes; a long job name is cut first. It is not
     unique by itself.
     """
     group = _legal(identity.group)[:_MAX_GROUP]
@@ -59,14 +59,14 @@ def ros_name(identity: RunIdentity, robot: str) -> str:
 
 
 def _legal(text: str) -> str:
-    """Return `text` with every character that ROS doesn't allow as an underscore."""
+    """Return `text` with an underscore for every character that ROS does not allow."""
     return _ILLEGAL.sub("_", text)
 
 
 def _hash(identity: RunIdentity, robot: str) -> str:
-    """Return 6 hex digits over all that makes a name one robot's own.
+    """Return 6 hex digits of a hash over everything that distinguishes a robot.
 
-    JSON keeps the parts apart: no text in one can look like the border to the next.
+    JSON separates the parts, so no text in one part can look like the beginning of the next.
     """
     parts = (*astuple(identity), robot)
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:HASH_DIGITS]

@@ -1,7 +1,7 @@
-"""Turn the tokens of a world file into its tree.
+"""Parse the tokens of a world file into its tree.
 
-Recursive descent with one function for each rule of the grammar. Depth is bounded by a number,
-not by Python's stack; and whatever the bytes are, the answer is a World or a WorldError.
+Recursive descent with one function for each rule of the grammar. A number limits the depth, not Python's
+stack. For any bytes the result is a World or a WorldError.
 """
 
 import re
@@ -23,10 +23,10 @@ _CONSTANTS: dict[bytes, bool | None] = {b"TRUE": True, b"FALSE": False, b"NULL":
 
 
 def parse(source: bytes, name: str = "world") -> World:
-    """Return the world that `source` describes; `name` is what its errors call it.
+    """Return the world that `source` describes; `name` is its name in errors.
 
     Raises:
-        WorldError: the bytes are no world file; it says where, why, and what to do.
+        WorldError: the bytes are no world file; the message has the place, the fact and the remedy.
     """
     text = Source(data=source, name=name)
     header = text.header()
@@ -34,7 +34,7 @@ def parse(source: bytes, name: str = "world") -> World:
 
 
 class _Reader:
-    """A place in a row of tokens, and the rules that move it."""
+    """A position in a sequence of tokens, and the rules that move it."""
 
     def __init__(self, source: Source, tokens: tuple[Token, ...]) -> None:
         self._source = source
@@ -137,11 +137,11 @@ class _Reader:
         raise self._error(token, f"{_shown(token)} where a value of {name} should be", "write one")
 
     def _span(self, first: Token) -> tuple[int, int]:
-        """Return where the tokens from `first` to the last one taken begin and end."""
+        """Return the span from the token `first` to the last one taken."""
         return (first.start, self._tokens[self._at - 1].end)
 
     def _name(self, role: str) -> str:
-        """Take a name; `role` says for the error what it would have been."""
+        """Take a name; `role` is its description for an error."""
         token = self._take()
         if token.kind != "word" or token.text in _RESERVED or not _NAME.fullmatch(token.text):
             fact = f"{_shown(token)} where {role} should be"
@@ -152,14 +152,14 @@ class _Reader:
         return self._tokens[self._at]
 
     def _take(self) -> Token:
-        """Return the next token and go past it, but never past the end."""
+        """Return the next token and move past it, but never past the end."""
         token = self._tokens[self._at]
         if token.kind != "end":
             self._at += 1
         return token
 
     def _skip(self, text: bytes) -> bool:
-        """Go past the next token if it is this word or mark, and say so."""
+        """Move past the next token if it is this word or mark; return whether it was."""
         if self._tokens[self._at].text != text:
             return False
         self._at += 1
@@ -170,7 +170,7 @@ class _Reader:
 
 
 def _shown(token: Token) -> str:
-    """Return a token as an error quotes it, no longer than a glance."""
+    """Return a token for an error message, shortened to `_GLANCE` characters."""
     if token.kind == "end":
         return "the end of the file"
     text = token.text.decode()

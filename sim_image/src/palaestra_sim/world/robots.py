@@ -1,8 +1,8 @@
 """Find the robots of a world that speak ROS.
 
-A robot speaks ROS if its `controller` is "ros", whatever its type is: a plain Robot or a PROTO,
-at the top or nested in another node's children, endPoint or slots. A PROTO whose own default is
-"ros" is not seen; its world must say `controller "ros"`.
+A robot speaks ROS if its `controller` is "ros", for any type: a plain Robot or a PROTO, at the top or
+nested in another node's children, endPoint or slots. A PROTO whose own default is "ros" is not found; its
+world must have `controller "ros"`.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,8 @@ CLOCK = "--clock"
 class WorldRobot:
     """A robot whose controller is "ros".
 
-    `robot` is its Robot.name; `ros_name` is the one that its `--name=` gives it, None without.
-    `supervisor` says whether it may see and change the whole scene, `synchronize` whether it
-    waits for a client to step.
+    `robot` is its Robot.name; `ros_name` is from its `--name=`, None without. `supervisor`: it may read and
+    change the whole scene. `synchronize`: it waits for a client to step.
     """
 
     robot: str
@@ -47,15 +46,15 @@ def ros_robots(world: World) -> tuple[Node, ...]:
 def robot_name(node: Node) -> str:
     """Return the Robot.name of a robot's node.
 
-    Without one, Webots calls a Robot "robot". A PROTO has a default of its own that the world
-    doesn't show, so its type stands in for it.
+    Without one, Webots calls a Robot "robot". A PROTO has a default of its own that is not in the world, so
+    its type is returned instead.
     """
     default = "robot" if node.type_name == "Robot" else node.type_name
     return node.text("name") or default
 
 
 def described(node: Node) -> WorldRobot:
-    """Return a robot's node as clients see it."""
+    """Return the description of a robot's node for clients."""
     arguments = node.texts("controllerArgs")
     names = [argument.removeprefix(NAME) for argument in arguments if argument.startswith(NAME)]
     return WorldRobot(

@@ -1,7 +1,7 @@
-"""The bytes of one world file, and how to point into them.
+"""The bytes of one world file, and errors at places in it.
 
-Everything in this package works on byte offsets; people read lines and columns. This is the
-only place that turns one into the other, so that every error of a world says where.
+This package works on byte offsets, but people read lines and columns. Only this module converts one into the
+other, so that every error of a world has its place.
 """
 
 import re
@@ -15,14 +15,14 @@ _HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """The bytes of a world and the name that its errors call it by."""
+    """The bytes of a world, and its name in errors."""
 
     data: bytes
     name: str
 
     @property
     def begin(self) -> int:
-        """Where the first line begins: behind a byte-order mark, if there is one."""
+        """Return the offset of the first line, after a byte-order mark if there is one."""
         return len(_BYTE_ORDER_MARK) if self.data.startswith(_BYTE_ORDER_MARK) else 0
 
     def header(self) -> str:
@@ -44,7 +44,7 @@ class Source:
         return match.group().decode()
 
     def error(self, offset: int, fact: str, remedy: str) -> WorldError:
-        """Return the error that points at byte `offset`, for the caller to raise."""
+        """Return an error at byte `offset`, for the caller to raise."""
         line_start = self.data.rfind(b"\n", 0, offset) + 1
         line = self.data.count(b"\n", 0, offset) + 1
         column = len(self.data[line_start:offset].decode("utf-8", errors="replace")) + 1

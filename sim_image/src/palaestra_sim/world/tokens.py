@@ -1,8 +1,8 @@
-r"""Cut a world file into tokens, each with its place in the bytes.
+r"""Cut a world file into tokens, each with its offset in the bytes.
 
-What lies between two tokens (blanks, line ends, commas and comments) is kept by nobody: whoever
-edits a world copies it from the bytes. Strings are read and written here and nowhere else; they
-know the escapes `\"` and `\\`, and every other backslash stands for itself.
+No token has the gaps between tokens (blanks, line ends, commas and comments); the editor of a world copies
+them from the bytes. Only this module reads and writes strings. They have the escapes `\"` and `\\`; every
+other backslash stands for itself.
 """
 
 import re
@@ -28,7 +28,7 @@ _ESCAPE = re.compile(r'\\(["\\])')
 
 
 class Token(NamedTuple):
-    """One token: its kind, its bytes as written, and where they are."""
+    """One token: its kind, its bytes as written, and their offset."""
 
     kind: Kind
     text: bytes
@@ -40,7 +40,7 @@ def tokenize(source: Source) -> tuple[Token, ...]:
     """Return the tokens of a world in order, closed by an empty one of kind `end`.
 
     Raises:
-        WorldError: a string is never closed, a number is none, or a character is not allowed.
+        WorldError: a string is never closed, a number is malformed, or a character is not allowed.
     """
     tokens = []
     for match in _TOKEN.finditer(source.data, source.begin):
@@ -55,7 +55,7 @@ def tokenize(source: Source) -> tuple[Token, ...]:
 
 
 def quoted(text: str) -> bytes:
-    """Return `text` as a world file writes a string, quotes included."""
+    """Return `text` as a string of a world file, with its quotes."""
     return b'"' + text.replace("\\", "\\\\").replace('"', '\\"').encode() + b'"'
 
 
@@ -65,7 +65,7 @@ def unquoted(token: Token) -> str:
 
 
 def _misfit(source: Source, match: re.Match[bytes]) -> Exception:
-    """Return the error for what fits no kind of token."""
+    """Return the error for text that fits no kind of token."""
     text = match.group()
     if text == b'"':
         fact = "this string is not closed on its line"

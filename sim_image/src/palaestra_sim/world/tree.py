@@ -1,8 +1,7 @@
-"""Read a world file as nodes, fields and values.
+"""A world file as nodes, fields and values.
 
-The reader knows the grammar of `.wbt` and no node: which fields a Robot has, what a PROTO's
-fields mean, whether a `USE` finds its `DEF`, is for others to say. Nothing is resolved, and every
-node and value tells which bytes it was read from.
+The reader knows the grammar of `.wbt`, but no node type: other modules know the fields of a Robot or a PROTO,
+and find the `DEF` of a `USE`. Nothing is resolved, and every node and value has the span of its bytes.
 """
 
 from bisect import bisect_left
@@ -17,7 +16,7 @@ Item: TypeAlias = "float | bool | str | Node | None"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """What a field holds: numbers, booleans, strings, nodes, `None` for NULL; in source order.
+    """The value of a field: numbers, booleans, strings, nodes, `None` for NULL; in source order.
 
     `translation 0 0 1` has three items and is not bracketed. The span is (start, end) in bytes,
     brackets included.
@@ -43,7 +42,7 @@ class Node:
     span: tuple[int, int]
 
     def numbers(self, name: str) -> tuple[float, ...] | None:
-        """Return the numbers of a field; None if it is absent or holds anything else."""
+        """Return the numbers of a field; None if it is absent or has another value."""
         value = self.fields.get(name)
         if value is None:
             return None
@@ -63,11 +62,11 @@ class Node:
         return next((item for item in self._items(name) if isinstance(item, bool)), default)
 
     def nodes(self, name: str) -> tuple["Node", ...]:
-        """Return the nodes of a field, those of a `USE` included; () if it is absent."""
+        """Return the nodes of a field, including each `USE`; () if it is absent."""
         return tuple(item for item in self._items(name) if isinstance(item, Node))
 
     def encloses(self, other: "Node") -> bool:
-        """Say whether `other`, of the same world, is this node or lies inside it."""
+        """Return whether `other`, of the same world, is this node or is inside it."""
         return self.span[0] <= other.span[0] and other.span[1] <= self.span[1]
 
     def _items(self, name: str) -> tuple[Item, ...]:
@@ -100,13 +99,13 @@ class World:
             waiting.extend(reversed(inside))
 
     def inside(self, value: Value) -> tuple[Token, ...]:
-        """Return the tokens of a value of this world, its brackets included."""
+        """Return the tokens of a value of this world, including its brackets."""
         start, end = value.span
         first = self.index(start)
         return self.tokens[first : bisect_left(self.tokens, end, lo=first, key=_start)]
 
     def index(self, offset: int) -> int:
-        """Return which token begins at byte `offset`, or is the first one after it."""
+        """Return the index of the token at byte `offset`, or of the first one after it."""
         return bisect_left(self.tokens, offset, key=_start)
 
 

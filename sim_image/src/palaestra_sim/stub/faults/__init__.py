@@ -1,4 +1,4 @@
-"""Faults on demand: a stub that fails as simulators do, so that training code can be tried against it.
+"""Injected faults: a stub that fails like a simulator, to test training code.
 
 - `kinds`: the faults, as data
 - `language`: from `crash:probability=0.0005` to data, or to a sentence about the mistake

@@ -1,7 +1,7 @@
-"""The course of one life: requests and messages go in, what becomes of them comes out.
+"""The course of one life: it decides the fate of each request and message.
 
-Pure: it counts, and knows no socket, process or clock. A fault that names a service and happens at a step
-or reset lasts from there on; so does a hang of a service, whenever it begins.
+Pure: it only counts, and knows no socket, process or clock. A fault that names a service and happens at a
+step or reset lasts from then on; so does a hang of a service.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ Damage = WrongValue | WrongShape
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ruling:
-    """What becomes of a request, or of a message.
+    """The fate of a request or a message.
 
     Attributes:
-        lost: it is forgotten, and nothing comes of it.
+        lost: it is dropped.
         delay_s: how long it waits.
         damages: the faults of the answer, or of the message.
         effects: what happens to the process first, in this order.
@@ -50,7 +50,7 @@ UNHARMED = Ruling()
 
 
 class Course:
-    """What has happened in this life so far, and what follows from it."""
+    """The counts of this life so far, and the rulings that follow from them."""
 
     def __init__(self, schedule: Schedule) -> None:
         self._schedule = schedule
@@ -62,11 +62,11 @@ class Course:
 
     @property
     def schedule(self) -> Schedule:
-        """The faults, and when they happen."""
+        """Return the faults with their times."""
         return self._schedule
 
     def start(self) -> tuple[StartRefused | None, float]:
-        """Return the fault that keeps the stub from starting, if any; else how long it has to wait."""
+        """Return the fault that keeps the stub from starting, if any, and the delay of the start."""
         number = self._schedule.life.number
         found = self._schedule.at(Event.START, number)
         refused = next((finding for finding in found if isinstance(finding, StartRefused)), None)
@@ -76,7 +76,7 @@ class Course:
         return refused, sum(delays)
 
     def request(self, robot: str, path: str) -> Ruling:
-        """Return what becomes of a request to `path`, below the robot's name."""
+        """Return the ruling on a request to `path`, below the robot's name."""
         delay_s, effects = 0.0, []
         number, happening = self._count(robot, path)
         for fault in happening:
@@ -89,7 +89,7 @@ class Course:
         return self._with_service_faults(path, delay_s, tuple(effects))
 
     def message(self, path: str) -> Ruling:
-        """Return what becomes of a message of the topic `path`; one with a leading slash is nobody's own."""
+        """Return the ruling on a message of the topic `path`; with a leading slash it belongs to no robot."""
         number = self._counts[Event.STEP]
         faults = [message for message in self._messages if _matches(path, message.topic)]
         if not faults:
@@ -101,12 +101,12 @@ class Course:
         )
 
     def closed(self, robot: str) -> None:
-        """Hear that a robot's controller ended: another may be the one whose steps count."""
+        """Record that a robot's controller ended; then the steps of another robot count."""
         if self._stepping == robot:
             self._stepping = None
 
     def _count(self, robot: str, path: str) -> tuple[int, tuple[Fault, ...]]:
-        """Return the number of the step or reset that a request is, and the faults that happen at it."""
+        """Return the number of a step or reset that a request asks for, and the faults that happen at it."""
         event = Event.RESET if path in RESET_PATHS else None
         if path == STEP_PATH:
             self._stepping = self._stepping or robot
@@ -132,7 +132,7 @@ class Course:
         return Ruling(lost=lost, delay_s=delay_s, damages=tuple(damages), effects=effects)
 
     def _befalls(self, fault: Fault) -> bool:
-        """Count a call of a service that `fault` names, and say whether it goes wrong."""
+        """Count a call of a service that `fault` names, and return whether it goes wrong."""
         self._calls[fault] += 1
         if fault.trigger.event is Event.CALL and self._schedule.happens(fault, self._calls[fault]):
             if isinstance(fault, Hang):
@@ -142,5 +142,5 @@ class Course:
 
 
 def _matches(path: str, pattern: str) -> bool:
-    """Say whether `*` and the rest fit a path; a global one fits only what begins with a slash too."""
+    """Return whether a pattern with `*` matches a path; a global pattern matches only global paths."""
     return path.startswith("/") == pattern.startswith("/") and fnmatchcase(path, pattern)

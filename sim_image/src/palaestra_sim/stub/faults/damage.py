@@ -1,6 +1,6 @@
-"""Messages and answers made wrong, as the bytes that travel.
+"""Damage messages and answers, as bytes.
 
-Pure. A message keeps its length prefix right: what is wrong is inside, so that the stream stays in step.
+Pure. The length prefix of a message stays right, so that the reader finds the next message.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _FRACTIONS = frozenset("fd")  # the codes of `struct`
 
 
 def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage]) -> bytes:
-    """Return a framed message of a topic with everything of `damages` wrong about it."""
+    """Return a framed message of a topic with all `damages`."""
     payload = data[LENGTH.size :]
     reading = last_field(type_name) if type_name else None
     for damage in damages:
@@ -38,9 +38,9 @@ def _with_reading(payload: bytes, reading: struct.Struct, value: float) -> bytes
 
 
 def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> bytes:
-    """Return a service's answer, its first byte and its frame, with everything of `damages` wrong about it.
+    """Return a service's answer, its first byte and its frame, with all `damages`.
 
-    One that says that the service failed stays as it is.
+    The answer of a failed service stays unchanged.
     """
     succeeded, payload = data[:1], data[1 + LENGTH.size :]
     if succeeded != b"\1":
@@ -60,7 +60,7 @@ def _fields(message: Any, value: float) -> dict[str, Any]:
 
 
 def _with_floats(part: Any, value: float) -> Any:
-    """Return a part of a decoded message as it can be encoded, with `value` in place of each float."""
+    """Return an encodable part of a decoded message, with `value` in place of each float."""
     if isinstance(part, float):
         return value
     if hasattr(part, "_fields"):

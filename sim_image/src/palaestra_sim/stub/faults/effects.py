@@ -1,4 +1,4 @@
-"""What a fault does to the process: signals, memory, the end. Nothing here decides when."""
+"""The effects of faults on the process: signals, memory, the end. Other modules decide when."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ log = logging.getLogger(__name__)
 
 
 class Endings(Protocol):
-    """What only the process as a whole can do to itself."""
+    """The effects for which the whole process is needed."""
 
     def end(self, status: int) -> None:
-        """End in good order, with that exit code."""
+        """Close everything and end with that exit code."""
         ...
 
     def lose_master(self) -> None:
-        """End as if the ROS master did not answer any more."""
+        """End as if the ROS master no longer answered."""
         ...
 
     def lose_names(self) -> None:
-        """Let the master forget every name, and go on."""
+        """Unregister every name at the master, and continue."""
         ...
 
 
 class Effects:
-    """Does to this process what faults say.
+    """Applies faults to this process.
 
     Args:
         endings: of the process.
@@ -60,7 +60,7 @@ class Effects:
         }
 
     def happen(self, faults: Sequence[Fault]) -> bool:
-        """Let the faults happen, in their order; say whether the stub goes on."""
+        """Apply the faults in their order; return whether the stub continues."""
         for fault in faults:
             if not isinstance(fault, MemoryGrowth):
                 log.warning("fault: %s", fault.text)
@@ -69,7 +69,7 @@ class Effects:
         return True
 
     def _crash(self, fault: Crash) -> bool:
-        # A core file would be left in a work folder that nobody looks into.
+        # A core file in the work folder would only take space.
         resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
         if fault.signal is not signal.SIGKILL:
             signal.signal(fault.signal, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""What can go wrong in a simulator, as data; docs/simulators.md tells what each looks like to a client."""
+"""The kinds of faults, as data; docs/simulators.md describes the effect of each on a client."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ RESET_PATHS = frozenset(
 class Event(StrEnum):
     """Events that are counted, from 1, in each life of a stub; the program that starts it counts the lives.
 
-    step: a `time_step` request of the robot that asked first: once a step, however many robots.
-    reset: a request for the start of the world. call: one of a service that the fault names.
+    - step: a `time_step` request of the robot that asked first, so once a step for any number of robots.
+    - reset: a request for a reset of the world.
+    - call: a call of a service that the fault names.
     """
 
     STEP = "step"
@@ -28,7 +29,7 @@ class Event(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """At which events a fault happens: at one, at every n-th, at a share of them, or at all.
+    """The events at which a fault happens: one, every n-th, a share of them, or all.
 
     Attributes:
         event: which events.
@@ -43,7 +44,7 @@ class Trigger:
     probability: float = 1.0
 
     def fires(self, number: int, draw: float) -> bool:
-        """Say whether the fault happens at that event, counted from 1; `draw` is even in [0, 1)."""
+        """Return whether the fault happens at that event, counted from 1; `draw` is uniform in [0, 1)."""
         if self.at is not None:
             return number == self.at
         return number % self.every == 0 and draw < self.probability
@@ -51,13 +52,13 @@ class Trigger:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fault:
-    """Something that goes wrong.
+    """A fault.
 
     Attributes:
         text: as it was written.
-        trigger: when.
-        service: the services it is about, below the robot's name, `*` for anything; "": none.
-        topic: the topics it is about, in the same way.
+        trigger: when it happens.
+        service: the affected services, below the robot's name, `*` for anything; "": none.
+        topic: the affected topics, in the same form.
     """
 
     text: str
@@ -68,14 +69,14 @@ class Fault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crash(Fault):
-    """The process is ended by a signal, with the request unanswered."""
+    """A signal ends the process, without an answer to the request."""
 
     signal: Signals = Signals.SIGSEGV
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exit(Fault):
-    """The process ends in good order, too early."""
+    """The process closes everything and ends, too early."""
 
     code: int = 0
 
@@ -87,7 +88,7 @@ class Hang(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delayed(Fault):
-    """Something comes later: by the latency, and by up to the jitter on top of it."""
+    """A delay: the latency, plus up to the jitter."""
 
     latency_s: float = 0.0
     jitter_s: float = 0.0
@@ -110,7 +111,7 @@ class Lost(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrongValue(Fault):
-    """Numbers with a fraction become another one."""
+    """Floats have another value."""
 
     value: float = math.nan
 
@@ -122,7 +123,7 @@ class WrongShape(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MemoryGrowth(Fault):
-    """Memory is taken and never given back, until there is `most_mib` of it."""
+    """Memory is allocated and never freed, up to `most_mib`."""
 
     mib: float = 1.0
     most_mib: float = 1024.0
@@ -130,21 +131,21 @@ class MemoryGrowth(Fault):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartRefused(Fault):
-    """The process ends before it has registered anything."""
+    """The process ends before it has registered any name."""
 
     code: int = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowStart(Delayed):
-    """Nothing is registered for a while."""
+    """The stub registers its names late."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MasterLost(Fault):
-    """The stub ends as it does when the ROS master is gone; its names stay, and lead nowhere."""
+    """The stub ends as if the ROS master were gone; its names stay registered."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamesLost(Fault):
-    """The master forgets the stub, as one does that was restarted; connections go on."""
+    """The master forgets the stub, like a restarted master; connections stay open."""

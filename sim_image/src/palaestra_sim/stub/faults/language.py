@@ -1,6 +1,6 @@
-"""The language in which faults are ordered: KIND, or KIND:KEY=VALUE,KEY=VALUE, with blanks between faults.
+"""The language of faults: KIND, or KIND:KEY=VALUE,KEY=VALUE, with blanks between faults.
 
-Pure: text in, data or a sentence out. It needs quotes neither in a shell (but for `*`) nor in YAML.
+Pure: text in, data or an error out. It needs no quotes in YAML, and in a shell only for `*`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SIGNALS: Final = ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV"
 
 
 class FaultError(SimError, ValueError):
-    """A fault is written wrongly, so nothing is started."""
+    """The description of a fault is wrong, so nothing is started."""
 
 
 def _whole(least: int, most: int) -> Callable[[str], int]:
@@ -72,7 +72,7 @@ def _path(text: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Key:
-    """A key: which field it fills, and how its text is read; a ValueError says what it has to be."""
+    """A key: its field, and the parser of its text, whose ValueError describes the allowed values."""
 
     field: str
     read: Callable[[str], Any]
@@ -135,10 +135,10 @@ _CALLS: Final = (Event.CALL, Event.STEP, Event.RESET)
 
 
 def parse(text: str, where: str) -> tuple[Fault, ...]:
-    """Return the faults that `text` orders; `where` it stands is said in errors.
+    """Return the faults in `text`; errors name its origin, `where`.
 
     Raises:
-        FaultError: it is written wrongly.
+        FaultError: a description is wrong.
     """
     return tuple(_Reader(word, where).fault() for word in text.split())
 
@@ -185,7 +185,7 @@ class _Reader:
         return pairs
 
     def _trigger(self, given: dict[str, str]) -> Trigger:
-        """Take the keys that say when out of `given`."""
+        """Remove the keys of the trigger from `given`, and return the trigger."""
         said = [it for it in ("every", "probability", *Event) if it in given]
         if len(said) > 1:
             raise self._error(f"{said[0]} and {said[1]} say two different times", "leave one")

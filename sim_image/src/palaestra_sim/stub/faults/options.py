@@ -1,4 +1,4 @@
-"""What the command line and the environment order, and which life of the simulator this is."""
+"""The faults from the command line and the environment, and the number of this life."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from palaestra_sim.stub.faults.language import FaultError, parse
 
 FAULTS: Final = "PALAESTRA_STUB_FAULTS"
 SEED: Final = "PALAESTRA_STUB_FAULT_SEED"
-START: Final = "PALAESTRA_SIMULATOR_START"  # which start of the simulator this is, as its sidecar counts
+START: Final = "PALAESTRA_SIMULATOR_START"  # the number of this start, counted by the sidecar
 _MOST_DRAWN: Final = 1_000_000
 
 
@@ -23,9 +23,9 @@ class Ordered:
 
     Attributes:
         faults: in the order they were written, options before the environment's.
-        seed: what all draws follow from.
-        life: which start of the simulator this is, counted from 1.
-        counted: whether somebody counts the lives; otherwise `life` was drawn.
+        seed: of all draws.
+        life: the number of this start of the simulator, from 1.
+        counted: whether a sidecar or a person counts the lives; otherwise `life` was drawn.
     """
 
     faults: tuple[Fault, ...]
@@ -46,10 +46,10 @@ def add_options(add: Callable[..., Any]) -> None:
 
 
 def read_options(options: argparse.Namespace, environment: Mapping[str, str]) -> Ordered | None:
-    """Return what options and environment order together; None: no faults.
+    """Return the faults of the options and the environment together; None: no faults.
 
     Raises:
-        FaultError: something is written wrongly.
+        FaultError: a description or a number is wrong.
     """
     faults = tuple(
         fault
@@ -83,7 +83,7 @@ def _check(faults: tuple[Fault, ...], *, counted: bool) -> None:
 
 
 def _whole(least: int, *given: tuple[str, str | None]) -> int | None:
-    """Return the first number that is given, None if there is none."""
+    """Return the first given number; None if there is none."""
     for where, text in given:
         if text is None:
             continue

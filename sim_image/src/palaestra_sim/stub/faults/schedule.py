@@ -1,8 +1,8 @@
-"""Which faults happen at the k-th event of a life.
+"""The schedule of a life: the faults at its k-th event.
 
-Pure, and a function rather than a stream: the draw for an event is a hash over the seed, the simulator,
-its life, the fault and the event's number. So a draw depends on nothing that was asked before, a fault
-that is added changes no other's, and no two lives of a simulator, nor two simulators of a group, are alike.
+Pure, and a function rather than a stream: the draw for an event is a hash over the seed, the simulator, its
+life, the fault and the event's number. So a draw does not depend on earlier draws, and an additional fault
+changes no other. Two lives of a simulator, or two simulators of a group, have different draws.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _DRAWS = float(256**_DRAW_BYTES)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Life:
-    """What makes the faults of one life its own.
+    """The values that distinguish the faults of one life.
 
     Attributes:
         seed: chosen by a person.
@@ -40,7 +40,7 @@ class Schedule:
     life: Life
 
     def happens(self, fault: Fault, number: int) -> bool:
-        """Say whether `fault` happens at the event of that number, counted from 1."""
+        """Return whether `fault` happens at the event of that number, counted from 1."""
         return fault.trigger.fires(number, self._draw(fault, number, "happens"))
 
     def at(self, event: Event, number: int) -> tuple[Fault, ...]:
@@ -54,7 +54,7 @@ class Schedule:
         return fault.latency_s + fault.jitter_s * self._draw(fault, number, "jitter")
 
     def _draw(self, fault: Fault, number: int, purpose: str) -> float:
-        """Return a number in [0, 1), evenly distributed."""
+        """Return a number in [0, 1), uniformly distributed."""
         life = self.life
         words = (life.seed, life.simulator, life.number, fault.text, number, purpose)
         digest = hashlib.blake2b(repr(words).encode(), digest_size=_DRAW_BYTES).digest()

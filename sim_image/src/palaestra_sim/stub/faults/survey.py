@@ -1,7 +1,6 @@
-"""Which services and topics a world has: its controllers start on nodes that only listen, without a socket.
+"""Find the services and topics of a world: its controllers start on nodes that only record, without sockets.
 
-So a fault that names a path which nobody serves is refused before anything starts, instead of never
-happening.
+So a fault that names a path that does not exist is refused before the start, instead of never happening.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _HASH = re.compile(r"_[0-9a-f]{6}$")  # how generated ROS names end; it differs 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """What a world has.
+    """The services and topics of a world.
 
     Attributes:
         simulator: the name of its first robot, without the part that differs from job to job.
@@ -44,10 +43,10 @@ class Survey:
 
 
 def survey(world_path: Path) -> Survey:
-    """Return what the world in that file has.
+    """Return the services and topics of the world in that file.
 
     Raises:
-        WorldError: the file is wrong, or holds something that the stub cannot simulate.
+        WorldError: the file is wrong, or has something that the stub cannot simulate.
         OSError: it cannot be read.
     """
     nodes: list[_Listener] = []
@@ -68,10 +67,10 @@ def survey(world_path: Path) -> Survey:
 
 
 def begin(ordered: Ordered, world_path: Path) -> Course:
-    """Return the course of a life in which the ordered faults happen to a stub of that world.
+    """Return the course of a life with the given faults for a stub of that world.
 
     Raises:
-        FaultError: a fault is about something that the world does not have.
+        FaultError: a fault names a path that the world does not have.
         WorldError: the world is wrong.
         OSError: it cannot be read.
     """
@@ -82,7 +81,7 @@ def begin(ordered: Ordered, world_path: Path) -> Course:
 
 
 def check(faults: Iterable[Fault], found: Survey) -> None:
-    """Return if every fault is about something that is there.
+    """Check that the paths of every fault exist.
 
     Raises:
         FaultError: the world has no such service or topic.
@@ -99,7 +98,7 @@ def check(faults: Iterable[Fault], found: Survey) -> None:
 
 
 class _Silent:
-    """A publisher with nobody to send to."""
+    """A publisher without subscribers."""
 
     def send(self, fields: Fields) -> None:
         """Send it to nobody."""
@@ -109,7 +108,7 @@ class _Silent:
 
 
 class _Listener:
-    """A node that notes what it is asked to serve."""
+    """A node that records its services and topics."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -119,27 +118,27 @@ class _Listener:
         self.topics: set[str] = set()
 
     def enable_all(self, period_ms: int) -> None:
-        """Enable every sensor, since their topics are there only then; a device that refuses has none."""
+        """Enable every sensor, because only then its topic exists; a device that refuses has none."""
         for path, handler in self.services.items():
             if path.endswith("/enable"):
                 with contextlib.suppress(ServiceFailed):
                     handler(SimpleNamespace(value=period_ms))
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Note a service."""
+        """Record a service."""
         del type_name
         self.services[path] = handler
 
     def advertise(
         self, path: str, type_name: str, *, latched: bool = False, template: Fields | None = None
     ) -> _Silent:
-        """Note a topic."""
+        """Record a topic."""
         del type_name, latched, template
         self.topics.add(path)
         return _Silent()
 
     def withdraw(self, publisher: Any) -> None:
-        """Keep the topic in mind."""
+        """Keep the topic in the record."""
 
     def answer(self, call: Any, fields: Fields) -> None:
         """Answer nobody."""

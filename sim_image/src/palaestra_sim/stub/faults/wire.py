@@ -1,7 +1,7 @@
 """A ROS node whose requests, answers and messages go through the course of faults.
 
-It stands between the links and the node: a link's header has been read, and what follows is passed on,
-changed, put off or forgotten. The node below it is the one that runs without faults.
+It is between the links and the node. After the header of a link, each message is forwarded, changed,
+delayed or dropped. The node below it is the same that runs without faults.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from palaestra_sim.stub.ros.node import RosNode, ServiceEnd
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failing:
-    """What the nodes of one stub share: what goes wrong, and what does it."""
+    """The course and the effects that the nodes of one stub share."""
 
     course: Course
     effects: Effects
 
 
 class FaultyNode(RosNode):
-    """A RosNode that fails as ordered.
+    """A RosNode with injected faults.
 
     Args:
-        loop: where its sockets are watched.
+        loop: watches its sockets.
         name: the node's name and the prefix of its relative paths.
         master_uri: the master.
         failing: shared by all nodes of a stub.
@@ -44,11 +44,11 @@ class FaultyNode(RosNode):
         self._master_lost = False
 
     def lose_master(self) -> None:
-        """Leave the names with the master when this node is closed."""
+        """Keep the names registered at the master when this node is closed."""
         self._master_lost = True
 
     def close(self) -> None:
-        """Close as a RosNode does, without a word to a master that is lost."""
+        """Close like a RosNode, but unregister no names at a lost master."""
         self._failing.course.closed(self.name)
         if self._master_lost:
             self.abandon()
@@ -56,14 +56,14 @@ class FaultyNode(RosNode):
             super().close()
 
     def request(self, end: ServiceEnd, payload: bytes) -> None:
-        """Take a request; while a slow step is under way it waits, as behind any step."""
+        """Take a request; during a slow step it waits, as during any step."""
         if self._held_steps:
             self._waiting.append((end, payload))
         else:
             super().request(end, payload)
 
     def take_waiting(self) -> None:
-        """Handle what waited, unless a slow step is under way."""
+        """Handle the waiting requests, unless a slow step is in progress."""
         if not self._held_steps:
             super().take_waiting()
 
@@ -72,7 +72,7 @@ class FaultyNode(RosNode):
         super().dropped(link.link if isinstance(link, _Answers | _Messages) else link)
 
     def receive(self, path: str, answers: _Answers, pass_on: Callable[[], None]) -> None:
-        """Take a request from a link, and pass it on when and if the course says so."""
+        """Take a request from a link, and forward, delay or drop it by the ruling of the course."""
         ruling = self._failing.course.request(self.name, path)
         if not self._failing.effects.happen(ruling.effects) or ruling.lost:
             return
@@ -111,7 +111,7 @@ class FaultyNode(RosNode):
         return _Requests(self, self._path(name), answers, super()._greet(answers, header))
 
     def _path(self, name: str) -> str:
-        """Return a name as faults call it: below the robot's, or with its leading slash."""
+        """Return a name in the form that faults use: below the robot's, or with a leading slash."""
         return name.removeprefix(f"/{self.name}/")
 
 
@@ -132,7 +132,7 @@ class _Requests:
 
 
 class _Answers:
-    """A client's link, on which the answer to the present request may go out wrong.
+    """A client's link, on which the answer to the current request may be damaged.
 
     Attributes:
         link: the link itself.
@@ -162,7 +162,7 @@ class _Answers:
 
 
 class _Messages:
-    """A subscriber's link, on which messages may be lost, late or wrong.
+    """A subscriber's link, on which messages may be lost, late or damaged.
 
     Attributes:
         link: the link itself.

@@ -1,8 +1,8 @@
-"""The ROS side of the stub: nodes that a client cannot tell from roscpp's, in one loop.
+"""The ROS side of the stub: nodes that behave like roscpp's to clients, in one loop.
 
-rospy gives one node to a process and a thread to each connection; a stub has a node a robot and one hot path.
-So the stub speaks the wire itself: XML-RPC with the master (`master`), connections (`links`), one selector
-loop for everything that moves (`loop`), and names, services and topics on top (`node`).
+rospy has one node in a process and a thread for each connection, but a stub has a node for each robot and one
+hot path. So the stub implements the protocols itself: XML-RPC with the master (`master`), connections
+(`links`), one selector loop for all sockets (`loop`), and names, services and topics (`node`).
 """
 
 from palaestra_sim.stub.ros.loop import Loop

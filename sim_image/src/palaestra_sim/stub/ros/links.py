@@ -16,23 +16,23 @@ from palaestra_sim.stub.ros.loop import Loop
 
 
 class Endpoint(Protocol):
-    """What a connection turns into once its header has been read."""
+    """The receiver of a connection after its header has been read."""
 
     def receive(self, payload: bytes) -> None:
         """Take one frame from the peer."""
         ...
 
     def lost(self) -> None:
-        """Hear that the connection is gone."""
+        """Handle the end of the connection."""
         ...
 
 
 class Connection(Protocol):
-    """What an endpoint sends through: a link, or something before one."""
+    """The connection through which an endpoint sends: a link, or a wrapper of one."""
 
     @property
     def closed(self) -> bool:
-        """Whether nothing can be sent any more."""
+        """Return whether it is closed, so that nothing can be sent."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -40,7 +40,7 @@ class Connection(Protocol):
         ...
 
     def send_newest(self, data: bytes) -> None:
-        """Send `data`, or keep the newest alone while the peer does not read."""
+        """Send `data`; while the peer does not read, keep only the newest."""
         ...
 
     def close(self) -> None:
@@ -49,7 +49,7 @@ class Connection(Protocol):
 
 
 class Refused(Exception):
-    """The header names nothing that is served here; the text goes to the peer."""
+    """The header names a service or topic that is not here; the text is sent to the peer."""
 
 
 Greet = Callable[["Link", Mapping[str, str]], Endpoint]
@@ -82,7 +82,7 @@ class Link:
             self._write(data)
 
     def send_newest(self, data: bytes) -> None:
-        """Send `data`, or, while the peer does not read, keep it in place of what was kept before."""
+        """Send `data`; while the peer does not read, keep it in place of the data kept before."""
         if self._unsent:
             self._newest = data
         else:

@@ -1,7 +1,6 @@
 """One selector loop for every socket and timer of the stub.
 
-Owns waiting. It knows no ROS: links register sockets, the simulator registers moments. Other threads may only
-call `post`.
+It knows no ROS: links register sockets, the simulator registers timers. Other threads may only call `post`.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from collections.abc import Callable
 Callback = Callable[[], None]
 _File = int | socket.socket
 
-# Being woken costs a virtual machine 30 us, more than the answer to a request. So where the last waits were
-# all short, the next one first looks a few times, and lets others run in between. One longer wait in every
-# step is enough not to look at all: looks in vain take a processor from the simulators beside this one.
+# In a virtual machine a wake-up costs 30 us, more than the answer to a request. So if all of the last waits
+# were short, the loop polls a few times before it waits, and yields the processor in between. One longer wait
+# in every step is enough to stop polling, because polls in vain take a processor from other simulators.
 _QUICK_S = 200e-6
 _STREAK = 10  # waits; a trainer's step has fewer
 _LOOKS = 30
@@ -35,7 +34,7 @@ _NEAR_S = 10e-3
 
 
 class Loop:
-    """Runs callbacks when sockets are ready, moments have come, or other threads posted."""
+    """Runs callbacks when sockets are ready, timers are due, or other threads posted some."""
 
     def __init__(self) -> None:
         self._epoll = select.epoll()
@@ -71,7 +70,7 @@ class Loop:
     def post(self, callback: Callback) -> None:
         """Call `callback` in the loop's thread; the one method for other threads and signal handlers."""
         self._posted.append(callback)
-        # A full pipe means that a wake-up is on its way already.
+        # If the pipe is full, a wake-up is already pending.
         with contextlib.suppress(BlockingIOError):
             os.write(self._wake_write, b"\0")
 
@@ -89,14 +88,14 @@ class Loop:
         self._running = True
         while self._running:
             for number, _ in self._ready():
-                # One that was ready may have been forgotten by one before it.
+                # An earlier callback may have stopped the watch of this file.
                 if (ready := self._watched.get(number)) is not None:
                     ready()
             while self._timers and self._timers[0][0] <= time.monotonic():
                 heapq.heappop(self._timers)[2]()
 
     def close(self) -> None:
-        """Close what the loop itself opened; signals end no wait any more."""
+        """Close the loop's own files; signals no longer end a wait."""
         if self._wakes_on_signals:
             signal.set_wakeup_fd(-1)
         self._epoll.close()
@@ -104,7 +103,7 @@ class Loop:
         os.close(self._wake_write)
 
     def _ready(self) -> list[tuple[int, int]]:
-        """Return what is ready, after a wait; where a short one is to be expected, look a few times first."""
+        """Return the ready files after a wait; if a short one is expected, poll a few times first."""
         wait_s = self._wait_s()
         if wait_s == 0.0:
             return self._epoll.poll(0, _EVENTS)
@@ -116,7 +115,7 @@ class Loop:
         return ready
 
     def _look(self) -> list[tuple[int, int]]:
-        """Return what is ready, after a few looks; nothing, if it takes longer."""
+        """Return the ready files after a few polls; none if it takes longer."""
         for _ in range(_LOOKS):
             if ready := self._epoll.poll(0, _EVENTS):
                 return ready

@@ -1,7 +1,7 @@
 """The XML-RPC side of a node: its calls to the ROS master, and the slave API that others call.
 
 Source: http://wiki.ros.org/ROS/Master_API and http://wiki.ros.org/ROS/Slave_API
-The slave API runs in a thread of its own, since nothing in it is hot, and hands all work to the loop.
+The slave API runs in a thread of its own, because it is used rarely, and passes all work to the loop.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class _Transport(xmlrpc.client.Transport):
 
 
 class Master:
-    """The master, as one node sees it.
+    """The master, for the calls of one node.
 
     Args:
         uri: its address, e.g. http://localhost:11311
@@ -60,7 +60,7 @@ class Master:
         """Return the value of a call in the node's name.
 
         Raises:
-            MasterUnreachable: no answer, or none that is one.
+            MasterUnreachable: no answer, or an invalid one.
         """
         try:
             code, text, value = getattr(self._proxy, method)(self._node, *arguments)
@@ -91,7 +91,7 @@ class SlaveApi:
         host: the name under which others reach this machine.
         has_topic: whether the node publishes a topic of that full name.
         tcpros_port: where the node's TCPROS listener is.
-        on_shutdown: called, in another thread, when the master asks the node to end.
+        on_shutdown: called in another thread when the master asks the node to end.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """A ROS node: services that answer and topics that publish, under one name.
 
-The interface that the simulated robot's controller is written against. A handler gets the decoded request and
-returns the fields of the response; `LATER` when it will call `answer`, as a step does that waits for another
-robot or for the end of a pause.
+The robot's controller uses this interface. A handler gets the decoded request and returns the fields of the
+response. It returns `LATER` if it will call `answer` itself, like a step that waits for another robot or
+for the end of a pause.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _BACKLOG = 128
 
 
 class ServiceFailed(Exception):
-    """The service cannot answer; the client sees the text as a ServiceException."""
+    """The service cannot answer; the client gets the text as a ServiceException."""
 
 
 class RosNode:
-    """One node: serves, advertises, and is known to the master between `start` and `close`.
+    """One node with its services and topics, registered at the master from `start` to `close`.
 
     Args:
-        loop: where its sockets are watched.
+        loop: watches its sockets.
         name: the node's name and the prefix of its relative paths, e.g. "robotino".
         master_uri: the master, e.g. http://localhost:11311
     """
@@ -125,12 +125,12 @@ class RosNode:
             end.handle(payload)
 
     def close(self) -> None:
-        """Unregister, as a controller that ends in good order does, and close every socket."""
+        """Unregister all names, like a controller that exits normally, and close every socket."""
         self.unregister()
         self.abandon()
 
     def unregister(self) -> None:
-        """Let the master forget every service and topic; connections stay."""
+        """Unregister every service and topic at the master; connections stay open."""
         # A master that is gone has forgotten us already.
         with contextlib.suppress(MasterUnreachable):
             for name in self._services:
@@ -139,7 +139,7 @@ class RosNode:
                 self._master.call("unregisterPublisher", name, self._slave.uri)
 
     def abandon(self) -> None:
-        """Close every socket without a word to the master, as a controller that was killed."""
+        """Close every socket without unregistering, like a controller that was killed."""
         self._loop.forget(self._listener)
         self._listener.close()
         for link in list(self._links):
@@ -148,15 +148,15 @@ class RosNode:
         self._master.close()
 
     def check_master(self) -> None:
-        """Ask the master for a sign of life.
+        """Check that the master answers.
 
         Raises:
-            MasterUnreachable: there is none.
+            MasterUnreachable: it does not.
         """
         self._master.call("getPid")
 
     def on_end(self, callback: Callable[[str], None]) -> None:
-        """Set what is called with the reason when this node is asked to end.
+        """Set the function to call with the reason when this node is asked to end.
 
         `rosnode kill` asks, and so does the master when a newer node registers with its name.
         """
@@ -169,7 +169,7 @@ class RosNode:
         try:
             connection, _ = self._listener.accept()
         except OSError:
-            return  # the peer was gone before we looked
+            return  # the peer has disconnected already
         self._links.add(Link(self._loop, connection, self._greet))
 
     def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
@@ -245,7 +245,7 @@ class ServiceEnd:
         self._node.request(self, payload)
 
     def handle(self, payload: bytes) -> None:
-        """Have a request handled, and answer it, or let the handler do so later."""
+        """Handle a request, and answer it, unless the handler answers later."""
         self._node.current_call = self
         try:
             fields = self._handler(self._service.request.decode(payload))

@@ -60,7 +60,7 @@ class _SubscriberEnd:
         self._dropped = dropped
 
     def receive(self, payload: bytes) -> None:
-        """Ignore it: a subscriber has nothing to say after its header."""
+        """Ignore it: a subscriber sends nothing after its header."""
 
     def lost(self) -> None:
         self._topic.links.remove(self._link)
@@ -88,7 +88,7 @@ class Publisher:
     def send_value(self, value: Any, stamp_ns: int | None = None) -> None:
         """Send a stamped message whose last field is `value`, the rest as in the template.
 
-        Without a subscriber it is none, and is not counted.
+        Without a subscriber no message is sent or counted.
 
         Args:
             value: the reading, or a tuple of the numbers of the last field.

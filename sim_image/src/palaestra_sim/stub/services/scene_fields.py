@@ -22,7 +22,7 @@ Fields = dict[str, Any]
 
 
 class _Codec(NamedTuple):
-    """How values of a type travel: to the wire, from the wire, and what stands for none."""
+    """The conversion of a type's values: to a message, from a message, and the value for none."""
 
     type: FieldType
     write: Callable[[Any], Any]
@@ -38,7 +38,7 @@ def _rotation_out(value: tuple[float, float, float, float]) -> Fields:
     return dict(zip("xyzw", axis_angle_to_quaternion(value), strict=True))
 
 
-def _colour_out(value: tuple[float, ...]) -> Fields:
+def _color_out(value: tuple[float, ...]) -> Fields:
     return {"r": value[0], "g": value[1], "b": value[2], "a": 1.0}
 
 
@@ -51,7 +51,7 @@ _CODECS: Final = {
     "rotation": _Codec(
         FieldType.ROTATION, _rotation_out, lambda q: quaternion_to_axis_angle(q.x, q.y, q.z, q.w)
     ),
-    "color": _Codec(FieldType.COLOR, _colour_out, lambda c: (c.r, c.g, c.b)),
+    "color": _Codec(FieldType.COLOR, _color_out, lambda c: (c.r, c.g, c.b)),
     "string": _Codec(FieldType.STRING, str, str, ""),
 }
 

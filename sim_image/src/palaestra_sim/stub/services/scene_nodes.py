@@ -128,7 +128,7 @@ class NodeServices:
         }
 
     def _get_center_of_mass(self, request: Any) -> Fields:
-        """Answer the middle of the node: nothing has a mass here."""
+        """Answer the origin of the node, because nothing has a mass here."""
         return {"centerOfMass": _point(_place(self._node(request)).world_position)}
 
     def _get_static_balance(self, request: Any) -> Fields:
@@ -187,13 +187,13 @@ class NodeServices:
         return {"success": int(node.robot is not None)}
 
     def _accept(self, request: Any) -> Fields:
-        """Take a hint that changes nothing but how fast Webots would answer, or what it draws."""
+        """Accept a hint that affects only the speed of Webots' answers, or its drawing."""
         self._node(request)
         return {"success": 1}
 
 
 def _pose(node: SceneNode) -> Pose:
-    """Return where a node is in the world, and how it is turned."""
+    """Return the pose of a node in the world."""
     return _place(node).world_pose
 
 
