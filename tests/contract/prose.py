@@ -13,6 +13,7 @@ import sys
 import tokenize
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 MOST_WORDS = 35
@@ -136,11 +137,26 @@ def is_message(text: str) -> bool:
 
 
 def of_docstring(line: int, text: str) -> Iterator[Paragraph]:
-    """Yield the paragraphs of a docstring, at their lines; the headings of its sections are none."""
-    yield from (
-        (line + number - 1, paragraph)
-        for number, paragraph in of_markdown(re.sub(r"^\s*\w+:$", "", text, flags=re.MULTILINE))
-    )
+    """Yield the paragraphs of a docstring, at their lines; headings of sections and blocks are none."""
+    prose = re.sub(r"^\s*\w+:$", "", without_blocks(text), flags=re.MULTILINE)
+    yield from ((line + number - 1, paragraph) for number, paragraph in of_markdown(prose))
+
+
+def without_blocks(docstring: str) -> str:
+    """Return a docstring whose blocks of code or tables, indented after an empty line, are empty lines."""
+    lines = docstring.split("\n")
+    margin = min((indent(line) for line in lines[1:] if line.strip()), default=0)
+    kept, inside = lines[:1], False
+    for before, line in pairwise(lines):
+        begins = inside or not before.strip()
+        inside = begins and indent(line) >= margin + 4 if line.strip() else inside
+        kept.append("" if inside else line)
+    return "\n".join(kept)
+
+
+def indent(line: str) -> int:
+    """Return how many blanks a line begins with."""
+    return len(line) - len(line.lstrip())
 
 
 def of_comments(text: str) -> Iterator[Paragraph]:
