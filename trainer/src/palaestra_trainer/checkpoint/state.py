@@ -53,7 +53,7 @@ class State:
         rollout: what else is counted amid an episode, as JSON data; the conductor's own.
         noise: matrices of state-dependent exploration, which are drawn before a boundary; none without it.
         targets: what a rollout changes of the networks, copied; never written, since it is part of the model.
-        scales: what is known of observations and rewards, where they are normalized; never written, as above.
+        scales: statistics of observations and rewards, if they are normalized; never written, as above.
         running_returns: for each member the discounted reward of its episode so far, where that is needed.
     """
 

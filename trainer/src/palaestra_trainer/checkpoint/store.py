@@ -162,7 +162,7 @@ def _put_in_place(draft: Path) -> Path:
 
 
 def tidy(folder: Path) -> None:
-    """Finish or take back what a kill interrupted; for whoever writes there."""
+    """Finish or undo a write that a kill interrupted; call it before writing to the folder."""
     for draft in folder.glob(".*.draft"):
         shutil.rmtree(draft, ignore_errors=True)
     for replaced in folder.glob(".*.replaced"):

@@ -1,7 +1,7 @@
 """A model's tensors, in the zip of Stable-Baselines3, of which nothing is unpickled.
 
-Where a model normalizes, the zip has one more member: what it knows of observations and rewards, as JSON, so
-that whoever has the file has a policy that can be used. Stable-Baselines3 reads such a zip like any other.
+If a model normalizes, the zip has one more member: the statistics of observations and rewards, as JSON. So
+the file alone is a usable policy. Stable-Baselines3 reads such a zip like any other.
 """
 
 from __future__ import annotations

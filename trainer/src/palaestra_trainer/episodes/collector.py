@@ -1,12 +1,12 @@
 """One row of a vector step: a member that plays episode after episode.
 
-Translates gymnasium's step into the row that Stable-Baselines3 expects (reset
-in the same step, `terminal_observation`, `TimeLimit.truncated`, Monitor's
-`episode`) and a fault into invalid rows (`info["valid"]` False), so that nobody
-waits for the member that broke: the row of the fault ends the episode (done,
-truncated, `info["sim_fault"]`), those that follow say `info["recovering"]`, and
-the last of them is done again, with the first observation of the next episode.
-It is False, and no last one comes, once the member was given up.
+Translates gymnasium's step into the row that Stable-Baselines3 expects: reset in the same step,
+`terminal_observation`, `TimeLimit.truncated`, Monitor's `episode`.
+
+Translates a fault into invalid rows (`info["valid"]` False), so that the others need not wait for the broken
+member. The row of the fault ends the episode (done, truncated, `info["sim_fault"]`). The rows after it have
+`info["recovering"]` True. The last of them has `done=True` and the first observation of the next episode.
+After a member was given up, `info["recovering"]` is False, and no last row follows.
 """
 
 from __future__ import annotations

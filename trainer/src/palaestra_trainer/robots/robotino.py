@@ -85,7 +85,7 @@ class Robotino(RobotinoAbc):
             WorldMisfit: the world lacks the robot's node, or the robot a device of a Robotino.
             SimulatorDead, SimulatorHung, WrongData
         """
-        self.close()  # what is left of connections to a simulator before this one
+        self.close()  # connections to the simulator before this one
         self._observer.forget_handles()
         self.simulation.connect()
 
@@ -130,7 +130,7 @@ class Robotino(RobotinoAbc):
 
 
 class RobotinoScene:
-    """What is arranged around a simulated Robotino. Each start of the simulator looks for the mark.
+    """The scene around a simulated Robotino. Each start of the simulator looks for the mark.
 
     Args:
         webots: the simulator.

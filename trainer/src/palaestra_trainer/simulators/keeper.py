@@ -32,7 +32,7 @@ from palaestra_trainer.waiting.turns import away_s, let_others
 log = structlog.get_logger(__name__)
 
 LOOK_EVERY_S = 0.1
-# A try that is told to fail ends at once, unless it waits for somebody who does not answer.
+# A canceled try ends at once, unless it waits for a program that does not answer.
 SETTLE_S = 10.0
 # A simulator that dies every two dozen resets is recycled every few seconds, all night.
 LOG_RECYCLING_EVERY_S = 60.0
@@ -43,7 +43,7 @@ class Keeper:
 
     Attributes:
         member: the member it looks after; hands off while the keeper is `busy`.
-        watcher: is told of every fault and restart.
+        watcher: notified of every fault and restart.
         group: the simulators that the member is one of.
         tried: whether it has been tried to start the member.
         lost: whether the member was given up, since the others of its group are enough.
