@@ -5,7 +5,7 @@
     │   └── WorldRefusedError   it has several mistakes; the message lists them all
     ├── UnknownWorldError       no shipped world has that name: retrying cannot help
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
-    ├── SidecarError            the sidecar cannot run as asked (sidecar.errors)
+    ├── SidecarError            the sidecar cannot run as requested: retrying cannot help
     ├── FaultError              the description of a fault is wrong (stub.faults.language)
     ├── NoSuchHandleError       this load of the world has no such node (stub.tree)
     ├── NoValueError            a field has no such value (stub.fields)
@@ -94,3 +94,7 @@ class UnknownWorldError(SimError, LookupError):
 
 class ForeignPackageError(SimError, FileExistsError):
     """The folder for the package webots_ros has one that Palaestra did not write."""
+
+
+class SidecarError(SimError, ValueError):
+    """The sidecar cannot run as requested. Nothing was started, and retrying cannot help."""

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.drivers import Driver, Launch, command
-from palaestra_sim.sidecar.errors import SidecarError
 
 WORLD = Path("/worlds/collect-0.wbt")
 

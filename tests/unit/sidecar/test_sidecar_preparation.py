@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 
 from palaestra_protocol.control import RobotName
-from palaestra_sim.errors import WorldError
+from palaestra_sim.errors import SidecarError, WorldError
 from palaestra_sim.sidecar import preparation
-from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.world import RunIdentity, builtin, ros_name
 
 ARENA = builtin("arena")

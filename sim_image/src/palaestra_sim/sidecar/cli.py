@@ -14,10 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from palaestra_protocol.control import SidecarState, SimulatorState
-from palaestra_sim.errors import SimError
+from palaestra_sim.errors import SidecarError, SimError
 from palaestra_sim.sidecar import metrics, preparation, signals
 from palaestra_sim.sidecar.drivers import Driver, Launch, command
-from palaestra_sim.sidecar.errors import SidecarError
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
 from palaestra_sim.sidecar.server import bound, control_routes, health_routes

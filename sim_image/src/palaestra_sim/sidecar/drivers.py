@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from palaestra_sim.sidecar.errors import SidecarError
+from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.process import Command
 
 WORLD = "{world}"  # in a command: the path of the world

@@ -11,8 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from palaestra_protocol.control import RobotName
-from palaestra_sim.errors import WorldError
-from palaestra_sim.sidecar.errors import SidecarError
+from palaestra_sim.errors import SidecarError, WorldError
 from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots
 
 SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby

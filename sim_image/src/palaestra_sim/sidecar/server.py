@@ -20,7 +20,7 @@ from palaestra_protocol.http import (
     json_response,
     probe_response,
 )
-from palaestra_sim.sidecar.errors import SidecarError
+from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.lifecycle import Event
 from palaestra_sim.sidecar.simulator import Answer, NoAnswer, Simulator
 
