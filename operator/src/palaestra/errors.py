@@ -3,7 +3,7 @@
     PalaestraError
     ├── TrainingJobError             a TrainingJob cannot be used as it stands
     │   ├── SpecErrors               its spec is wrong: never retried
-    │   └── PlanError                no plan can be made of it (plan.errors)
+    │   └── PlanError                no plan can be made of it
     ├── LocalError                   the local runner cannot go on (local.errors)
     │   ├── Refused                  the run cannot be started as asked
     │   ├── StartFailed              a container that others wait for did not start
@@ -60,3 +60,7 @@ class SpecErrors(TrainingJobError, ValueError):
         super().__init__("\n".join(problems))
         self.name = name
         self.problems = problems
+
+
+class PlanError(TrainingJobError, ValueError):
+    """The job cannot be planned in this layout; the message is `<field>: <fact>; <remedy>`."""

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from palaestra.cluster import Limits, connect
-from palaestra.cluster.backoff import Backoff
+from palaestra.cluster.limits import Backoff
 from palaestra.cluster.resources import NAMESPACES
 from tests.integration.apiserver.server import serving
 

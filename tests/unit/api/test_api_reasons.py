@@ -5,7 +5,7 @@ import string
 
 import pytest
 
-from palaestra.api.reason_table import page, table
+from palaestra.api.generated import reasons_page, reasons_table
 from palaestra.api.reasons import LONGEST_MESSAGE, ROWS, Reason, say
 
 
@@ -51,12 +51,12 @@ def test_operations_has_a_row_for_each_reason(repository) -> None:
     """A reader of a status looks up its reason there and finds what to do."""
     text = (repository / "docs" / "operations.md").read_text()
 
-    assert table() in text
-    assert page(text) == text
+    assert reasons_table() in text
+    assert reasons_page(text) == text
     assert all(f"| {reason} |" in text for reason in Reason)
 
 
 def test_a_page_without_its_marks_raises_an_error() -> None:
     """A table that is silently left out would not be noticed."""
     with pytest.raises(ValueError, match=r"no <!-- generated from the reasons.*; put both in"):
-        page("# Operations")
+        reasons_page("# Operations")

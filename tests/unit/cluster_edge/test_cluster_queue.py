@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from palaestra.cluster import WorkQueue
-from palaestra.cluster.backoff import Backoff
+from palaestra.cluster.limits import Backoff
 
 KEYS = st.sampled_from("abc")
 

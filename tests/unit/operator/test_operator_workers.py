@@ -8,7 +8,7 @@ from prometheus_client import CollectorRegistry, Histogram
 
 from palaestra.api.reasons import Reason
 from palaestra.cluster import Conflict, WorkQueue
-from palaestra.cluster.backoff import Backoff
+from palaestra.cluster.limits import Backoff
 from palaestra.decide import Replace, SetSuspend, Stop
 from palaestra.decide.decision import Basis
 from palaestra.operator.acting import Acting

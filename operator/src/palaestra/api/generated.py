@@ -1,12 +1,14 @@
-"""The files of the repository that are made from the models, as they should be."""
+"""The files of the repository that are generated from the models and the reasons."""
 
 from pathlib import Path
 
 from palaestra.api.crd import crd
-from palaestra.api.reason_table import page as reasons_page
+from palaestra.api.marks import between_marks
+from palaestra.api.reasons import ROWS
 from palaestra.api.reference import page
 from palaestra.api.yaml_text import write
 
+REASONS = "<!-- generated from the reasons: palaestra.api.generated -->"
 _HEADER = "# Generated from operator/src/palaestra/api by `make golden`; edit the models instead.\n"
 
 
@@ -27,3 +29,21 @@ def generated_files(root: Path) -> dict[str, str]:
         reference: page((root / reference).read_text(encoding="utf-8")),
         operations: reasons_page((root / operations).read_text(encoding="utf-8")),
     }
+
+
+def reasons_page(text: str) -> str:
+    """Return docs/operations.md, whose old text is `text`, with a new table of reasons.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    return between_marks(text, REASONS, reasons_table())
+
+
+def reasons_table() -> str:
+    """Return the table with a row for each reason: type of its event, meaning, remedy."""
+    rows = (
+        f"| {reason} | {'Warning' if row.warning else 'Normal'} | {row.meaning} | {row.remedy} |"
+        for reason, row in ROWS.items()
+    )
+    return "\n".join(("| reason | event | what it means | what to do |", "|---|---|---|---|", *rows, ""))

@@ -12,7 +12,7 @@ from palaestra.api.status import TERMINAL, Phase
 from palaestra.cli.cluster import REFUSED, cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client, why
-from palaestra.client.reading import current
+from palaestra.client.waiting import current
 from palaestra.view import History, live, progress
 from palaestra_protocol.numbers import seconds
 

@@ -25,7 +25,7 @@ from palaestra.client.errors import (
     TookTooLong,
 )
 from palaestra.client.happenings import Happening
-from palaestra.client.reading import why
+from palaestra.client.waiting import why
 
 __all__ = [
     "Client",

@@ -15,8 +15,7 @@ from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob, QueueDecid
 from palaestra.client.fetching import fetch
 from palaestra.client.following import changes
 from palaestra.client.happenings import Happening, happenings
-from palaestra.client.reading import current, why
-from palaestra.client.waiting import News
+from palaestra.client.waiting import News, current, why
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
 from palaestra.cluster.resources import TRAINING_JOBS
 from palaestra.errors import SpecErrors

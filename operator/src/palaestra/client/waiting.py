@@ -1,10 +1,11 @@
-"""The progress of a job as lines of text: its phases, and why replicas wait."""
+"""What a command reads in a status while it waits: progress as lines of text, and the reason of the phase."""
 
 import re
 from collections.abc import Iterator
 
+from palaestra.api import TrainingJob
 from palaestra.api.reasons import ROWS, Reason
-from palaestra.api.status import TERMINAL, ReplicaStatus, Status
+from palaestra.api.status import TERMINAL, ConditionStatus, ReplicaStatus, Status
 
 _NUMBERS = re.compile(r"\d+")
 
@@ -32,6 +33,23 @@ class News:
             if change not in self._reported:
                 self._reported.add(change)
                 yield f"{self._name}: {_line(replica)}"
+
+
+def current(job: TrainingJob) -> bool:
+    """Return whether the status is about the newest spec."""
+    return job.status.observed_generation == job.metadata.generation
+
+
+def why(status: Status) -> str:
+    """Return reason and message of the condition of the phase; empty if there is none."""
+    for condition in status.conditions:
+        if (
+            status.phase
+            and condition.type.value == status.phase.value
+            and condition.status is ConditionStatus.TRUE
+        ):
+            return f"{condition.reason}: {condition.message}"
+    return ""
 
 
 def _waits(replica: ReplicaStatus) -> bool:

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
-from palaestra.cluster.backoff import Backoff
+from palaestra.cluster.limits import Backoff
 
 Item = TypeVar("Item", bound=Hashable)
 RETRY = Backoff(first_s=0.1, cap_s=60.0)  # with its jitter: 0.05 s to 60 s

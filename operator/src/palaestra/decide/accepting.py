@@ -19,7 +19,7 @@ from palaestra.decide.conditions import (
 from palaestra.decide.decision import Decision
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import happening, of_actions, of_change
-from palaestra.decide.moments import first_of, seconds_to, whole
+from palaestra.decide.times import first_of, seconds_to, whole
 from palaestra.errors import SpecErrors, TrainingJobError
 from palaestra.observe.reading import count, part, text
 

@@ -22,14 +22,13 @@ from palaestra.decide.edits import edits
 from palaestra.decide.ending import expired, expires
 from palaestra.decide.happenings import of_actions, of_change
 from palaestra.decide.judging import Course
-from palaestra.decide.moments import first_of, seconds_to, whole
 from palaestra.decide.preparing import Prepared
 from palaestra.decide.remembering import late_word
 from palaestra.decide.replicas import Decided, decided
 from palaestra.decide.situation import Situation, Verdict
 from palaestra.decide.summary import active, as_first, columns, standing, started
 from palaestra.decide.suspending import seen_generation
-from palaestra.decide.times import Record, Times
+from palaestra.decide.times import Record, Times, first_of, seconds_to, whole
 from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import Observed, ReplicaObserved
 

@@ -4,7 +4,7 @@ from datetime import datetime
 
 from palaestra.api.status import TERMINAL, Status
 from palaestra.decide.decision import Delete
-from palaestra.decide.moments import after, seconds_between
+from palaestra.decide.times import after, seconds_between
 
 
 def expires(status: Status, ttl_s: int | None) -> datetime | None:

@@ -15,9 +15,8 @@ from palaestra.api.status import (
     SimulatorStatus,
     SuccessInterval,
 )
-from palaestra.decide.moments import after
 from palaestra.decide.situation import Situation
-from palaestra.decide.times import Wait
+from palaestra.decide.times import Wait, after
 from palaestra.observe.reading import MOST_COUNT, as_time
 from palaestra_protocol.control import SidecarState
 from palaestra_protocol.pod import status as protocol

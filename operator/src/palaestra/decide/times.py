@@ -3,12 +3,13 @@
 Clocks differ: a node's may be minutes off, and the operator's own may be set. So a wait is measured on this
 process's monotonic clock, from the reconcile that first found it. After a restart or with a new leader every
 wait begins again, so it gets longer, never shorter. The wall clock is for the times in a status. Only the
-time to live is measured by it, from a time that the operator wrote.
+time to live is measured by it, from a time that the operator wrote. A status has whole seconds, so
+decisions do too.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 
 from palaestra.decide.conditions import Explanation
 
@@ -84,3 +85,28 @@ class Times:
         record = self.record
         elapsed_s = 0.0 if record.active_at_s is None else self.clock_s - record.active_at_s
         return max(float(written_s), record.active_s + elapsed_s)
+
+
+def whole(at: datetime) -> datetime:
+    """Return a time with a time zone in UTC and whole seconds, as a status holds it."""
+    return at.astimezone(UTC).replace(microsecond=0)
+
+
+def after(at: datetime, seconds: float) -> datetime:
+    """Return the moment `seconds` after `at`."""
+    return at + timedelta(seconds=seconds)
+
+
+def seconds_between(before: datetime, later: datetime) -> int:
+    """Return the whole seconds from one moment to a later one, 0 where it is not later."""
+    return max(int((later - before).total_seconds()), 0)
+
+
+def seconds_to(at: datetime | None, now: datetime) -> float | None:
+    """Return the seconds from `now` to `at`; None where there is no such moment."""
+    return None if at is None else (at - now).total_seconds()
+
+
+def first_of(waits_s: Iterable[float | None]) -> float | None:
+    """Return the seconds until the first of some waits is over; None: none goes on."""
+    return min((waits_ for waits_ in waits_s if waits_ is not None and waits_ > 0), default=None)

@@ -10,10 +10,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from palaestra.api import TrainingJob
+from palaestra.errors import PlanError
 from palaestra.objects import Object
 from palaestra.plan.claim import claim
 from palaestra.plan.config_map import config_map
-from palaestra.plan.errors import PlanError
 from palaestra.plan.job import job as replica_job
 from palaestra.plan.layout import ClusterLayout, Images, Layout, LocalLayout, Places, Ports
 from palaestra.plan.network_policy import network_policy

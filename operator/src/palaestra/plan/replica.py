@@ -7,7 +7,7 @@ objects again and is refused by the API server.
 from dataclasses import dataclass
 
 from palaestra.api import SimulatorGroup, TrainingJob
-from palaestra.plan.errors import PlanError
+from palaestra.errors import PlanError
 from palaestra.plan.layout import Layout, Places
 from palaestra_sim.world import RunIdentity
 

@@ -8,7 +8,7 @@ lie in the image, and are left to the sidecar altogether.
 from collections.abc import Mapping
 
 from palaestra.api import SimulatorGroup, TrainingJob, World
-from palaestra.plan.errors import PlanError
+from palaestra.errors import PlanError
 from palaestra.plan.replica import Replica, Simulator
 from palaestra_sim.world import builtin, check, generate
 

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra.cluster.backoff import Backoff
+from palaestra.cluster.limits import Backoff
 from palaestra.cluster.queue import RETRY
 
 chances = st.floats(min_value=0, max_value=1, exclude_max=True)
