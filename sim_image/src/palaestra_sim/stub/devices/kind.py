@@ -84,7 +84,7 @@ class Carrier(Protocol):
 
     body: Body | None
 
-    def gauss(self, mean: float, deviation: float) -> float:
+    def gauss(self, mean: float, deviation: float, /) -> float:
         """Return the next number of the robot's own noise."""
         ...
 
