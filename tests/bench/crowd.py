@@ -9,7 +9,7 @@ import yaml
 
 from palaestra.api import validate
 from palaestra.cluster import Resource
-from palaestra.cluster.resources import JOBS, TRAINING_JOBS, of
+from palaestra.cluster.resources import JOBS, TRAINING_JOBS, resource_of
 from palaestra.plan import ClusterLayout, Images, identified, plan
 from tests.integration.operator.installed import asked
 from tests.waiting import eventually
@@ -41,7 +41,7 @@ def create_all_objects(api, namespace, count):
 
     def create(name):
         for obj in renamed(template, name):
-            api.create(of(obj), obj)
+            api.create(resource_of(obj), obj)
 
     in_parallel(create, names(count))
 

@@ -24,7 +24,7 @@ GIVEN_UP = {
 @pytest.mark.beside
 @pytest.mark.parametrize("name", GIVEN_UP)
 def test_a_trainer_that_says_so_is_not_tried_again(name, namespace, job):
-    """Wrong configuration, spent fault budget, diverged: a second pod would come to the same."""
+    """Wrong configuration, spent restart budget, diverged: a second pod would come to the same."""
     code, reason = GIVEN_UP[name]
 
     namespace.apply(job(name, script=f"exit {code}"))

@@ -97,7 +97,7 @@ def _restarts() -> Panel:
 
 def _budget() -> Panel:
     return Panel(
-        question="How much of the fault budget is spent?",
+        question="How much of the restart budget is spent?",
         says=(
             "Restarts after faults within restart.withinSeconds, by restart.limit. At 1 the next fault gives "
             "the simulator up, and may end the run. Above 0.7 it is an alert: find the cause of the faults."

@@ -139,7 +139,7 @@ def _ignored_around_us():
 
 
 def test_a_simulator_gets_none_of_our_files(sidecar) -> None:
-    """With the keeper's pipe in its hands it would hold itself alive."""
+    """With the reaper's pipe in its hands it would hold itself alive."""
     it = sidecar(["sh", "-c", "for fd in /proc/$$/fd/*; do readlink $fd; done; echo up; sleep 60"])
 
     it.start()

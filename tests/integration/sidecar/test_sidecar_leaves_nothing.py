@@ -9,7 +9,7 @@ import subprocess
 import pytest
 
 from palaestra_protocol.control import LastExit, SidecarState
-from palaestra_sim.sidecar.keeper import children
+from palaestra_sim.sidecar.reaper import children
 from palaestra_sim.sidecar.signals import SHUTDOWN_S
 from palaestra_sim.sidecar.simulator import SHUTDOWN_GRACE_S
 from tests.integration.sidecar.conftest import DEADLINE_S, ENDS
@@ -31,7 +31,7 @@ def test_a_simulator_takes_its_family_along(sidecar, family, left, eventually_tr
     """A child that left group, session, parent and environment is found as well as one that stayed."""
     it = sidecar(family)
     it.start()
-    eventually_true(lambda: len(left()) == 6)  # sidecar, keeper, simulator, and three more
+    eventually_true(lambda: len(left()) == 6)  # sidecar, reaper, simulator, and three more
 
     it.request("/stop", {"deadline_s": 0})
     it.until(SidecarState.IDLE)
@@ -96,7 +96,7 @@ def test_a_simulator_gets_the_chance_to_end_by_itself(sidecar, ends) -> None:
 
 @pytest.mark.parametrize("what", ["waits", "stubborn", "family"])
 def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_true, what) -> None:
-    """SIGKILL gives it no time to say anything: the keeper sees the end of its pipe."""
+    """SIGKILL gives it no time to say anything: the reaper sees the end of its pipe."""
     it = sidecar(request.getfixturevalue(what))
     it.start()
 
@@ -104,16 +104,16 @@ def test_a_killed_sidecar_leaves_no_process(sidecar, request, left, eventually_t
     eventually_true(lambda: not left())
 
 
-def test_a_killed_keeper_is_a_fault_and_leaves_no_process(sidecar, family, left, eventually_true) -> None:
+def test_a_killed_reaper_is_a_fault_and_leaves_no_process(sidecar, family, left, eventually_true) -> None:
     """What it held becomes the sidecar's own, which ends it and can start again."""
     it = sidecar(family)
     it.start()
-    (keeper,) = children({it.process.pid})
+    (reaper,) = children({it.process.pid})
 
-    os.kill(keeper, signal.SIGKILL)
+    os.kill(reaper, signal.SIGKILL)
     failed = it.until(SidecarState.FAILED)
 
-    assert failed.detail.startswith("the simulator ended: its keeper ended before it")
+    assert failed.detail.startswith("the simulator ended: its reaper ended before it")
     eventually_true(lambda: left() == {it.process.pid})
     assert it.start().starts == 2
 

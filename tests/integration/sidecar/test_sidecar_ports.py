@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_protocol.control import SidecarState
-from palaestra_sim.sidecar.keeper import children
+from palaestra_sim.sidecar.reaper import children
 
 BUSY = """
 import os, signal, time
@@ -184,7 +184,7 @@ def test_a_port_in_use_is_one_clear_line_and_nothing_is_started(sidecar, argumen
 
 
 def test_a_sidecar_is_small(sidecar, family) -> None:
-    """Under 40 MB with its keeper, so that a laptop and a node take many."""
+    """Under 40 MB with its reaper, so that a laptop and a node take many."""
     it = sidecar(family)
     it.start()
     it.ask("GET", "/metrics", address=it.health)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
-from palaestra_sim.sidecar.keeper import children
+from palaestra_sim.sidecar.reaper import children
 from palaestra_sim.world import RunIdentity, robots, ros_name
 from tests.integration.sidecar.conftest import ENDS, was_seen
 
@@ -104,20 +104,20 @@ def test_one_that_dies_is_no_matter_of_the_other(two, waits, broken, whole) -> N
     assert (it.state(whole).starts, it.state(whole).faults, it.state(whole).pid) == (1, 0, other)
 
 
-def test_a_killed_keeper_takes_its_own_simulator_along_and_no_other(
+def test_a_killed_reaper_takes_its_own_simulator_along_and_no_other(
     two, family, left, eventually_true
 ) -> None:
-    """What it leaves becomes the sidecar's child, as the other keeper is, which is no orphan."""
+    """What it leaves becomes the sidecar's child, as the other reaper is, which is no orphan."""
     it = two(family)
     sidecar = it.it.process.pid
     it.start(FIRST)
-    (keeper,) = children({sidecar})
+    (reaper,) = children({sidecar})
     it.start(SECOND)
 
-    os.kill(keeper, signal.SIGKILL)
+    os.kill(reaper, signal.SIGKILL)
     it.until(FIRST, FAILED)
 
-    eventually_true(lambda: len(left()) == 6)  # the sidecar, and keeper, simulator and three more
+    eventually_true(lambda: len(left()) == 6)  # the sidecar, and reaper, simulator and three more
     assert it.state(SECOND).state is STARTING
     assert len(children({sidecar})) == 1
 
@@ -134,7 +134,7 @@ def test_a_signal_ends_both(two, request, left, eventually_true, what) -> None:
 
 
 def test_a_killed_sidecar_leaves_neither(two, family, left, eventually_true) -> None:
-    """Each keeper sees the end of its own pipe."""
+    """Each reaper sees the end of its own pipe."""
     it = two(family)
     it.start(FIRST)
     it.start(SECOND)

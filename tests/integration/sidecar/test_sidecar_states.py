@@ -9,11 +9,11 @@ import pytest
 from palaestra_protocol.control import SidecarState, SimulatorState
 from palaestra_sim.sidecar.lifecycle import Event
 from palaestra_sim.sidecar.process import Command
-from palaestra_sim.sidecar.simulator import Simulator
+from palaestra_sim.sidecar.simulator import SupervisedSimulator
 from tests.integration.sidecar.conftest import DEADLINE_S, eventually
 
 
-class Watched(Simulator):
+class Watched(SupervisedSimulator):
     """A simulator that keeps every state which it lets others see."""
 
     def __setattr__(self, name, value):

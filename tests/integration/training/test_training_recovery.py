@@ -18,7 +18,7 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
 from palaestra_trainer.simulators.member import Nobody
@@ -53,7 +53,7 @@ class Trained:
         self._sidecar = sidecar
         self.restarts = Restarts()
         simulator = Simulator("collect-0", sidecar, make, 20.0)
-        self.keeper = Keeper(simulator, Care(restart_limit=20), self.restarts)
+        self.keeper = Keeper(simulator, RestartLimit(restarts=20), self.restarts)
         self.keeper.begin_start()
         await_one([self.keeper])
         assert self.keeper.up()

@@ -60,7 +60,7 @@ def test_what_has_rested_goes_on(rested):
     """At the next rollout."""
     mode = rested.simulator.webots.observer.mode()
 
-    rested.env.run()
+    rested.env.unpause()
 
     assert mode is Mode.PAUSE
     assert rested.step()["valid"]
@@ -71,7 +71,7 @@ def test_what_broke_while_it_rested_is_mended(rested, number, kind):
     """Its rest could not be ended; that it was once paused is held against nobody."""
     os.kill(rested.launcher.state().pid, number)
 
-    rested.env.run()
+    rested.env.unpause()
     fault = rested.step()["sim_fault"]
 
     assert fault["kind"] == kind

@@ -15,7 +15,7 @@ from palaestra_protocol.control import SidecarState
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHung
 from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper, settle
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
@@ -30,7 +30,7 @@ LONG_S = 30.0  # a change of roles takes milliseconds, a start that is waited fo
 class Pair:
     """A member with a spare, and its two simulators to look at."""
 
-    def __init__(self, launcher, recycle, care):
+    def __init__(self, launcher, recycle, limit):
         def make(robot, scene):
             return gymnasium.make("MoveToTargetEnv-v0", disable_env_checker=True, robot=robot, scene=scene)
 
@@ -39,7 +39,7 @@ class Pair:
             Simulator("collect-0", sidecar, make, START_DEADLINE_S, recycle)
             for sidecar in (launcher, launcher.standby())
         )
-        self.member = Standby(self.first, self.second, care)
+        self.member = Standby(self.first, self.second, limit)
 
     def begin(self):
         """Start it, wait for the spare, and begin an episode."""
@@ -79,10 +79,10 @@ def pair(master, tmp_path):
     del master
     made = []
 
-    def make(*options, recycle=None, care=None):
+    def make(*options, recycle=None, limit=None):
         names = ("--job=pair", f"--uid={tmp_path.name}", f"--work={tmp_path}", "--standby")
         launcher = ProcessLauncher("arena", options=options, names=names)
-        made.append(Pair(launcher, recycle, care))
+        made.append(Pair(launcher, recycle, limit))
         return made[-1]
 
     yield make
@@ -194,7 +194,7 @@ def test_a_spare_that_does_not_come_up_is_tried_again_while_nobody_waits(pair):
 
 def test_a_spare_that_does_not_start_within_its_budget_fails_the_restart_that_needs_it(pair):
     """The simulator that works goes on until then."""
-    it = pair("--fault=start_refused:start=2", care=Care(restart_limit=0))
+    it = pair("--fault=start_refused:start=2", limit=RestartLimit(restarts=0))
     it.member.start()
     it.member.restart()
     it.member.env.reset(seed=1)
@@ -260,9 +260,9 @@ def test_a_stop_while_the_spare_starts_leaves_no_process_and_no_thread(pair):
 def test_a_start_that_a_restart_waits_for_is_not_begun_again_once_it_is_abandoned(pair):
     """However large the budget: a run that ends gives each of its simulators a few seconds."""
     held = [f"--fault=slow_start:latency_ms=600000,start={start}" for start in range(2, 60)]
-    it = pair(*held, care=Care(restart_limit=1000)).begin()
+    it = pair(*held, limit=RestartLimit(restarts=1000)).begin()
     it.member.restart()
-    keeper = Keeper(it.member, Care(restart_limit=1000))
+    keeper = Keeper(it.member, RestartLimit(restarts=1000))
     keeper.begin_mending(SimulatorDead("collect-0", "gone"))
     give_up = time.monotonic() + PATIENCE_S
     while it.first.sidecar.state().starts < 2:

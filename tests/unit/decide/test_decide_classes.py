@@ -73,7 +73,7 @@ def test_a_name_that_no_image_can_have_is_final(accepted):
 
 
 def test_a_simulator_that_does_not_start_is_reported_and_left_to_the_trainer(training, simulator):
-    """It has a budget of faults; the operator ends nothing by its own clock."""
+    """It has a restart budget; the operator ends nothing by its own clock."""
     scene, pod = training()
     told = {"phase": "starting", "simulators": (simulator(state="failed", last_fault="did not come up"),)}
     scene.poll(pod, **told)

@@ -163,7 +163,7 @@ class FakeMember:
         """Note it."""
         self.log.append("pause")
 
-    def run(self) -> None:
+    def unpause(self) -> None:
         """Note it."""
         self.log.append("run")
 

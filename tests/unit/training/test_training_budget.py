@@ -7,7 +7,7 @@ import time
 import pytest
 
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
-from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
+from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Nobody
 from palaestra_trainer.simulators.meter import Pace
@@ -18,7 +18,7 @@ DEAD, HUNG = SimulatorDead("robotino", "closed the connection"), SimulatorHung("
 
 def test_the_message_tells_flapping_from_an_accident():
     """Kinds, window and remedy: a person reads it hours later, and nothing else."""
-    budget = RestartBudget("collect-0", Care(restart_limit=10), clock=lambda: 0.0)
+    budget = RestartBudget("collect-0", RestartLimit(restarts=10), clock=lambda: 0.0)
     for fault in [DEAD] * 9 + [HUNG]:
         budget.spend(fault)
 
@@ -34,7 +34,7 @@ def test_the_message_tells_flapping_from_an_accident():
 
 def test_a_budget_of_nothing_bears_nothing():
     """With restart.limit 0 the first fault ends the run."""
-    budget = RestartBudget("collect-0", Care(restart_limit=0))
+    budget = RestartBudget("collect-0", RestartLimit(restarts=0))
 
     with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 0 restarts within 600 s .* \(last: robotino: "):
         budget.spend(DEAD)
@@ -43,7 +43,7 @@ def test_a_budget_of_nothing_bears_nothing():
 def test_three_restarts_in_a_short_time_are_flapping():
     """Two may be chance; what is long ago does not count."""
     times = iter([0.0, 50.0, 99.0, 100.0, 199.0])
-    budget = RestartBudget("collect-0", Care(restart_within_s=100.0), clock=lambda: next(times))
+    budget = RestartBudget("collect-0", RestartLimit(within_s=100.0), clock=lambda: next(times))
     flapping = []
     for _ in range(5):
         budget.spend(DEAD)

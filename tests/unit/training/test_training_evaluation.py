@@ -6,7 +6,7 @@ import pytest
 
 from palaestra_trainer.episodes.evaluation import evaluate, evaluate_on_all
 from palaestra_trainer.errors import FaultBudgetSpent
-from palaestra_trainer.simulators.budget import Care, Group
+from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Nobody
 from palaestra_trainer.waiting.interruption import Interrupted
@@ -61,7 +61,7 @@ def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
 
 def test_a_spent_budget_ends_an_evaluation(make_member):
     """As it ends training."""
-    keeper = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=3))
+    keeper = Keeper(make_member(steps=range(1, 100)), RestartLimit(restarts=3))
 
     with pytest.raises(FaultBudgetSpent):
         evaluate(Walker(), keeper, [10])
@@ -93,7 +93,7 @@ def test_an_evaluation_can_be_given_up_between_episodes(make_member):
 @pytest.mark.parametrize("first", [True, False])
 def test_what_ends_one_simulator_s_episodes_ends_all(make_member, first):
     """After Ctrl-C the other half of the episodes must not be played."""
-    broken = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=0))
+    broken = Keeper(make_member(steps=range(1, 100)), RestartLimit(restarts=0))
     other = make_member("evaluate-1")
     keepers = [broken, Keeper(other)] if first else [Keeper(other), broken]
 
@@ -121,7 +121,7 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
     """Also if they have ended all of their own by then."""
     group = Group(2, least=1)
     keepers = [
-        Keeper(make_member("evaluate-0", steps=range(1, 100)), Care(restart_limit=1), group=group),
+        Keeper(make_member("evaluate-0", steps=range(1, 100)), RestartLimit(restarts=1), group=group),
         Keeper(make_member("evaluate-1"), group=group),
     ]
 
@@ -134,7 +134,7 @@ def test_a_simulator_that_is_given_up_leaves_its_episodes_to_the_others(make_mem
 
 def test_without_any_simulator_left_there_is_no_evaluation(make_member):
     """It would wait for ever."""
-    keeper = Keeper(make_member(steps=range(1, 100)), Care(restart_limit=0), group=Group(2, least=1))
+    keeper = Keeper(make_member(steps=range(1, 100)), RestartLimit(restarts=0), group=Group(2, least=1))
 
     with pytest.raises(FaultBudgetSpent, match="every evaluating simulator was given up"):
         evaluate(Walker(), keeper, [10])

@@ -19,7 +19,7 @@ from palaestra_trainer.errors import (
     SimulatorHung,
     WorldMisfit,
 )
-from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.fleet import Fleet, resting
 from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.member import Nobody
@@ -274,7 +274,7 @@ def test_a_resting_member_is_recycled_in_the_background_and_awaited_before_it_ru
 
     keeper.recycle_resting(episodes=1)
     busy = keeper.busy
-    keeper.run(check=member.release.set)
+    keeper.unpause(check=member.release.set)
 
     assert busy
     assert member.log == ["restart", "pause", "run"]
@@ -299,7 +299,7 @@ def test_a_recycling_at_rest_that_fails_is_mended_when_the_member_is_to_run(make
     keeper.reset(seed=1)
 
     keeper.recycle_resting(episodes=1)
-    keeper.run()
+    keeper.unpause()
     await_one([keeper])
 
     assert keeper.up()
@@ -324,7 +324,7 @@ def test_stopping_ends_a_recycling_at_rest_and_reports_no_fault(make_fleet, make
 
 def test_fifty_faults_leave_nothing_behind(make_member):
     """Neither threads nor descriptors: a week of training has many more."""
-    keeper = Keeper(make_member(), Care(restart_limit=50))
+    keeper = Keeper(make_member(), RestartLimit(restarts=50))
     threads, descriptors = threading.active_count(), len(list(Path("/proc/self/fd").iterdir()))
 
     for number in range(50):

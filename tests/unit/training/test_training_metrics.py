@@ -16,7 +16,7 @@ from palaestra_trainer.episodes.evaluation import Episode, Evaluation
 from palaestra_trainer.errors import SimulatorDead, SimulatorHung
 from palaestra_trainer.families import FAMILIES
 from palaestra_trainer.run.training import Attempt, Surroundings
-from palaestra_trainer.simulators.budget import Care
+from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.telemetry import metrics
@@ -149,7 +149,7 @@ def test_simulators_are_counted_by_how_they_stand(progress):
 
 def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_member, clock):
     """Steps with their time, episodes, and what is left of the restarts; simulated time if it is known."""
-    keeper = Keeper(make_member(), Care(restart_limit=4), progress, clock)
+    keeper = Keeper(make_member(), RestartLimit(restarts=4), progress, clock)
     progress.figures.meters = {"collect-0": keeper.meter}
     keeper.reset(1)
     keeper.step(1)
@@ -167,7 +167,7 @@ def test_each_simulator_has_metrics_of_its_steps_and_episodes(progress, make_mem
 
 def test_a_budget_is_whole_again_when_its_time_has_passed(make_member, clock):
     """By the same window by which the simulator is given up."""
-    keeper = Keeper(make_member(), Care(restart_limit=2, restart_within_s=60.0), clock=clock)
+    keeper = Keeper(make_member(), RestartLimit(restarts=2, within_s=60.0), clock=clock)
     keeper.begin_mending(SimulatorDead("collect-0", "gone"))
     await_one([keeper])
     before = keeper.meter.budget_spent

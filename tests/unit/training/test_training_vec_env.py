@@ -15,7 +15,7 @@ from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import Diverged, FaultBudgetSpent, MasterLost, SimulatorHung, WrongData
-from palaestra_trainer.simulators.budget import Care, Group
+from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.waiting.interruption import Interrupted
 from palaestra_trainer.waiting.turns import let_others
@@ -28,8 +28,8 @@ def make_env():
     """Make a VecEnv of members and close it in the end."""
     made = []
 
-    def make(*members, care=None, run_seed=1, **options):
-        keepers = [Keeper(member, care) for member in members]
+    def make(*members, limit=None, run_seed=1, **options):
+        keepers = [Keeper(member, limit) for member in members]
         env = SimulatorsVecEnv(keepers, run_seed, **options)
         made.append(env)
         return env
@@ -355,7 +355,7 @@ def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_membe
 
 def test_a_spent_budget_ends_the_run(make_env, make_member):
     """Restarting for ever would look like progress."""
-    env = make_env(make_member(steps=range(1, 100)), care=Care(restart_limit=2))
+    env = make_env(make_member(steps=range(1, 100)), limit=RestartLimit(restarts=2))
     env.reset()
 
     with pytest.raises(FaultBudgetSpent, match=r"^collect-0: 2 restarts within 600 s .* restart.limit"):
@@ -366,7 +366,7 @@ def test_a_budget_is_spent_within_its_window_only(make_member):
     """One fault an hour for a week is no reason to give up."""
     times = iter([0.0, 100.0, 600.0, 650.0])
     member = make_member(steps=range(1, 100))
-    keeper = Keeper(member, Care(restart_limit=2, restart_within_s=600.0), clock=lambda: next(times))
+    keeper = Keeper(member, RestartLimit(restarts=2, within_s=600.0), clock=lambda: next(times))
     env = SimulatorsVecEnv([keeper], 1)
     env.reset()
 
@@ -384,7 +384,7 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
         make_member("collect-1"),
         make_member("collect-2", steps=range(40, 100)),
     ]
-    keepers = [Keeper(member, Care(restart_limit=1), group=group) for member in members]
+    keepers = [Keeper(member, RestartLimit(restarts=1), group=group) for member in members]
     env = SimulatorsVecEnv(keepers, 1)
     env.reset()
     for steps in (1, 2):
@@ -491,7 +491,7 @@ def test_resting_reaches_every_member(make_env, make_member, members):
     env = make_env(*made)
 
     env.pause()
-    env.run()
+    env.unpause()
 
     assert [member.log for member in made] == [["pause", "run"]] * members
 

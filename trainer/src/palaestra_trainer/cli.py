@@ -29,7 +29,7 @@ exit codes:
   0   done
   2   the configuration is wrong; a retry cannot help
   75  interrupted by a signal or the loss of the ROS master; state saved; start it again to resume
-  80  a simulator failed more often than its restart limit allows
+  80  a simulator failed more often than its restart budget allows
   81  diverged: a number of the environment, a loss or a weight is NaN or infinite
   82  stalled, or a simulator hung: no environment step for stallDeadlineSeconds
   1   any other error; a retry may help
@@ -63,7 +63,7 @@ EVAL_EXIT_CODES = """\
 exit codes:
   0   done
   2   the configuration or the run directory is wrong; a retry cannot help
-  80  a simulator failed more often than its restart limit allows
+  80  a simulator failed more often than its restart budget allows
   130 ended by Ctrl-C; nothing is written
   1   any other error; a retry may help
 """

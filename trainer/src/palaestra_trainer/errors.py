@@ -46,7 +46,7 @@ class UnreadableAnswer(TrainerError, ValueError):
 
 
 class FaultBudgetSpent(TrainerError, RuntimeError):
-    """A simulator failed more often than its restart limit allows."""
+    """A simulator failed more often than its restart budget allows."""
 
 
 class Diverged(TrainerError, ArithmeticError):

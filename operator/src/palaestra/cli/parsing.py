@@ -14,7 +14,7 @@ exit codes:
   1    failed; the last lines of the log give the reason
   2    the job, a world or this machine is not suitable; nothing was started
   75   interrupted after a checkpoint; run the same command to resume
-  80   a simulator had more faults than its restart limit allows
+  80   a simulator had more faults than its restart budget allows
   81   training diverged
   82   training stalled
   130  killed by a second Ctrl-C; run the same command to resume from the newest checkpoint

@@ -11,7 +11,7 @@ from typing import Any
 
 from palaestra.cluster.errors import Gone, NotFound
 from palaestra.cluster.lines import lines
-from palaestra.cluster.resources import PODS, Resource, of
+from palaestra.cluster.resources import PODS, Resource, resource_of
 from palaestra.cluster.transport import JSON, Call, OnRequest, Transport
 from palaestra.cluster.watching import Watch
 from palaestra.objects import Object
@@ -222,7 +222,7 @@ class Api:
         """
         query = {"fieldManager": manager, "force": "true" if force else "false"}
         name = str(obj["metadata"]["name"])
-        call = _call("apply", of(obj), _namespace(obj), name, query=query)
+        call = _call("apply", resource_of(obj), _namespace(obj), name, query=query)
         return self._object(call.sending(obj, method="PATCH", media_type=APPLY_PATCH))
 
     def delete(

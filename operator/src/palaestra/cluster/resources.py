@@ -112,7 +112,7 @@ ALL: tuple[Resource, ...] = (
 _BY_KIND = {(resource.api_version, resource.kind): resource for resource in ALL}
 
 
-def of(obj: Object) -> Resource:
+def resource_of(obj: Object) -> Resource:
     """Return the resource of an object, by its apiVersion and kind.
 
     Raises:

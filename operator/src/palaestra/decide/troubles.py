@@ -118,7 +118,7 @@ def sidecar_crash_loops(situation: Situation) -> Finding | None:
 
 
 def simulator_not_up(situation: Situation) -> Finding | None:
-    """A simulator takes long to start; the trainer gives it up when its fault budget is spent."""
+    """A simulator takes long to start; the trainer gives it up when its restart budget is spent."""
     polled = situation.seen.polled
     if situation.pod is None or polled is None or situation.trains or not situation.fresh:
         return None

@@ -9,7 +9,7 @@ from http import HTTPStatus
 import structlog
 
 from palaestra.cluster import AlreadyExists, Api, ApiError, Conflict, NotFound
-from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, TRAINING_JOBS, of
+from palaestra.cluster.resources import CONFIG_MAPS, JOBS, NETWORK_POLICIES, TRAINING_JOBS, resource_of
 from palaestra.decide import Action, Create, Delete, Discard, Replace, SetSuspend, Stop
 from palaestra.objects import Key, Object
 from palaestra.observe.reading import owners
@@ -96,15 +96,15 @@ class Acting:
     def _create(self, key: Key, uid: str, obj: Object) -> None:
         kind, name = obj["kind"], obj["metadata"]["name"]
         try:
-            if of(obj) == NETWORK_POLICIES:
+            if resource_of(obj) == NETWORK_POLICIES:
                 self._writer.apply(obj)
             else:
                 self._writer.create(obj)
         except AlreadyExists:
             log.info("exists", job=key, kind=kind, name=name)
-            if of(obj) == JOBS:
+            if resource_of(obj) == JOBS:
                 self._see_owner(key, uid, obj)
-            if of(obj) == CONFIG_MAPS:
+            if resource_of(obj) == CONFIG_MAPS:
                 self._see_config_map(key[0], obj)
             return
         log.info("applied", job=key, kind=kind, name=name)

@@ -7,7 +7,7 @@ and the write fails on a precondition of the write: the uid and the resourceVers
 from collections.abc import Mapping, Sequence
 
 from palaestra.cluster import Api, NotFound
-from palaestra.cluster.resources import JOBS, PODS, TRAINING_JOBS, of
+from palaestra.cluster.resources import JOBS, PODS, TRAINING_JOBS, resource_of
 from palaestra.decide import Action, Create, Replace, Stop
 from palaestra.errors import PalaestraError
 from palaestra.objects import Object
@@ -38,7 +38,9 @@ def confirm(api: Api, raw: Object, actions: Sequence[Action]) -> None:
         found = None
     if found != raw["metadata"]["resourceVersion"]:
         raise Outdated(f"TrainingJob {name} is not as in the cache")
-    created = (action for action in actions if isinstance(action, Create) and of(action.object) == JOBS)
+    created = (
+        action for action in actions if isinstance(action, Create) and resource_of(action.object) == JOBS
+    )
     begun = {str(creation.replica): creation.object for creation in created}
     stops = [action for action in actions if isinstance(action, Stop | Replace)]
     pods = api.list(PODS, namespace, labels=f"{JOB_LABEL}={name}") if begun or stops else []

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from palaestra.cluster import Api, Resource
-from palaestra.cluster.resources import TRAINING_JOBS, of
+from palaestra.cluster.resources import TRAINING_JOBS, resource_of
 from palaestra.errors import PalaestraError
 from palaestra.objects import Object
 
@@ -40,7 +40,7 @@ class Writer:
     def create(self, obj: Object) -> Object:
         """Create an object and return it as stored."""
         self._check()
-        return self._api.create(of(obj), obj)
+        return self._api.create(resource_of(obj), obj)
 
     def apply(self, obj: Object) -> Object:
         """Apply an object that only the operator writes, whether it exists or not."""

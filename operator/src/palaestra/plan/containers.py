@@ -7,7 +7,7 @@ from palaestra.api import Driver
 from palaestra.api.container import Resources, Variable
 from palaestra.plan import resources as planned
 from palaestra.plan.layout import Places
-from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica, Simulator
+from palaestra.plan.replica import ROS_MASTER, TRAINER, PlannedSimulator, Replica
 from palaestra.plan.text import literal
 from palaestra.plan.training import FILE, LOOPBACK
 from palaestra.plan.worlds import world_path
@@ -48,7 +48,7 @@ def ros_master(replica: Replica) -> Container:
     }
 
 
-def sidecar(replica: Replica, simulator: Simulator, worlds: Mapping[str, bytes]) -> Container:
+def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, bytes]) -> Container:
     """Return the sidecar of one simulator, which the trainer tells when to start it."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
@@ -73,7 +73,7 @@ def sidecar(replica: Replica, simulator: Simulator, worlds: Mapping[str, bytes])
     }
 
 
-def _arguments(replica: Replica, simulator: Simulator, world: str) -> list[str]:
+def _arguments(replica: Replica, simulator: PlannedSimulator, world: str) -> list[str]:
     """Return the options of a sidecar."""
     group, layout = simulator.group, replica.layout
     return [
@@ -187,7 +187,7 @@ def _variable(variable: Variable) -> dict[str, Any]:
     return {"valueFrom": {"secretKeyRef": {"name": reference.name, "key": reference.key}}}
 
 
-def _identity(simulator: Simulator) -> tuple[str, ...]:
+def _identity(simulator: PlannedSimulator) -> tuple[str, ...]:
     identity = simulator.identity
     return (
         f"--job={identity.job}",
@@ -201,7 +201,7 @@ def _identity(simulator: Simulator) -> tuple[str, ...]:
     )
 
 
-def _simulator_image(replica: Replica, simulator: Simulator) -> str:
+def _simulator_image(replica: Replica, simulator: PlannedSimulator) -> str:
     images = replica.layout.images
     release = images.webots if simulator.group.driver is Driver.WEBOTS else images.stub
     return simulator.group.image or release

@@ -19,7 +19,7 @@ ROS_MASTER = "ros-master"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Simulator:
+class PlannedSimulator:
     """One simulator of a replica; `place` counts all of the pod's, in the order of the job."""
 
     group: SimulatorGroup
@@ -88,11 +88,11 @@ class Replica:
         return f"{self.job.metadata.name}-{self.index}"
 
     @property
-    def simulators(self) -> tuple[Simulator, ...]:
+    def simulators(self) -> tuple[PlannedSimulator, ...]:
         """Return its simulators in the order of the job's groups."""
         members = [(group, i) for group in self.job.spec.simulators for i in range(group.count)]
         return tuple(
-            Simulator(group=group, identity=self._identity(group, i), place=place)
+            PlannedSimulator(group=group, identity=self._identity(group, i), place=place)
             for place, (group, i) in enumerate(members)
         )
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from palaestra.api.simulators import Driver, Recycle, SimulatorGroup
-from palaestra.plan.replica import Replica, Simulator
+from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.resources import asks_for_gpu, in_bytes
 from palaestra.plan.text import as_yaml
 from palaestra.plan.worlds import world_path
@@ -52,7 +52,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
     return {field: value for field, value in training.items() if value is not None}
 
 
-def _simulator(replica: Replica, simulator: Simulator, files: Mapping[str, bytes]) -> dict[str, Any]:
+def _simulator(replica: Replica, simulator: PlannedSimulator, files: Mapping[str, bytes]) -> dict[str, Any]:
     group = simulator.group
     port = replica.layout.ports.control[simulator.place]
     described: dict[str, Any] = {

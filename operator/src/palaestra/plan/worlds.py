@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from palaestra.api import SimulatorGroup, TrainingJob, World
 from palaestra.errors import PlanError
-from palaestra.plan.replica import Replica, Simulator
+from palaestra.plan.replica import Replica, PlannedSimulator
 from palaestra_sim.world import builtin, check, generate
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
@@ -61,7 +61,7 @@ def named_files(replica: Replica, sources: Files) -> Files:
     return copies if _size(copies) <= MOST_BYTES else sources
 
 
-def world_path(replica: Replica, simulator: Simulator, files: Files) -> str:
+def world_path(replica: Replica, simulator: PlannedSimulator, files: Files) -> str:
     """Return the path of the world that a simulator's sidecar is given."""
     if simulator.group.world.file is not None:
         return simulator.group.world.file
@@ -74,7 +74,7 @@ def _of_group(group: SimulatorGroup) -> str:
     return f"{group.name}.wbt"
 
 
-def _of_simulator(simulator: Simulator) -> str:
+def _of_simulator(simulator: PlannedSimulator) -> str:
     return f"{simulator.name}.wbt"
 
 

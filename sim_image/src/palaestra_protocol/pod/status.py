@@ -118,7 +118,7 @@ class SimulatorStatus:
         restarts: after faults, in this attempt; recycling is not counted.
         last_fault: in a sentence; None: no fault in this attempt.
         flapping: whether it fails again and again.
-        given_up: whether its budget of restarts is spent, so that the run continues without it.
+        given_up: whether its restart budget is spent, so that the run continues without it.
         standby: starting or ready, the state of its spare; None: it has none.
     """
 

@@ -8,7 +8,7 @@ It may have a second simulator as a standby. The two share the process and its p
 - `lifecycle`: the events that each state allows, as a table; pure
 - `simulator`: the one owner of the state, which takes events in order and carries out the table's actions
 - `process`: the only module that starts a process
-- `keeper`: the small program between sidecar and simulator, from which no process can escape
+- `reaper`: the small program between sidecar and simulator, from which no process can escape
 - `output`: the simulator's output, forwarded line by line
 - `server`: the routes of the two ports: control, and health with metrics and state
 - `families`: every metric by name, as data

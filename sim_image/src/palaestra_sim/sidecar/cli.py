@@ -20,7 +20,7 @@ from palaestra_sim.sidecar.drivers import Driver, Launch, command
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
 from palaestra_sim.sidecar.server import bound, control_routes, health_routes
-from palaestra_sim.sidecar.simulator import Simulator
+from palaestra_sim.sidecar.simulator import SupervisedSimulator
 from palaestra_sim.world import RunIdentity
 
 log = logging.getLogger(__name__)
@@ -68,13 +68,13 @@ def look_after(given: argparse.Namespace) -> int:
     return 0
 
 
-def shut_down(simulators: Sequence[Simulator]) -> None:
+def shut_down(simulators: Sequence[SupervisedSimulator]) -> None:
     """End all simulators at once and make `run` return; from any thread."""
     for simulator in simulators:
         simulator.shut_down()
 
 
-def run(simulators: Sequence[Simulator]) -> None:
+def run(simulators: Sequence[SupervisedSimulator]) -> None:
     """Run all simulators, each in its own thread, until a shutdown has ended them."""
     first, *others = simulators
     threads = [threading.Thread(target=other.run, name="simulator", daemon=True) for other in others]
@@ -85,7 +85,7 @@ def run(simulators: Sequence[Simulator]) -> None:
         thread.join()
 
 
-def prepare(given: argparse.Namespace) -> tuple[Simulator, ...]:
+def prepare(given: argparse.Namespace) -> tuple[SupervisedSimulator, ...]:
     """Return the simulator, and with --standby a second one, not started yet.
 
     Raises:
@@ -102,13 +102,13 @@ def prepare(given: argparse.Namespace) -> tuple[Simulator, ...]:
     return tuple(_simulator(given, driver, slot) for slot in slots)
 
 
-def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Simulator:
+def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> SupervisedSimulator:
     """Return the simulator of one slot."""
     world = _world(given, slot)
     robots = preparation.described(preparation.read(world), str(world))
     launch = Launch(world=world, options=given.option, program=given.program)
     started = command(driver, launch, os.environ | {"PALAESTRA_SIMULATOR_SLOT": slot})
-    return Simulator(
+    return SupervisedSimulator(
         replace(started, mark=f"{slot}: ") if given.standby else started,
         SimulatorState(state=SidecarState.IDLE, driver=driver.value, world=str(world), robots=robots),
     )

@@ -11,10 +11,10 @@ from palaestra_protocol.control import SidecarState
 from palaestra_protocol.metrics import Family, Values
 from palaestra_sim.sidecar import families
 from palaestra_sim.sidecar.preparation import SLOTS
-from palaestra_sim.sidecar.simulator import Simulator
+from palaestra_sim.sidecar.simulator import SupervisedSimulator
 
 
-def registry(simulators: Sequence[Simulator]) -> CollectorRegistry:
+def registry(simulators: Sequence[SupervisedSimulator]) -> CollectorRegistry:
     """Return a registry with the metrics of these simulators, and of this process."""
     own = CollectorRegistry()
     own.register(_Simulators(simulators))
@@ -25,7 +25,7 @@ def registry(simulators: Sequence[Simulator]) -> CollectorRegistry:
 class _Simulators(Collector):
     """Creates the metrics of the simulators, each with all of its labels, so that none appears later."""
 
-    def __init__(self, simulators: Sequence[Simulator]) -> None:
+    def __init__(self, simulators: Sequence[SupervisedSimulator]) -> None:
         self._simulators = dict(zip(SLOTS, simulators, strict=False))
 
     def collect(self) -> Iterator[Metric]:

@@ -1,8 +1,8 @@
-"""The one module that starts processes: a simulator, under a keeper that ends everything it started.
+"""The one module that starts processes: a simulator, under a reaper that ends everything it started.
 
-The sidecar talks to the keeper through two pipes and learns of its end through threads, so nothing here
+The sidecar talks to the reaper through two pipes and learns of its end through threads, so nothing here
 blocks. The whole sidecar reaps children, because it may be process 1 of its container: `reap` takes every
-child that ended, both keepers and the orphans that only process 1 gets.
+child that ended, both reapers and the orphans that only process 1 gets.
 """
 
 import contextlib
@@ -15,16 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from palaestra_sim.sidecar import keeper
+from palaestra_sim.sidecar import reaper
 from palaestra_sim.sidecar.output import Passage
 
-_KEEPER = Path(keeper.__file__)
+_REAPER = Path(reaper.__file__)
 # In /proc/PID/stat after the name: time of the process, and of its children that have ended, in ticks.
 _OWN_TIME, _ENDED_TIME = slice(11, 13), slice(13, 15)  # Source: proc_pid_stat(5)
 _LAST_OUTPUT_S = 0.2  # for lines that are still in the pipe after the simulator has ended
 
-_keepers: set[int] = set()  # running keepers: the only children that are not orphans
-_keepers_lock = threading.Lock()  # a keeper is not in the set until its start returns
+_reapers: set[int] = set()  # running reapers: the only children that are not orphans
+_reapers_lock = threading.Lock()  # a reaper is not in the set until its start returns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,11 +72,11 @@ class Process:
     """A simulator's process and all of its descendants.
 
     Attributes:
-        keeper: the keeper's process id; all processes of the simulator are its descendants.
+        reaper: the reaper's process id; all processes of the simulator are its descendants.
     """
 
-    def __init__(self, keeper_pid: int, commands: int) -> None:
-        self.keeper = keeper_pid
+    def __init__(self, reaper_pid: int, commands: int) -> None:
+        self.reaper = reaper_pid
         self._commands = commands
         self._cpu_s = 0.0
 
@@ -90,7 +90,7 @@ class Process:
         (commands, our_commands), (our_reports, reports) = os.pipe(), os.pipe()
         our_output, output = os.pipe()
         try:
-            pid = _spawn(command, {0: commands, 1: output, 2: output, keeper.REPORTS: reports})
+            pid = _spawn(command, {0: commands, 1: output, 2: output, reaper.REPORTS: reports})
         except OSError:
             _close(our_commands, our_reports, our_output)
             raise
@@ -107,23 +107,23 @@ class Process:
 
     def terminate(self) -> None:
         """Send SIGTERM to the simulator's process group."""
-        self._say(keeper.TERMINATE)
+        self._say(reaper.TERMINATE)
 
     def kill(self) -> None:
         """Kill the simulator and all of its descendants."""
-        self._say(keeper.KILL)
+        self._say(reaper.KILL)
 
     def close(self) -> None:
-        """Close the pipe to the keeper, which then kills all that is left."""
+        """Close the pipe to the reaper, which then kills all that is left."""
         _close(self._commands)
 
     def usage(self) -> Usage:
         """Return the usage of all processes of the simulator; shared pages count twice. From any thread."""
-        below = found = keeper.children({self.keeper})
-        while found := keeper.children(found):
+        below = found = reaper.children({self.reaper})
+        while found := reaper.children(found):
             below |= found
         ticks = sum(_ticks(pid, _OWN_TIME) + _ticks(pid, _ENDED_TIME) for pid in below)
-        cpu_s = (ticks + _ticks(self.keeper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
+        cpu_s = (ticks + _ticks(self.reaper, _ENDED_TIME)) / os.sysconf("SC_CLK_TCK")
         self._cpu_s = max(self._cpu_s, cpu_s)  # a process that ends meanwhile may be missing in both
         pages = sum(_resident_pages(pid) for pid in below)
         return Usage(rss_bytes=pages * os.sysconf("SC_PAGE_SIZE"), cpu_s=self._cpu_s)
@@ -154,22 +154,22 @@ def _ticks(pid: int, fields: slice) -> int:
 
 
 def _spawn(command: Command, descriptors: Mapping[int, int]) -> int:
-    """Start the keeper with these descriptors as its own, detached from the terminal."""
-    with _keepers_lock:
+    """Start the reaper with these descriptors as its own, detached from the terminal."""
+    with _reapers_lock:
         pid = os.posix_spawn(
             sys.executable,
-            [sys.executable, "-I", "-S", str(_KEEPER), *command.arguments],
+            [sys.executable, "-I", "-S", str(_REAPER), *command.arguments],
             dict(command.environment),
             file_actions=[(os.POSIX_SPAWN_DUP2, ours, its) for its, ours in descriptors.items()],
             setsid=True,
             setsigmask=(),
         )
-        _keepers.add(pid)
+        _reapers.add(pid)
         return pid
 
 
-def _watch(keeper_pid: int, reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
-    """Report the keeper's messages until it has ended."""
+def _watch(reaper_pid: int, reports: int, reader: threading.Thread, passage: Passage, report: Report) -> None:
+    """Report the reaper's messages until it has ended."""
     said: dict[str, int] = {}
     with os.fdopen(reports) as lines:
         for line in lines:
@@ -177,8 +177,8 @@ def _watch(keeper_pid: int, reports: int, reader: threading.Thread, passage: Pas
             said[word] = int(number)
             if word == "started":
                 report(Started(pid=said[word]))
-    with _keepers_lock:
-        _keepers.discard(keeper_pid)
+    with _reapers_lock:
+        _reapers.discard(reaper_pid)
     if "exit" not in said:
         _end_orphans()
     reader.join(_LAST_OUTPUT_S)
@@ -186,7 +186,7 @@ def _watch(keeper_pid: int, reports: int, reader: threading.Thread, passage: Pas
 
 
 def _end_orphans() -> None:
-    """Kill the descendants of a keeper that was killed itself; they are now children of this process."""
+    """Kill the descendants of a reaper that was killed itself; they are now children of this process."""
     while orphans := _kill_orphans():
         for pid in orphans:
             with contextlib.suppress(ChildProcessError):  # reaped by the signals' thread
@@ -195,15 +195,15 @@ def _end_orphans() -> None:
 
 
 def _kill_orphans() -> set[int]:
-    with _keepers_lock:
-        return keeper.kill_children(frozenset(_keepers))
+    with _reapers_lock:
+        return reaper.kill_children(frozenset(_reapers))
 
 
 def _ended(said: Mapping[str, int], last_line: str) -> Ended:
     if "error" in said:
         return Ended(problem=f"it could not be run: {os.strerror(said['error'])}", last_line=last_line)
     if "exit" not in said:
-        return Ended(problem="its keeper ended before it", last_line=last_line)
+        return Ended(problem="its reaper ended before it", last_line=last_line)
     code = os.waitstatus_to_exitcode(said["exit"])
     if code >= 0:
         return Ended(code=code, last_line=last_line)

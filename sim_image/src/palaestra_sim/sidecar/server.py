@@ -22,7 +22,7 @@ from palaestra_protocol.http import (
 )
 from palaestra_sim.errors import SidecarError
 from palaestra_sim.sidecar.lifecycle import Event
-from palaestra_sim.sidecar.simulator import Answer, NoAnswer, Simulator
+from palaestra_sim.sidecar.simulator import Answer, NoAnswer, SupervisedSimulator
 
 _ABOVE = ("", STANDBY)  # the paths of the first simulator, and of one that stands by for it
 
@@ -45,7 +45,7 @@ def bound(option: str, address: Address, routes: Routes) -> Server:
         raise SidecarError(f"{option}: {address}: {error.strerror}; {remedy}") from error
 
 
-def control_routes(simulators: Sequence[Simulator]) -> Routes:
+def control_routes(simulators: Sequence[SupervisedSimulator]) -> Routes:
     """Return the routes of the control port; see `palaestra_protocol.control`."""
     routes: dict[tuple[str, str], Route] = {}
     for above, simulator in zip(_ABOVE, simulators, strict=False):
@@ -58,7 +58,7 @@ def control_routes(simulators: Sequence[Simulator]) -> Routes:
     return routes
 
 
-def health_routes(simulators: Sequence[Simulator], registry: CollectorRegistry) -> Routes:
+def health_routes(simulators: Sequence[SupervisedSimulator], registry: CollectorRegistry) -> Routes:
     """Return the routes of the health port: health, states and metrics."""
     states = {
         ("GET", f"{above}/state"): _state(simulator)
@@ -72,12 +72,12 @@ def health_routes(simulators: Sequence[Simulator], registry: CollectorRegistry) 
     }
 
 
-def _state(simulator: Simulator) -> Route:
+def _state(simulator: SupervisedSimulator) -> Route:
     """Return the route of a question for a simulator's state."""
     return lambda _: json_response(HTTPStatus.OK, simulator.told().to_json())
 
 
-def _plain(simulator: Simulator, event: Event) -> Route:
+def _plain(simulator: SupervisedSimulator, event: Event) -> Route:
     """Return the route of a request without parameters."""
 
     def route(body: bytes) -> Response:
@@ -90,7 +90,7 @@ def _plain(simulator: Simulator, event: Event) -> Route:
     return route
 
 
-def _stop(simulator: Simulator) -> Route:
+def _stop(simulator: SupervisedSimulator) -> Route:
     """Return the route of an announced stop."""
 
     def route(body: bytes) -> Response:

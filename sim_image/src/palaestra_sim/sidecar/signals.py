@@ -11,8 +11,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from palaestra_sim.sidecar.keeper import adopt_orphans
 from palaestra_sim.sidecar.process import reap
+from palaestra_sim.sidecar.reaper import adopt_orphans
 
 SHUTDOWN_S = 1.8  # the sidecar ends this long after the first signal, even if something hangs
 EXIT_HUNG = 1
@@ -44,4 +44,4 @@ def _take(shut_down: Callable[[], None]) -> None:
     while (left_s := give_up - time.monotonic()) > 0:
         signal.sigtimedwait(_TAKEN, left_s)
         reap()
-    os._exit(EXIT_HUNG)  # the keeper reads the end of its pipe and ends the rest
+    os._exit(EXIT_HUNG)  # the reaper reads the end of its pipe and ends the rest

@@ -44,7 +44,7 @@ class _Message:
     answers: "queue.SimpleQueue[Answer] | None" = None
 
 
-class Simulator:
+class SupervisedSimulator:
     """One simulator, from the first start to the end of the container.
 
     Attributes:

@@ -87,7 +87,7 @@ class Collector:
         """Return the first observation of the next episode; the last one seen while the member is mended.
 
         Raises:
-            FaultBudgetSpent: the member's budget of restarts is used up.
+            FaultBudgetSpent: the member's restart budget is used up.
         """
         self._actions = None
         self.reset_info = {"valid": False}
@@ -106,7 +106,7 @@ class Collector:
         earlier than it did: its environment does not repeat.
 
         Raises:
-            FaultBudgetSpent: the member's budget of restarts is used up.
+            FaultBudgetSpent: the member's restart budget is used up.
         """
         self.episode = state.episode
         self.begin()
@@ -128,7 +128,7 @@ class Collector:
         step has an invalid row.
 
         Raises:
-            FaultBudgetSpent: the member's budget of restarts is used up.
+            FaultBudgetSpent: the member's restart budget is used up.
         """
         if self._actions is None:
             return self._recover()

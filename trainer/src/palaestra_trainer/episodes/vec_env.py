@@ -53,10 +53,10 @@ class SimulatorsVecEnv(VecEnv):
         for keeper in self._keepers:
             keeper.pause()
 
-    def run(self) -> None:
+    def unpause(self) -> None:
         """End the pause of all members."""
         for keeper in self._keepers:
-            keeper.run()
+            keeper.unpause()
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Set the run's seed, if one is given; return the seeds of the next episodes."""

@@ -121,7 +121,7 @@ class Conductor(BaseCallback):
         self._mark_boundary()
         self._run.interruption.check()
         if self._resting:
-            self._env.run()
+            self._env.unpause()
             self._resting = False
         if _passed(self._evaluated, self._step, self._run.configuration.evaluation.every_steps):
             self._evaluate_if_wanted()

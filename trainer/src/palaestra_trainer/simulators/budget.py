@@ -15,15 +15,15 @@ FLAPPING = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Care:
-    """The restart limit of a member.
+class RestartLimit:
+    """How often a member may be restarted.
 
     Attributes:
-        restart_limit: restarts after faults within any `restart_within_s` seconds.
+        restarts: how many after faults within any `within_s` seconds.
     """
 
-    restart_limit: int = 10
-    restart_within_s: float = 600.0
+    restarts: int = 10
+    within_s: float = 600.0
 
 
 @dataclass(slots=True)
@@ -31,35 +31,35 @@ class RestartBudget:
     """The restarts that one simulator has left, counted in a sliding window of time."""
 
     simulator: str
-    care: Care
+    limit: RestartLimit
     clock: Callable[[], float] = time.monotonic
     _spent: deque[tuple[float, FaultKind]] = field(default_factory=deque)
 
     @property
     def flapping(self) -> bool:
-        """Whether it was restarted `FLAPPING` times or more within `restart_within_s`."""
+        """Whether it was restarted `FLAPPING` times or more within `within_s`."""
         return len(self._spent) >= FLAPPING
 
     @property
     def spent_share(self) -> float:
-        """Share of `restart_limit` spent within `restart_within_s`, 0 to 1; callable from any thread.
+        """Share of `limit.restarts` spent within `within_s`, 0 to 1; callable from any thread.
 
         It is 0 for a limit of 0: no warning would be possible.
         """
-        now, limit = self.clock(), self.care.restart_limit
-        recent = sum(now - at < self.care.restart_within_s for at, _ in tuple(self._spent))
+        now, limit = self.clock(), self.limit.restarts
+        recent = sum(now - at < self.limit.within_s for at, _ in tuple(self._spent))
         return recent / limit if limit else 0.0
 
     def spend(self, fault: SimulatorFault) -> None:
         """Take one restart from the budget, to repair `fault`.
 
         Raises:
-            FaultBudgetSpent: `restart_limit` restarts were already spent within `restart_within_s`.
+            FaultBudgetSpent: `limit.restarts` restarts were already spent within `within_s`.
         """
         now = self.clock()
-        while self._spent and now - self._spent[0][0] >= self.care.restart_within_s:
+        while self._spent and now - self._spent[0][0] >= self.limit.within_s:
             self._spent.popleft()
-        if len(self._spent) >= self.care.restart_limit:
+        if len(self._spent) >= self.limit.restarts:
             raise FaultBudgetSpent(self._message(fault)) from fault
         self._spent.append((now, fault.kind))
 
@@ -68,7 +68,7 @@ class RestartBudget:
         faults = ", ".join(f"{kind} {count}" for kind, count in kinds)
         return (
             f"{self.simulator}: {'flapping: ' if self.flapping else ''}"
-            f"{self.care.restart_limit} restarts within {self.care.restart_within_s:g} s did not mend it "
+            f"{self.limit.restarts} restarts within {self.limit.within_s:g} s did not mend it "
             f"({f'{faults}; ' if faults else ''}last: {fault}); "
             "read the simulator's log, or raise restart.limit"
         )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
-from palaestra_trainer.simulators.claims import claim
+from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.connect import Arena, connect
 
 
@@ -62,18 +62,18 @@ def configured_simulator(role: Role) -> Configured:
         SimulatorFault: the simulator does not start.
     """
     configuration = load()
-    claimed = claim(configuration, role)
+    allocated = allocate(configuration, role)
     try:
-        [simulator] = connect(_alone(configuration, claimed.simulator.name))
+        [simulator] = connect(_alone(configuration, allocated.simulator.name))
         simulator.start()
     except BaseException:
-        claimed.lock.release()
+        allocated.lock.release()
         raise
 
     def release() -> None:
-        if claimed.lock.held:
+        if allocated.lock.held:
             simulator.close()
-            claimed.lock.release()
+            allocated.lock.release()
 
     return Configured(name=simulator.name, robot=simulator.robot, scene=simulator.scene, release=release)
 

@@ -17,7 +17,7 @@ from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.ros import ensure_node
-from palaestra_trainer.simulators.fleet import care_of
+from palaestra_trainer.simulators.fleet import limit_of
 from palaestra_trainer.simulators.member import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
@@ -47,7 +47,7 @@ def connect_members(configuration: Configuration) -> list[Member]:
     """
     simulators = connect(configuration)
     return [
-        Standby(simulator, _simulator(configuration, entry, simulator.sidecar.standby()), care_of(entry))
+        Standby(simulator, _simulator(configuration, entry, simulator.sidecar.standby()), limit_of(entry))
         if entry.standby
         else simulator
         for entry, simulator in zip(configuration.simulators, simulators, strict=True)

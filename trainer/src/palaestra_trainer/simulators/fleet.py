@@ -14,7 +14,7 @@ from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.configuration import Configuration, SimulatorConfiguration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.background import in_background
-from palaestra_trainer.simulators.budget import Care, Group
+from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member, Watcher
 from palaestra_trainer.simulators.meter import Meter
@@ -45,7 +45,7 @@ class Fleet:
             raise ConfigurationError(f"simulators: {', '.join(missing)} cannot be made; list it")
         groups = groups_of(configuration)
         keepers = {
-            wanted.name: Keeper(by_name[wanted.name], care_of(wanted), watcher, group=groups[wanted.group])
+            wanted.name: Keeper(by_name[wanted.name], limit_of(wanted), watcher, group=groups[wanted.group])
             for wanted in configuration.simulators
         }
         self.collecting = [keepers[wanted.name] for wanted in configuration.with_role(Role.COLLECT)]
@@ -113,7 +113,7 @@ class Fleet:
 def running(keepers: Sequence[Keeper], check: Check = go_on) -> Iterator[None]:
     """Run the members inside the context, once their recycling is over; pause them outside."""
     for keeper in keepers:
-        keeper.run(check)
+        keeper.unpause(check)
     try:
         yield
     finally:
@@ -128,7 +128,7 @@ def resting(keepers: Sequence[Keeper]) -> Iterator[None]:
         yield
     finally:
         for keeper in keepers:
-            keeper.run()
+            keeper.unpause()
 
 
 def rest(keepers: Sequence[Keeper]) -> None:
@@ -146,9 +146,9 @@ def groups_of(configuration: Configuration) -> dict[str, Group]:
     }
 
 
-def care_of(simulator: SimulatorConfiguration) -> Care:
+def limit_of(simulator: SimulatorConfiguration) -> RestartLimit:
     """Return the restart limit of one member from the configuration."""
-    return Care(
-        restart_limit=simulator.restart.limit,
-        restart_within_s=simulator.restart.within_seconds,
+    return RestartLimit(
+        restarts=simulator.restart.limit,
+        within_s=simulator.restart.within_seconds,
     )

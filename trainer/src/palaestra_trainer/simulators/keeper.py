@@ -22,7 +22,7 @@ import structlog
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
 from palaestra_trainer.simulators.background import in_background
-from palaestra_trainer.simulators.budget import Care, Group, RestartBudget
+from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
 from palaestra_trainer.simulators.member import Member, Nobody, Step, Watcher
 from palaestra_trainer.simulators.meter import Meter
 from palaestra_trainer.simulators.numbers import check_observation, check_reward
@@ -54,7 +54,7 @@ class Keeper:
     def __init__(
         self,
         member: Member,
-        care: Care | None = None,
+        limit: RestartLimit | None = None,
         watcher: Watcher | None = None,
         clock: Callable[[], float] = time.monotonic,
         group: Group | None = None,
@@ -64,8 +64,8 @@ class Keeper:
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
         self._misfit = False  # whether the last process had a world that lacks what is needed
-        self._care = care or Care()
-        self._budget = RestartBudget(member.name, self._care, clock)
+        self._limit = limit or RestartLimit()
+        self._budget = RestartBudget(member.name, self._limit, clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
         self.meter = Meter(member, self._budget)
@@ -174,7 +174,7 @@ class Keeper:
             self._recycles_resting = True
             self._begin(self._recycle_resting)
 
-    def run(self, check: Check = go_on) -> None:
+    def unpause(self, check: Check = go_on) -> None:
         """End the rest; a broken member is found by the next step that needs it.
 
         Waits for a recycling that began during the rest. If that fails, mending begins.
@@ -186,7 +186,7 @@ class Keeper:
                 self._await_recycling(check)
             except SimulatorFault as fault:
                 self.begin_mending(fault)
-        self._switch(self.member.run)
+        self._switch(self.member.unpause)
 
     def _begin(self, work: Callable[[], None]) -> None:
         self._abandoned = False

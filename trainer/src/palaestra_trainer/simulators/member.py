@@ -51,10 +51,10 @@ class Member(Protocol):
         ...
 
     def pause(self) -> None:
-        """Pause the simulator: it uses no processor time until `run`."""
+        """Pause the simulator: it uses no processor time until `unpause`."""
         ...
 
-    def run(self) -> None:
+    def unpause(self) -> None:
         """End the pause."""
         ...
 

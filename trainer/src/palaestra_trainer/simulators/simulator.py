@@ -84,7 +84,7 @@ class Simulator:
             SimulatorDead, SimulatorHung, WrongData: it does not start in time.
         """
         self.webots.start()  # connects the robot too
-        self.run()
+        self.unpause()
         self.scene.resets = 0
         self.wear.begin()
 
@@ -135,7 +135,7 @@ class Simulator:
         """Pause the simulator: it uses no processor time until `run`."""
         self.webots.supervisor.set_mode(Mode.PAUSE)
 
-    def run(self) -> None:
+    def unpause(self) -> None:
         """End the pause."""
         self.webots.supervisor.set_mode(Mode.FAST)
 

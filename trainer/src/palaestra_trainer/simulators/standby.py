@@ -27,7 +27,7 @@ from palaestra_trainer.errors import (
     WorldMisfit,
 )
 from palaestra_trainer.simulators.background import in_background
-from palaestra_trainer.simulators.budget import Care, RestartBudget
+from palaestra_trainer.simulators.budget import RestartBudget, RestartLimit
 from palaestra_trainer.simulators.member import Environment
 from palaestra_trainer.simulators.simulator import Simulator
 
@@ -42,11 +42,13 @@ class Standby:
     Args:
         first: the active one at the beginning.
         second: the standby.
-        care: restart limit of a spare that does not start.
+        limit: restart limit of a spare that does not start.
     """
 
-    def __init__(self, first: Simulator, second: Simulator, care: Care | None = None) -> None:
-        self._active, self._spare = (Side(simulator, care or Care()) for simulator in (first, second))
+    def __init__(self, first: Simulator, second: Simulator, limit: RestartLimit | None = None) -> None:
+        self._active, self._spare = (
+            Side(simulator, limit or RestartLimit()) for simulator in (first, second)
+        )
         self._both = (first, second)
 
     @property
@@ -115,9 +117,9 @@ class Standby:
         """Pause the active simulator; the spare is always paused."""
         self._active.simulator.pause()
 
-    def run(self) -> None:
+    def unpause(self) -> None:
         """End the pause."""
-        self._active.simulator.run()
+        self._active.simulator.unpause()
 
 
 class Side:
@@ -128,9 +130,9 @@ class Side:
         wanted: False: it is not started any more.
     """
 
-    def __init__(self, simulator: Simulator, care: Care) -> None:
+    def __init__(self, simulator: Simulator, limit: RestartLimit) -> None:
         self.simulator = simulator
-        self._budget = RestartBudget(simulator.name, care)
+        self._budget = RestartBudget(simulator.name, limit)
         self.wanted = True
         self._was_up = False
         self._preparation: Future[None] | None = None
@@ -164,7 +166,7 @@ class Side:
         preparation.result()
         if not simulator.webots.available():
             raise SimulatorDead(simulator.name, "its standby no longer answers")
-        simulator.run()
+        simulator.unpause()
         simulator.wear.begin()
 
     def abandon(self) -> None:

@@ -1,4 +1,4 @@
-"""Claims of processes on simulators: a lock file for each, in the container's scratch folder."""
+"""Allocates simulators to environments of any process, by a lock file each in the scratch folder."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.locks import FileLock
 
 
-class Claim(NamedTuple):
+class Allocation(NamedTuple):
     """One simulator, and the lock that reserves it for one environment."""
 
     simulator: SimulatorConfiguration
     lock: FileLock
 
 
-def claim(configuration: Configuration, role: Role) -> Claim:
-    """Return a claim on the first simulator with this role that no environment of any process uses.
+def allocate(configuration: Configuration, role: Role) -> Allocation:
+    """Allocate the first simulator with this role that no environment of any process uses.
 
     Raises:
         ConfigurationError: all are in use, or the lock file cannot be written.
@@ -30,7 +30,7 @@ def claim(configuration: Configuration, role: Role) -> Claim:
     simulators = configuration.with_role(role)
     for simulator in simulators:
         if lock := _lock(_path(configuration, simulator)):
-            return Claim(simulator, lock)
+            return Allocation(simulator, lock)
     raise ConfigurationError(_none_left(len(simulators), role, len(configuration.simulators)))
 
 
@@ -55,7 +55,7 @@ def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Pa
 
 
 def _none_left(having_role: int, role: Role, total: int) -> str:
-    other = Role.EVALUATE if role is Role.COLLECT else Role.COLLECT
+    other = Role.EVALUATE if role == Role.COLLECT else Role.COLLECT
     return (
         f"PALAESTRA_CONFIG: {having_role} of {total} simulators have role {role}, and each has an "
         f"environment; add simulators with that role to the job, close an environment, or create one "

@@ -1,4 +1,4 @@
-"""Each simulator has one environment, in one process: the claims of PALAESTRA_CONFIG."""
+"""Each simulator has one environment, in one process: who gets which of PALAESTRA_CONFIG."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from palaestra_trainer.configuration import parse
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.simulators.claims import claim
+from palaestra_trainer.simulators.allocation import allocate
 
 LONG_S = 60
 
@@ -22,7 +22,9 @@ def make_configuration(*roles):
         {"name": f"s-{index}", "group": "s", "index": index, "role": role, "control": f"127.0.0.1:710{index}"}
         for index, role in enumerate(roles)
     ]
-    return parse({"job": "claims", "environment": {"id": "Task-v0"}, "steps": 1, "simulators": simulators})
+    return parse(
+        {"job": "allocation", "environment": {"id": "Task-v0"}, "steps": 1, "simulators": simulators}
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -34,16 +36,16 @@ def scratch(tmp_path, monkeypatch):
 
 @pytest.fixture
 def take():
-    """Claim a simulator and return its name; all claims are released when the test ends."""
-    claims = []
+    """Allocate a simulator and return its name; all are released when the test ends."""
+    allocated = []
 
     def next_name(configuration, role="Collect"):
-        claims.append(claim(configuration, role))
-        return claims[-1].simulator.name
+        allocated.append(allocate(configuration, role))
+        return allocated[-1].simulator.name
 
     yield next_name
-    for each in claims:
-        each.lock.release()
+    for allocation in allocated:
+        allocation.lock.release()
 
 
 def test_each_environment_has_a_simulator_of_its_own(take):
@@ -63,30 +65,30 @@ def test_a_collecting_environment_never_takes_an_evaluating_simulator(take):
     assert take(configuration, "Evaluate") == "s-0"
 
 
-def test_a_released_simulator_can_be_claimed_again():
+def test_a_released_simulator_can_be_allocated_again():
     """AsyncVectorEnv makes an environment to read its spaces, and closes it before the workers start."""
     configuration = make_configuration("Collect")
-    first = claim(configuration, "Collect")
+    first = allocate(configuration, "Collect")
 
     first.lock.release()
     first.lock.release()
 
-    second = claim(configuration, "Collect")
+    second = allocate(configuration, "Collect")
     assert second.simulator.name == "s-0"
     second.lock.release()
 
 
-def _claim_and_name(configuration, folder=None):
+def _allocate_and_name(configuration, folder=None):
     if folder is not None:  # a server that starts workers has the variables of the test that started it
         os.environ["ROS_LOG_DIR"] = str(folder)
     try:
-        return claim(configuration, "Collect").simulator.name
+        return allocate(configuration, "Collect").simulator.name
     except ConfigurationError:
         return None
 
 
-def _claim_and_die(configuration):
-    claim(configuration, "Collect")
+def _allocate_and_die(configuration):
+    allocate(configuration, "Collect")
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -98,30 +100,30 @@ def test_worker_processes_have_simulators_of_their_own(take, method, scratch):
     mine = take(configuration)
 
     with ProcessPoolExecutor(1, multiprocessing.get_context(method)) as worker:
-        theirs = worker.submit(_claim_and_name, configuration, scratch).result(LONG_S)
+        theirs = worker.submit(_allocate_and_name, configuration, scratch).result(LONG_S)
         assert (mine, theirs) == ("s-0", "s-1")
         with pytest.raises(ConfigurationError, match="each has an environment"):
             take(configuration)
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
-def test_a_forked_worker_does_not_release_its_parents_claim():
+def test_a_forked_worker_does_not_release_its_parents_simulator():
     """It inherits the parent's environment objects, and may close them as it ends."""
     configuration = make_configuration("Collect")
-    mine = claim(configuration, "Collect")
+    mine = allocate(configuration, "Collect")
 
     with ProcessPoolExecutor(1, multiprocessing.get_context("fork")) as worker:
         worker.submit(mine.lock.release).result(LONG_S)
-        assert worker.submit(_claim_and_name, configuration).result(LONG_S) is None
+        assert worker.submit(_allocate_and_name, configuration).result(LONG_S) is None
 
     assert mine.lock.held
     mine.lock.release()
 
 
-def test_a_killed_process_leaves_no_claim(take):
+def test_a_killed_process_leaves_no_lock(take):
     """The kernel frees the lock, so an attempt that follows finds every simulator."""
     configuration = make_configuration("Collect")
-    killed = multiprocessing.get_context("spawn").Process(target=_claim_and_die, args=(configuration,))
+    killed = multiprocessing.get_context("spawn").Process(target=_allocate_and_die, args=(configuration,))
     killed.start()
     killed.join(LONG_S)
 
@@ -134,4 +136,4 @@ def test_a_scratch_folder_that_cannot_be_written_is_named(monkeypatch, scratch):
     monkeypatch.setenv("ROS_LOG_DIR", str(scratch / "missing"))
 
     with pytest.raises(ConfigurationError, match=r"missing/palaestra-claim.*ROS_LOG_DIR"):
-        claim(make_configuration("Collect"), "Collect")
+        allocate(make_configuration("Collect"), "Collect")

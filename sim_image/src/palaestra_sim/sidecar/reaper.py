@@ -1,6 +1,6 @@
 """Stand between the sidecar and its simulator, so that nothing the simulator starts can outlive them.
 
-It is a program of its own, one for each start of the simulator: `python -I -S keeper.py PROGRAM ...`
+It is a program of its own, one for each start of the simulator: `python -I -S reaper.py PROGRAM ...`
 with a pipe from the sidecar as standard input, and a pipe to it as descriptor 3:
 
     in   T             send SIGTERM to the simulator's process group
