@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from palaestra.api import SimulatorGroup, TrainingJob, World
 from palaestra.errors import PlanError
-from palaestra.plan.replica import Replica, PlannedSimulator
+from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra_sim.world import builtin, check, generate
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
