@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from palaestra.api.marks import between_marks
-from palaestra_sim.stub.devices import DEVICES
-from palaestra_sim.stub.devices.kind import Kind
-from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.stub.scene.devices import DEVICES
+from palaestra_sim.stub.scene.devices.kind import Kind
+from palaestra_sim.stub.scene.simulation import Simulation
 
 PAGE = "docs/simulators.md"
 BEGIN = "<!-- generated: devices of the stub -->"

@@ -7,8 +7,8 @@
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
     ├── SidecarError            the sidecar cannot run as requested: retrying cannot help
     ├── FaultError              the description of a fault is wrong (stub.faults.language)
-    ├── NoSuchHandleError       this load of the world has no such node (stub.tree)
-    ├── NoValueError            a field has no such value (stub.fields)
+    ├── NoSuchHandleError       this load of the world has no such node (stub.scene.tree)
+    ├── NoValueError            a field has no such value (stub.scene.tree)
     └── UnsimulatedError        Webots does it, the stub does not (stub.seam)
 
 A message names the place, the fact and the remedy.

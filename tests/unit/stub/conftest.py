@@ -12,10 +12,10 @@ from collections import deque
 import pytest
 
 from palaestra_protocol.ros.rostypes import service_type
-from palaestra_sim.stub.options import StubOptions
+from palaestra_sim.stub.front.options import StubOptions
+from palaestra_sim.stub.front.simulator import Simulator
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
-from palaestra_sim.stub.simulation import Mode
-from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.world import builtin
 
 PENDING = object()

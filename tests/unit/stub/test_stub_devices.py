@@ -7,14 +7,14 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import last_field, message_type
 from palaestra_protocol.ros.tcpros import LENGTH
-from palaestra_sim.stub.catalogue import field_kinds, type_number
-from palaestra_sim.stub.devices import DEVICES
-from palaestra_sim.stub.effects import require_effect
 from palaestra_sim.stub.faults.damage import damaged_message
 from palaestra_sim.stub.faults.language import parse
 from palaestra_sim.stub.ros.topics import Publisher, Topic
+from palaestra_sim.stub.scene.devices import DEVICES
+from palaestra_sim.stub.scene.tree.catalogue import field_kinds, type_number
+from palaestra_sim.stub.scene.tree.effects import require_effect
+from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.seam import UnsimulatedError
-from palaestra_sim.stub.tree import SceneTree
 
 COMMON = {"get_model", "get_name", "get_node_type"}
 PUBLISHING = {"enable", "get_sampling_period"}

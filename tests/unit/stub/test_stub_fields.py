@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.catalogue import FieldType, field_kinds, type_number
-from palaestra_sim.stub.fields import quaternion_to_axis_angle
-from palaestra_sim.stub.geometry import axis_angle_to_quaternion
+from palaestra_sim.stub.physics.geometry import axis_angle_to_quaternion
 from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.simulation import Simulation
-from palaestra_sim.stub.tree import SceneTree
+from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.stub.scene.tree.catalogue import FieldType, field_kinds, type_number
+from palaestra_sim.stub.scene.tree.fields import quaternion_to_axis_angle
+from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world import builtin
 
 HALF = math.sqrt(0.5)

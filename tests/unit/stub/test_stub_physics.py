@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.motors import Motor, MotorSpec
-from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
-from palaestra_sim.stub.physics import WHEELS, Body, twist, wheel_speeds
+from palaestra_sim.stub.physics.body import WHEELS, Body, twist, wheel_speeds
+from palaestra_sim.stub.physics.motors import Motor, MotorSpec
+from palaestra_sim.stub.physics.obstacles import Block, Disc, Neighborhood
 
 STEP_S = 0.032
 RADIUS = 0.2

@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.simulation import Mode
+from palaestra_sim.stub.scene.simulation import Mode
 
 
 def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):

@@ -6,9 +6,9 @@ import pickle
 import pytest
 
 from palaestra_sim.errors import WorldError, WorldRefusedError
-from palaestra_sim.stub.devices.distance_sensor import DISTANCE_SENSOR
-from palaestra_sim.stub.scene import read_scene
-from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
+from palaestra_sim.stub.scene.reader import read_scene
+from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.world import builtin, parse
 
 

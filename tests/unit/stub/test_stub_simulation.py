@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics import WHEELS, wheel_speeds
-from palaestra_sim.stub.robot import seed_of
-from palaestra_sim.stub.simulation import Simulation
+from palaestra_sim.stub.physics.body import WHEELS, wheel_speeds
+from palaestra_sim.stub.scene.robot import seed_of
+from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.world import builtin
 
 
@@ -279,7 +279,7 @@ def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
 def test_it_is_small():
     """Many run on one machine: the whole stub below 120 MB, and this part of it far below."""
     program = (
-        "import pathlib, sys; from palaestra_sim.stub.simulation import Simulation;"
+        "import pathlib, sys; from palaestra_sim.stub.scene.simulation import Simulation;"
         "from palaestra_sim.world import builtin;"
         "Simulation.load(builtin('arena')).step(192);"
         "status = pathlib.Path('/proc/self/status').read_text();"

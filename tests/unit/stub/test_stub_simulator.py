@@ -3,9 +3,9 @@
 import pytest
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.front.simulator import Simulator
 from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.simulation import Mode
-from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.world import builtin
 
 

@@ -1,8 +1,9 @@
 """The stub simulator: worlds, robots and the ROS interface of Webots' `ros` controller, without Webots.
 
-- `simulation`: time, steps and resets, without ROS
-- `scene`, `devices`, `physics`, `rays`: the contents of a world, and their motion
-- `tree`, `nodes`, `fields`: the scene tree as a supervisor sees it
-- `controller`, `services`: the services and topics of one robot
+- `front`: the `ros` controllers of the robots, with their services and topics
 - `ros`: the wire
+- `scene`: the contents of a world, its devices, nodes and fields, and the steps of time
+- `physics`: motion, contacts and rays
+- `faults`: faults on demand
+- `seam`: the Protocol of a node, and services as data
 """

@@ -15,10 +15,10 @@ from pathlib import Path
 from palaestra_protocol.numbers import milliseconds
 from palaestra_sim.errors import SimError, WorldRefusedError
 from palaestra_sim.stub import faults
-from palaestra_sim.stub.options import StubOptions
+from palaestra_sim.stub.front.options import StubOptions
+from palaestra_sim.stub.front.simulator import Simulator
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
-from palaestra_sim.stub.simulation import Mode
-from palaestra_sim.stub.simulator import Simulator
+from palaestra_sim.stub.scene.simulation import Mode
 
 log = logging.getLogger(__name__)
 

@@ -20,9 +20,9 @@ from palaestra_sim.stub.faults.kinds import Fault
 from palaestra_sim.stub.faults.language import FaultError
 from palaestra_sim.stub.faults.options import Ordered
 from palaestra_sim.stub.faults.schedule import Life, Schedule
+from palaestra_sim.stub.front.simulator import Simulator
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Fields, Handler
-from palaestra_sim.stub.simulator import Simulator
 
 _HASH = re.compile(r"_[0-9a-f]{6}$")  # how generated ROS names end; it differs from job to job
 

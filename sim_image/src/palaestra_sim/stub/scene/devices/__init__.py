@@ -1,0 +1,34 @@
+"""The devices of robots: one table, with a row for each type of node.
+
+A row (`Kind`) holds everything about one type: how it is read from the world, how its value is sampled, its
+services, its topics with their messages, and the rule of its `enable`. The effect of the fault `wrong_value`
+follows from the message. A new device is one file in this package and one line in `DEVICES`; CONTRIBUTING.md
+has the steps.
+
+kind              what a row is
+distance_sensor, touch_sensor, position_sensor, rotational_motor    the rows
+pseudo            battery, keyboard and joystick, which every robot has
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
+from palaestra_sim.stub.scene.devices.kind import Kind
+from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
+from palaestra_sim.stub.scene.devices.rotational_motor import ROTATIONAL_MOTOR
+from palaestra_sim.stub.scene.devices.touch_sensor import TOUCH_SENSOR
+
+# By the type of the node. Robots sample in this order, so a new row goes to the end: a row in between would
+# change the noise of the sensors behind it.
+DEVICES: Final[Mapping[str, Kind[Any]]] = {
+    kind.node: kind
+    for kind in (
+        DISTANCE_SENSOR,
+        TOUCH_SENSOR,
+        POSITION_SENSOR,
+        ROTATIONAL_MOTOR,
+    )
+}

@@ -1,0 +1,191 @@
+"""What the table of devices has of each type, and what a device of it is.
+
+Nothing here knows a wire: services are data (`seam`), and a message is its type and its fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
+
+from palaestra_sim.stub.physics.body import Body
+from palaestra_sim.stub.physics.motors import Motor
+from palaestra_sim.stub.physics.obstacles import Ray
+from palaestra_sim.stub.scene.places import Place
+from palaestra_sim.stub.scene.reading import ELSEWHERE, Reading
+from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.stub.seam import Fields, Row
+from palaestra_sim.world import Node
+
+
+class Device(Protocol):
+    """A device of a robot. A sensor also has a `value`, which its sampler sets."""
+
+    @property
+    def name(self) -> str:
+        """Its name in the world file."""
+        ...
+
+    @property
+    def model(self) -> str:
+        """The node's `model`."""
+        ...
+
+
+DeviceT = TypeVar("DeviceT", bound=Device)
+
+
+@dataclass(slots=True, kw_only=True)
+class Part:
+    """The node of a device, while its robot is read.
+
+    Attributes:
+        reading: of the world.
+        node: of the device.
+        name: as the world file has it, else the default of its type.
+        place: its frame in the robot's; of a device on a joint, the frame of the joint.
+        motor: of the joint that it is on.
+        outline: the shapes with which the robot runs into things.
+    """
+
+    reading: Reading
+    node: Node
+    name: str
+    place: Place
+    motor: Motor | None
+    outline: list[Shape]
+
+    def number(self, name: str, default: float) -> float:
+        """Return the number of a field; `default` if the field is refused."""
+        return self.reading.number(self.node, name, default)
+
+    def text(self, name: str, default: str = "") -> str:
+        """Return the text of a field, `default` if it has none."""
+        return self.node.text(name) or default
+
+    def refuse(self, fact: str, remedy: str = ELSEWHERE) -> None:
+        """Note that this device cannot be simulated."""
+        self.reading.refuse(self.node, fact, remedy)
+
+    def take_outline(self) -> list[Shape]:
+        """Return the shapes of its boundingObject, which become part of the robot's outline."""
+        shapes = list(bounding_shapes(self.reading, self.node, self.place))
+        self.outline += shapes
+        return shapes
+
+
+class Carrier(Protocol):
+    """The robot that carries a device, for sampling.
+
+    Attributes:
+        body: None if nothing can run into the robot.
+    """
+
+    body: Body | None
+
+    def gauss(self, mean: float, deviation: float, /) -> float:
+        """Return the next number of the robot's own noise."""
+        ...
+
+    def look(
+        self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
+    ) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each ray travels now, in metres.
+
+        Args:
+            rays: in the robot's frame.
+            reach_m: of each ray: the longest distance that matters.
+            heights_m: of each ray, in the robot's frame.
+        """
+        ...
+
+
+class Source(Protocol):
+    """Holds a value that a topic publishes: a sensor, or a part of one.
+
+    Attributes:
+        value: of the last step; a number, or as many as the last field of the message has.
+    """
+
+    value: Any
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Topic:
+    """A topic of one device.
+
+    Attributes:
+        name: below the device's name.
+        type_name: of its messages, which begin with a header and end with a field of numbers, the reading.
+        source: of the reading; None if it never has one.
+        constants: the fields between the header and the reading.
+    """
+
+    name: str
+    type_name: str
+    source: Source | None
+    constants: Fields = field(default_factory=dict)
+
+
+Sample = Callable[[], None]
+Enable = Callable[[int, int], bool]  # period and step in ms; returns whether the period is accepted
+
+
+def whole_steps(period_ms: int, step_ms: int) -> bool:
+    """Accept a period that is a multiple of the controller's last step."""
+    return period_ms % step_ms == 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind(Generic[DeviceT]):
+    """A row of the table: one type of device.
+
+    Attributes:
+        node: the type of its node.
+        name: of a device whose node has none.
+        fields: of the node, written as in `catalogue`, beside `name` and, off joints, those of a Solid.
+        on_joint: whether it is a device of a joint; otherwise it has a frame of its own on the robot.
+        read: returns the device of a node.
+        sampler: returns a function that gives devices of one robot their values; None: they have none.
+        services: returns those beside `get_model`, `get_name`, `get_node_type` and, with topics, `enable` and
+            `get_sampling_period`.
+        topics: returns those that `enable` begins to publish.
+        enable: whether a period is accepted; 0, which ends publishing, always is.
+    """
+
+    node: str
+    name: str
+    fields: str
+    on_joint: bool = False
+    read: Callable[[Part], DeviceT]
+    sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
+    services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
+    topics: Callable[[DeviceT], tuple[Topic, ...]] = lambda _: ()
+    enable: Enable = whole_steps
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Devices:
+    """All devices of a robot by name, in the order of the world file, each with its row of the table."""
+
+    rows: dict[str, tuple[Kind[Any], Any]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.rows)
+
+    @property
+    def motors(self) -> dict[str, Motor]:
+        """The motors."""
+        return {name: it for name, (_, it) in self.rows.items() if isinstance(it, Motor)}
+
+    @property
+    def sensors(self) -> Mapping[str, Source]:
+        """The devices that have a value."""
+        return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
+
+    def of(self, kind: Kind[DeviceT]) -> tuple[DeviceT, ...]:
+        """Return the devices of one type."""
+        return tuple(device for found, device in self.rows.values() if found is kind)

@@ -1,0 +1,138 @@
+"""One simulated robot: its motors, its sensors, and its noise.
+
+The seed of the noise comes in the robot's `customData`, either as a whole number (`"7"`) or as JSON
+(`'{"seed": 7}'`), and is taken when the world is loaded and at each `simulation_reset`. Anything
+else leaves the seed as it was; the first one is WorldInfo.randomSeed. From a reset on, the noise is a
+function of the seed and of the number of steps alone. Every sensor with noise draws at every step, also
+while it is not enabled: types in the order of the table of devices, sensors in that of the world file.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Mapping, Sequence
+
+from palaestra_sim.stub.physics.body import Body
+from palaestra_sim.stub.physics.motors import Motor
+from palaestra_sim.stub.physics.obstacles import Neighborhood, Ray
+from palaestra_sim.stub.physics.rays import Fan
+from palaestra_sim.stub.scene.devices import DEVICES
+from palaestra_sim.stub.scene.devices.kind import Sample, Source
+from palaestra_sim.stub.scene.places import Place
+from palaestra_sim.stub.scene.robot_reader import RobotParts
+from palaestra_sim.stub.scene.shapes import Shape
+
+
+class Robot:
+    """A robot of the world, whether it drives or only watches.
+
+    Attributes:
+        name: Robot.name in the world file.
+        motors: by device name.
+        sensors: by device name; each has a `value` after a step.
+        samplers: give all sensors their values of this moment, in this order.
+        gauss: returns the next number of the robot's noise, from mean and deviation.
+        place: its frame.
+        body: None for a robot that only watches.
+        custom_data: the customData field, as it stands now.
+    """
+
+    def __init__(self, parts: RobotParts, random_seed: int) -> None:
+        self.parts = parts
+        self.name = parts.name
+        self.motors: dict[str, Motor] = parts.devices.motors
+        self.sensors: Mapping[str, Source] = parts.devices.sensors
+        self.place: Place = parts.place
+        self.body: Body | None = parts.body
+        self.custom_data = parts.node.text("customData") or ""
+        self.seed = random_seed
+        self._random = random.Random()  # noqa: S311 - noise, not secrets
+        self.gauss = self._random.gauss
+        self._fans: list[tuple[Fan, tuple[float, float]]] = []
+        self.samplers: tuple[Sample, ...] = tuple(
+            kind.sampler(devices, self)
+            for kind in DEVICES.values()
+            if kind.sampler is not None and (devices := parts.devices.of(kind))
+        )
+        self._stray_motors = tuple(
+            it for it in self.motors.values() if self.body is None or not self.body.driven_by(it)
+        )
+        self.sow()
+
+    def face(self, solids: Sequence[Shape], others: Sequence[Robot]) -> None:
+        """Set the obstacles of this robot and its rays."""
+        bodies = [it.body for it in others if it.body is not None and it.body.radius > 0.0]
+        height = self.place.world_pose.position[2]
+        if self.body is not None and self.body.radius > 0.0:
+            in_the_way = _between(solids, self.parts.heights, height)
+            self.body.face(_neighborhood(in_the_way, self.body.radius), bodies)
+        for fan, heights in self._fans:
+            fan.face(_neighborhood(_between(solids, heights, height), fan.reach_m), bodies)
+
+    def look(
+        self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
+    ) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each ray travels now, in metres; see `Carrier`."""
+        fan = Fan(rays, reach_m)
+        self._fans.append((fan, (min(heights_m), max(heights_m))))
+        cast, frame = fan.cast, self._frame
+        return lambda: cast(frame())
+
+    def advance(self, step_s: float) -> None:
+        """Move on by one basic step."""
+        if self.body is not None:
+            self.body.advance(step_s)
+        for motor in self._stray_motors:
+            motor.speed_rad_s = motor.demand(step_s)
+            motor.angle_rad += motor.speed_rad_s * step_s
+
+    def reset(self) -> None:
+        """Return to the start of the world file: pose, rest, motors, noise. customData stays."""
+        self.place.return_to_start()
+        for motor in self.motors.values():
+            motor.reset()
+        self.halt()
+        self.sow()
+
+    def halt(self) -> None:
+        """Stop all motion."""
+        if self.body is not None:
+            self.body.halt()
+
+    def sow(self) -> None:
+        """Restart the noise with the seed that is now in customData."""
+        self.seed = seed_of(self.custom_data, self.seed)
+        self._random.seed(self.seed)
+
+    def _frame(self) -> tuple[float, float, float, float]:
+        if self.body is not None:
+            return self.body.frame
+        pose = self.place.world_pose
+        return pose.position[0], pose.position[1], pose.rotation[0], pose.rotation[3]
+
+
+def seed_of(custom_data: str, otherwise: int) -> int:
+    """Return the seed in a robot's customData: `7` or `{"seed": 7}`; else `otherwise`."""
+    try:
+        value = json.loads(custom_data)
+    except (ValueError, RecursionError):
+        return otherwise
+    if isinstance(value, dict):
+        value = value.get("seed")
+    return value if isinstance(value, int) and not isinstance(value, bool) else otherwise
+
+
+def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
+    """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
+    low, high = heights[0] + shift, heights[1] + shift
+    found = []
+    for shape in solids:
+        bottom, top = shape.heights()
+        if bottom < high and top > low:
+            found.append(shape)
+    return found
+
+
+def _neighborhood(shapes: Sequence[Shape], reach_m: float) -> Neighborhood:
+    return Neighborhood([shape.obstacle() for shape in shapes], reach_m)

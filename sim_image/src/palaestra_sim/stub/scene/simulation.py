@@ -1,0 +1,158 @@
+"""The simulated world, without ROS: load it, command motors, step it, read sensors.
+
+    simulation = Simulation.load(world_bytes)
+    robot = simulation.robots[0]
+    robot.motors["wheel0_joint"].set_position(math.inf)
+    robot.motors["wheel0_joint"].set_velocity(2.0)
+    simulation.step(192)
+    robot.sensors["ir1"].value
+
+The same world, commands and seed give the same values, bit for bit. Time advances only by steps; no clock is
+read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+
+from palaestra_sim.stub.scene.places import Place
+from palaestra_sim.stub.scene.reader import Scene, read_scene
+from palaestra_sim.stub.scene.robot import Robot
+from palaestra_sim.world import World, parse
+
+
+class Mode(IntEnum):
+    """The modes of the simulator, with the numbers of `simulation_set_mode` in R2021a and later."""
+
+    PAUSE = 0
+    REAL_TIME = 1
+    FAST = 2
+
+
+class Simulation:
+    """One loaded world. A reload makes another Simulation.
+
+    Attributes:
+        world: as read.
+        robots: in the order of the world file.
+        time_ms: simulated so far, back to 0 at a reset.
+        mode: for the program that paces the steps; `step` itself works in all three.
+        quit_status: the exit status that `quit` asked for; None before.
+    """
+
+    def __init__(self, world: World, scene: Scene, mode: Mode) -> None:
+        self.world = world
+        self.scene = scene
+        self.robots = tuple(Robot(parts, scene.random_seed) for parts in scene.robots)
+        self.time_ms = 0
+        self.mode = mode
+        self.quit_status: int | None = None
+        self._pending: list[Callable[[], None]] = []
+        self._reset_asked = False
+        self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
+        self._step_s = scene.basic_step_ms / 1000.0
+        self._solids_moved = False
+        self._arrange()
+
+    @classmethod
+    def load(cls, source: bytes, name: str = "world", mode: Mode = Mode.REAL_TIME) -> Simulation:
+        """Return the simulation of a world file.
+
+        Raises:
+            WorldError: the file is wrong, or holds something that the stub cannot simulate.
+        """
+        world = parse(source, name)
+        return cls(world, read_scene(world, name), mode)
+
+    @property
+    def basic_step_ms(self) -> int:
+        """WorldInfo.basicTimeStep."""
+        return self.scene.basic_step_ms
+
+    def step(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`, then give the sensors their values.
+
+        Raises:
+            ValueError: the duration is no positive multiple of the basic step.
+        """
+        self.advance(duration_ms)
+        self.sample()
+
+    def advance(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`; the sensors keep their values.
+
+        Raises:
+            ValueError: the duration is no positive multiple of the basic step.
+        """
+        count, rest = divmod(duration_ms, self.scene.basic_step_ms)
+        if rest or count < 1:
+            raise ValueError(
+                f"step: {duration_ms} ms is no multiple of the basic step;"
+                f" use one of {self.scene.basic_step_ms} ms"
+            )
+        for _ in range(count):
+            self._basic_step()
+
+    def sample(self) -> None:
+        """Give every sensor its value of this moment."""
+        for sample in self._samplers:
+            sample()
+
+    def before_next_step(self, change: Callable[[], None]) -> None:
+        """Register a change, such as the write of a field, for the beginning of the next basic step."""
+        self._pending.append(change)
+
+    def reset(self) -> None:
+        """Request a reset of the world within the next basic step.
+
+        Restored: time, poses of all solids and robots, motors, noise (with the seed that is then in
+        customData). Not restored: other fields that were written.
+        """
+        self._reset_asked = True
+
+    def reset_physics(self) -> None:
+        """Stop all motion, at once."""
+        for robot in self.robots:
+            robot.halt()
+
+    def quit(self, status: int) -> None:
+        """Ask for the end of the simulator."""
+        self.quit_status = status
+
+    def place_of(self, first_byte: int) -> Place | None:
+        """Return the place of the node that begins at this byte of the world file; None if it has none."""
+        return self.scene.places.get(first_byte)
+
+    def moved(self, place: Place) -> None:
+        """Update the places of the solids, if `place` is part of one of them."""
+        if any(place in shape.place.chain() for shape in self.scene.solids):
+            self._solids_moved = True
+            self._arrange()
+
+    def _arrange(self) -> None:
+        for robot in self.robots:
+            others = [it for it in self.robots if it is not robot]
+            robot.face(self.scene.solids, others)
+
+    def _basic_step(self) -> None:
+        if self._pending:
+            pending, self._pending = self._pending, []
+            for change in pending:
+                change()
+        for robot in self.robots:
+            robot.advance(self._step_s)
+        if self._reset_asked:
+            self._restore()
+        self.time_ms += self.scene.basic_step_ms
+
+    def _restore(self) -> None:
+        self._reset_asked = False
+        self.time_ms = 0
+        for place in self.scene.places.values():
+            place.return_to_start()
+        for robot in self.robots:
+            robot.reset()
+        if self._solids_moved:
+            self._solids_moved = False
+            self._arrange()

@@ -1,0 +1,81 @@
+"""Refuse writes of fields that have an effect in Webots but none in the stub.
+
+Otherwise a client that randomizes a world would read back its writes, but train in a world that stays the
+same.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from palaestra_sim.stub.scene.devices import DEVICES
+from palaestra_sim.stub.scene.tree.nodes import SceneNode
+from palaestra_sim.stub.seam import UnsimulatedError
+
+# Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
+_ACTING: Final = DEVICES.keys() | frozenset(
+    (
+        "ContactProperties",
+        "Group",
+        "HingeJoint",
+        "HingeJointParameters",
+        "Physics",
+        "Pose",
+        "Robot",
+        "Solid",
+        "Transform",
+        "WorldInfo",
+    )
+)
+_FOR_PEOPLE: Final = frozenset(("description", "info", "model", "recognitionColors", "title"))
+_PLACING: Final = frozenset(("translation", "rotation"))
+_MOUNTED: Final = frozenset(kind.node for kind in DEVICES.values() if not kind.on_joint)
+
+
+def require_effect(node: SceneNode, field: str) -> None:
+    """Check that a write of the node's field `field` has the same effect as in Webots.
+
+    Raises:
+        UnsimulatedError: it would have no effect.
+    """
+    takes_effect = _is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)
+    if node.outline or not takes_effect:
+        part = " of a boundingObject" if node.outline else ""
+        raise UnsimulatedError(
+            f"the stub cannot change {node.type_name}.{field}{part} while it runs;"
+            " write it into the world file, or use driver webots"
+        )
+
+
+def require_true_value(node: SceneNode, field: str) -> None:
+    """Check that Webots would not change a field when a joint moves.
+
+    Raises:
+        UnsimulatedError: it would change it.
+    """
+    if node.jointed and field in _PLACING:
+        raise UnsimulatedError(
+            f"a {node.type_name} on a joint stands still in the stub; read the joint's PositionSensor"
+        )
+
+
+def _is_drawn_only(node: SceneNode, field: str) -> bool:
+    return node.type_name not in _ACTING or field in _FOR_PEOPLE
+
+
+def _reaches_robot(node: SceneNode, field: str) -> bool:
+    return node.robot is not None and field == "customData"
+
+
+def _moves(node: SceneNode, field: str) -> bool:
+    """Return whether a write of a node's place moves it; rays and outlines of a robot do not move."""
+    if field not in _PLACING or node.place is None or node.jointed:
+        return False
+    if node.robot is not None or not _on_robot(node):
+        return True
+    return not any(it.type_name in _MOUNTED for it in (node, *node.descendants()))
+
+
+def _on_robot(node: SceneNode) -> bool:
+    parent = node.parent
+    return parent is not None and (parent.robot is not None or _on_robot(parent))

@@ -1,0 +1,192 @@
+"""Fields of nodes: typed values that a supervisor reads and writes.
+
+The next read answers a written value at once; the simulation sees it when the next basic step begins.
+`translation` and `rotation` move things, `customData` reaches the robot, and a field that only draws has no
+effect in Webots either. Every other write is refused: it would be read back, and change nothing (`effects`).
+
+As in Webots, a value that is invalid for the field is ignored without an error.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.stub.physics.geometry import AxisAngle
+from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.stub.scene.tree.catalogue import WIDTH, FieldKind, FieldType
+from palaestra_sim.stub.scene.tree.effects import require_effect, require_true_value
+from palaestra_sim.stub.scene.tree.nodes import SceneNode
+
+
+class NoValueError(SimError, LookupError):
+    """A field has no value of that type at that index; Webots would read a null pointer."""
+
+
+class Field:
+    """One field of one node.
+
+    Attributes:
+        handle: for clients; the tree sets it.
+        node: its node.
+        name: as in the world file.
+        kind: its declaration.
+    """
+
+    def __init__(self, node: SceneNode, name: str, kind: FieldKind, simulation: Simulation) -> None:
+        self.handle = 0
+        self.node = node
+        self.name = name
+        self.kind = kind
+        self._simulation = simulation
+        self._values = _initial(node, name, kind)
+        self._writes = 0  # written, not yet seen by the simulation
+
+    @property
+    def count(self) -> int:
+        """Return the number of values, like `get_count`: -1 for a field of exactly one."""
+        return len(self._current()) if self.kind.multiple else -1
+
+    def get(self, type_: FieldType, index: int = 0) -> Any:
+        """Return the value at `index` (ignored by a field of exactly one).
+
+        A bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
+
+        Raises:
+            NoValueError: the field has another type, or no value at that index.
+            UnsimulatedError: Webots would change the value as a joint moves.
+        """
+        require_true_value(self.node, self.name)
+        values = self._current()
+        at = index if self.kind.multiple else 0
+        if type_ is not self.kind.type or not -len(values) <= at < len(values):
+            raise NoValueError(f"{self.name} ({self.kind.name}) has no {type_.name} at {index}")
+        return values[at]
+
+    def set(self, type_: FieldType, index: int, value: Any) -> None:
+        """Write a value: visible at once, in effect from the next basic step on.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
+        at = index if self.kind.multiple else 0
+        if type_ is not self.kind.type or not _acceptable(type_, value):
+            return
+        values = list(self._current())
+        if not -len(values) <= at < len(values):
+            return
+        self._require_effect()
+        values[at] = value
+        self._values = values
+        self._writes += 1
+        self._simulation.before_next_step(self._take_effect)
+
+    def insert(self, type_: FieldType, index: int, value: Any) -> bool:
+        """Insert a value before `index`, -1 for the end; return False if that is impossible.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
+        size = len(self._values)
+        fits = self.kind.multiple and type_ is self.kind.type and -size - 1 <= index <= size
+        if not fits or not _acceptable(type_, value):
+            return False
+        self._require_effect()
+        self._values.insert(index if index >= 0 else size + 1 + index, value)
+        return True
+
+    def remove(self, index: int) -> bool:
+        """Remove the value at `index`; return False if there is none, or if it must stay.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
+        size = len(self._values)
+        removable = self.kind.multiple and self.kind.type is not FieldType.NODE
+        if not removable or not -size <= index < size:
+            return False
+        self._require_effect()
+        del self._values[index]
+        return True
+
+    def _require_effect(self) -> None:
+        require_effect(self.node, self.name)
+
+    def _current(self) -> list[Any]:
+        """Return the values: those written last, else those of the simulation."""
+        node = self.node
+        if self._writes == 0:
+            if node.place is not None and self.name == "translation":
+                return [node.place.translation]
+            if node.place is not None and self.name == "rotation":
+                return [node.place.rotation]
+            if node.robot is not None and self.name == "customData":
+                return [node.robot.custom_data]
+        return self._values
+
+    def _take_effect(self) -> None:
+        """Apply the written values to the simulation; of several writes the last one counts."""
+        self._writes -= 1
+        node = self.node
+        if self._writes:
+            return
+        if node.place is not None and self.name == "translation":
+            node.place.translation = self._values[0]
+        elif node.place is not None and self.name == "rotation":
+            node.place.rotation = self._values[0]
+        elif node.robot is not None and self.name == "customData":
+            node.robot.custom_data = self._values[0]
+            return
+        else:
+            return
+        self._simulation.moved(node.place)
+
+
+def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
+    """Return the axis and angle that the controller computes from a quaternion, with its RosMathUtils bug.
+
+    An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then. For the exact identity that is NaN,
+    so a zero rotation that was read cannot be written back. If |w| > 1, the angle is NaN.
+    """
+    angle_rad = 2.0 * math.acos(w) if -1.0 <= w <= 1.0 else math.nan
+    if angle_rad < 1e-4:  # noqa: PLR2004 - Source: RosMathUtils
+        angle_rad = 0.0
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return math.nan, math.nan, math.nan, angle_rad
+    return x / length, y / length, z / length, angle_rad
+
+
+def _acceptable(type_: FieldType, value: Any) -> bool:
+    """Return whether libController accepts a value: no NaN, no infinity, no axis without direction."""
+    if type_ is FieldType.ROTATION and not any(value[:3]):
+        return False
+    if isinstance(value, tuple):
+        return all(map(math.isfinite, value))
+    return type_ is not FieldType.FLOAT or math.isfinite(value)
+
+
+def _initial(node: SceneNode, name: str, kind: FieldKind) -> list[Any]:
+    """Return the values that the world file gives, or the default."""
+    if kind.type is FieldType.NODE:
+        inside: list[Any] = list(node.inside.get(name, ()))
+        return inside if kind.multiple or inside else [None]
+    written = node.source.fields.get(name) if node.source is not None else None
+    items = list(written.items) if written is not None else _default(kind)
+    width = WIDTH.get(kind.type, 1)
+    if width > 1:
+        return [tuple(items[at : at + width]) for at in range(0, len(items) - width + 1, width)]
+    return [_scalar(kind.type, item) for item in items]
+
+
+def _default(kind: FieldKind) -> list[Any]:
+    if kind.type is FieldType.STRING:
+        return [] if kind.multiple and not kind.default else [kind.default]
+    if kind.type is FieldType.BOOL:
+        return [kind.default == "TRUE"]
+    return [float(word) for word in kind.default.split()]
+
+
+def _scalar(type_: FieldType, item: Any) -> Any:
+    return int(item) if type_ is FieldType.INT32 else item
