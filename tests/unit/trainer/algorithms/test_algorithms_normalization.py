@@ -23,7 +23,7 @@ from palaestra_trainer.run.measuring import measure
 from palaestra_trainer.simulators.keeper import Keeper
 from tests.pages import blocks
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = Path(__file__).parents[4] / "docs"
 GAMMA = 0.9
 HYPERPARAMETERS = {
     "DQN": {"learning_starts": 10, "batch_size": 8, "buffer_size": 200, "policy_kwargs": {"net_arch": [8]}},

@@ -42,13 +42,13 @@ def test_a_name_cannot_lead_to_another_address():
 @pytest.mark.parametrize("resource", resources.ALL, ids=lambda resource: resource.plural)
 def test_an_object_names_its_resource(resource):
     """What the plan makes knows where it belongs."""
-    assert resources.of({"apiVersion": resource.api_version, "kind": resource.kind}) == resource
+    assert resources.resource_of({"apiVersion": resource.api_version, "kind": resource.kind}) == resource
 
 
 def test_a_kind_that_the_operator_does_not_use_is_refused_by_name():
     """It has no RBAC for it either."""
     with pytest.raises(KeyError, match="apps/v1 Deployment"):
-        resources.of({"apiVersion": "apps/v1", "kind": "Deployment"})
+        resources.resource_of({"apiVersion": "apps/v1", "kind": "Deployment"})
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from palaestra_trainer.robots.base import SENSOR_RANGE_M
 from palaestra_trainer.testing import fake_arena
 
 SHEET = inspect.getdoc(MoveToTargetEnv) or ""
-EXAMPLE = Path(__file__).parents[3] / "manifests" / "examples" / "move-to-target.yaml"
+EXAMPLE = Path(__file__).parents[4] / "manifests" / "examples" / "move-to-target.yaml"
 Row = dict[str, str]
 
 
