@@ -195,3 +195,31 @@ def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
 
     assert simulation.time_ms == min(asked)
     assert waiting == [total > simulation.time_ms for total in asked]
+
+
+class OtherSimulation:
+    """A simulation of another kind, which notes what its steps ask of it."""
+
+    def __init__(self):
+        self.mode = Mode.FAST
+        self.quit_status = None
+        self.asked = []
+
+    def advance(self, duration_ms):
+        """Note the duration."""
+        self.asked.append(duration_ms)
+
+    def sample(self):
+        """Note that the sensors get their values."""
+        self.asked.append("sample")
+
+
+def test_any_simulation_can_be_stepped():
+    """Other simulators stand behind the same controllers: they move, then sample once a step."""
+    simulation, answers = OtherSimulation(), []
+    stepping = Stepping(simulation)
+
+    stepping.ask(object(), 192, answers.append)
+
+    assert simulation.asked == [192, "sample"]
+    assert answers == [True]

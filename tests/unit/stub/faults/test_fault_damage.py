@@ -38,6 +38,24 @@ def test_the_reading_becomes_nan_and_the_rest_stays(type_name, field):
     assert (read.header.seq, read.header.frame_id) == (7, "robotino/ir1")
 
 
+def test_all_numbers_of_a_reading_become_nan():
+    """A client that checks one coordinate of a GPS would be wrong."""
+    sound = message("geometry_msgs/PointStamped", point={"x": 1.0, "y": 2.0, "z": 3.0})
+
+    wrong = payload(damaged_message("geometry_msgs/PointStamped", sound, WRONG_VALUE))
+    read = message_type("geometry_msgs/PointStamped").codec.decode(wrong)
+
+    assert all(map(math.isnan, (read.point.x, read.point.y, read.point.z)))
+
+
+def test_a_message_too_short_for_a_reading_stays_short():
+    """Cut three times, a message of a GPS has fewer bytes than its reading."""
+    sound = message("geometry_msgs/PointStamped")
+    damages = (*WRONG_SHAPE * 3, *WRONG_VALUE)
+
+    assert len(payload(damaged_message("geometry_msgs/PointStamped", sound, damages))) < 24
+
+
 def test_a_bumper_has_nothing_to_become_nan():
     """True and False are all there is."""
     sound = message("webots_ros/BoolStamped", data=True)
