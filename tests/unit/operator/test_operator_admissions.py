@@ -5,8 +5,8 @@ import pytest
 from palaestra.cluster import Forbidden, NotFound, ServerError
 from palaestra.operator.admissions import Admissions
 from palaestra.operator.asking import PATIENCE_S, RECHECK_S, Answers
+from palaestra.operator.hindrances import Hindrances
 from palaestra.operator.memory import REMEMBERED
-from palaestra.operator.refusals import Refusals
 
 KEY, UID = ("robots", "job"), "job-uid"
 QUEUED = {"kueue.x-k8s.io/queue-name": "trainings"}
@@ -102,13 +102,13 @@ def test_an_api_server_in_trouble_is_asked_again_after_the_pause_and_what_it_sai
 
 def test_jobs_in_queues_take_no_place_and_no_turn_from_pods_that_are_refused(server):
     """Thousands wait in queues for days, and that is no trouble."""
-    admissions, refusals = (kind(server, lambda: server.now) for kind in (Admissions, Refusals))
+    admissions, hindrances = (kind(server, lambda: server.now) for kind in (Admissions, Hindrances))
     for number in range(REMEMBERED):
         admissions.of(("robots", f"job-{number}"), UID, [job(f"u{number}")], [])
     server.now += PATIENCE_S
     beyond = admissions.of(KEY, UID, [job("beyond")], [])
 
-    refused = refusals.of(KEY, UID, [job(suspend=False)], [])
+    refused = hindrances.of(KEY, UID, [job(suspend=False)], [])
 
     assert beyond.unasked == {"beyond"}
     assert (refused.unasked, refused.again_s) == (frozenset(), PATIENCE_S)

@@ -8,7 +8,7 @@ that cannot be read counts as absent.
         observed = replace(observed, sources={each: lookup(each) for each in references(job)}, kueue=...)
 """
 
-from palaestra.observe.observing import last_refusal, observe
+from palaestra.observe.observing import last_hindrance, observe
 from palaestra.observe.shortening import Lacking, lacking
 from palaestra.observe.sources import references
 from palaestra.observe.trim import trimmed, whole
@@ -53,7 +53,7 @@ __all__ = [
     "SourceKind",
     "Suspended",
     "lacking",
-    "last_refusal",
+    "last_hindrance",
     "observe",
     "references",
     "trimmed",

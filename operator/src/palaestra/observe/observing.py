@@ -149,7 +149,7 @@ def _unmounted(newest: PodView, objects: Objects) -> str:
     return text(last, "message")
 
 
-def last_refusal(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
+def last_hindrance(events: Iterable[Raw], uid: str) -> dict[str, Any] | None:
     """Return the last event about what the object with this uid lacks, with only the fields read here."""
     found = (raw for raw in events if text(raw, "reason") in {"FailedCreate", *UNMOUNTED})
     last = max(found, key=_when, default=None)

@@ -3,7 +3,7 @@
 - `controller`: one reconcile: observe, plan, decide, act, one status write, events
 - `looking`: everything that the operator observes of one TrainingJob
 - `caches`, `following`: the watched objects
-- `asking`, `admissions`, `refusals`, `switchers`, `strangers`: facts that no watch reports, read on demand
+- `asking`, `admissions`, `hindrances`, `switchers`, `strangers`: facts that no watch reports, read on demand
 - `poller`: the trainers' own reports, over the pod network
 - `schedule`: which trainer to poll next, so that silent pods delay no others
 - `trainers`: the pods to poll

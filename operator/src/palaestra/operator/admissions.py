@@ -13,7 +13,7 @@ from palaestra.cluster.resources import WORKLOADS
 from palaestra.objects import Key, Object
 from palaestra.observe import why_not_admitted
 from palaestra.operator.asking import Answers, Asking
-from palaestra.operator.refusals import is_suspended, podless
+from palaestra.operator.hindrances import is_suspended, podless
 from palaestra.plan.job import QUEUE_LABEL
 
 JOB_UID_LABEL = "kueue.x-k8s.io/job-uid"  # of a Workload; Kueue's pkg/controller/constants/constants.go

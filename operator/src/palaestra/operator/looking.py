@@ -29,7 +29,7 @@ from palaestra.operator.admissions import Admissions
 from palaestra.operator.caches import Caches
 from palaestra.operator.confirming import Outdated
 from palaestra.operator.denials import Denials
-from palaestra.operator.refusals import Refusals
+from palaestra.operator.hindrances import Hindrances
 from palaestra.operator.strangers import Strangers
 from palaestra.operator.switchers import Switchers
 
@@ -76,7 +76,7 @@ class Looking:
         self._strangers = strangers
         self._denials = denials
         self._polled = polled
-        self._refusals = Refusals(api)
+        self._hindrances = Hindrances(api)
         self._admissions = Admissions(api)
         self._switchers = Switchers(api)
         self._kueue = (-KUEUE_S, False)
@@ -90,7 +90,7 @@ class Looking:
         key, uid = (job.metadata.namespace, job.metadata.name), job.metadata.uid or ""
         jobs, pods = self._caches.children(JOBS, key), self._caches.children(PODS, key)
         strangers = self._strangers.among(key, uid, {job["metadata"]["name"] for job in jobs})
-        refusals = self._refusals.of(key, uid, jobs, pods)
+        hindrances = self._hindrances.of(key, uid, jobs, pods)
         admissions = self._admissions.of(key, uid, jobs, pods)
         objects = Objects(
             jobs=[*jobs, *strangers],
@@ -98,16 +98,18 @@ class Looking:
             claims=self._caches.children(CLAIMS, key),
             config_maps=self._caches.children(CONFIG_MAPS, key),
             policies=self._caches.children(NETWORK_POLICIES, key),
-            events=list(refusals.facts.values()),
+            events=list(hindrances.facts.values()),
             unadmitted=admissions.facts,
-            unasked=admissions.unasked | {key for key, _ in refusals.unasked},
+            unasked=admissions.unasked | {key for key, _ in hindrances.unasked},
             polled=self._polled(),
             denied=self._denials.known(key, uid),
             switchers=self._switchers.of(key, uid, job, jobs),
         )
         observed, asked_s = self._asked(job, observe(job, objects))
         met_s = RECHECK_S if strangers else None
-        return Seen(observed=observed, again_s=earliest(refusals.again_s, admissions.again_s, asked_s, met_s))
+        return Seen(
+            observed=observed, again_s=earliest(hindrances.again_s, admissions.again_s, asked_s, met_s)
+        )
 
     def ask_for(self, job: TrainingJob, seen: Seen) -> Seen:
         """Return the observation of a job's copy, completed with all objects to which the whole job refers.
@@ -136,7 +138,7 @@ class Looking:
 
     def forget(self, key: Key) -> None:
         """Forget a TrainingJob that is gone."""
-        for each in (self._strangers, self._denials, self._refusals, self._admissions, self._switchers):
+        for each in (self._strangers, self._denials, self._hindrances, self._admissions, self._switchers):
             each.forget(key)
 
     def _asked(self, job: TrainingJob, observed: Observed) -> tuple[Observed, float | None]:

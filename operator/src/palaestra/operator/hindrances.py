@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterator, Sequence
 from palaestra.cluster import Api
 from palaestra.cluster.resources import EVENTS
 from palaestra.objects import Key, Object
-from palaestra.observe import last_refusal
+from palaestra.observe import last_hindrance
 from palaestra.observe.reading import holds, owners
 from palaestra.operator.asking import Answers, Asking
 
 Lacking = tuple[str, str]  # uid of a Job or pod, and a selector of the events with the reason
 
 
-class Refusals(Asking[Lacking, Object]):
+class Hindrances(Asking[Lacking, Object]):
     """The last event about each Job without a pod and each pod without its volumes.
 
     Args:
@@ -42,7 +42,7 @@ class Refusals(Asking[Lacking, Object]):
     def _event(self, namespace: str, lacking: Lacking) -> Object | None:
         uid, about = lacking
         found = self._api.list(EVENTS, namespace, fields=f"involvedObject.uid={uid},{about}")
-        return last_refusal(found, uid)
+        return last_hindrance(found, uid)
 
 
 def podless(jobs: Sequence[Object], pods: Sequence[Object]) -> Iterator[Object]:

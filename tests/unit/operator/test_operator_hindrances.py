@@ -4,8 +4,8 @@ import pytest
 
 from palaestra.cluster import NotFound
 from palaestra.operator.asking import LONGEST_PAUSE_S, PATIENCE_S, RECHECK_S, Answers
+from palaestra.operator.hindrances import Hindrances
 from palaestra.operator.memory import REMEMBERED
-from palaestra.operator.refusals import Refusals
 from palaestra.operator.strangers import Strangers
 
 KEY, UID = ("robots", "job"), "job-uid"
@@ -70,9 +70,9 @@ def events(answers):
 
 def test_a_new_job_is_given_some_seconds(server):
     """Nearly all have a pod at once; nobody is asked."""
-    refusals = Refusals(server, lambda: server.now)
+    hindrances = Hindrances(server, lambda: server.now)
 
-    found = refusals.of(KEY, UID, [job()], [])
+    found = hindrances.of(KEY, UID, [job()], [])
 
     assert (events(found), server.asked) == ([], 0)
     assert found.again_s == PATIENCE_S
@@ -80,41 +80,41 @@ def test_a_new_job_is_given_some_seconds(server):
 
 def test_after_that_its_events_are_read_now_and_then(server):
     """Not at every look: a job is looked at many times a second while its pods change."""
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, [job()], [])
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
 
-    first, second = refusals.of(KEY, UID, [job()], []), refusals.of(KEY, UID, [job()], [])
+    first, second = hindrances.of(KEY, UID, [job()], []), hindrances.of(KEY, UID, [job()], [])
     assert first == second
     assert (events(first), first.again_s, server.asked) == ([LAST], RECHECK_S, 1)
 
 
 def test_the_pauses_grow_to_five_minutes(server):
     """A quota that is spent for a night is no news."""
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, [job()], [])
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
 
     pauses = []
     for _ in range(7):
-        pauses.append(refusals.of(KEY, UID, [job()], []).again_s)
+        pauses.append(hindrances.of(KEY, UID, [job()], []).again_s)
         server.now += pauses[-1]
 
     assert pauses == [15, 30, 60, 120, 240, 300, 300]
     assert server.asked == 7
 
 
-def look_at(refusals, number):
+def look_at(hindrances, number):
     """Return what is known about the Job, which should have a pod, of one of many TrainingJobs."""
     name, uid = f"job-{number}", f"u{number}"
     raw = job(metadata={"name": name, "namespace": "robots", "uid": uid})
-    return refusals.of(("robots", name), f"job-{uid}", [raw], [])
+    return hindrances.of(("robots", name), f"job-{uid}", [raw], [])
 
 
 def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_turn(server):
     """Whatever a namespace does; a look before the turn asks nobody."""
-    refusals = Refusals(server, lambda: server.now)
-    due = {number: look_at(refusals, number).again_s for number in range(1500)}
+    hindrances = Hindrances(server, lambda: server.now)
+    due = {number: look_at(hindrances, number).again_s for number in range(1500)}
     looks = 0
 
     begun = server.now
@@ -122,25 +122,25 @@ def test_at_most_five_events_lists_a_second_are_asked_for_and_everybody_has_a_tu
     while server.asked < 1500:
         number = min(due, key=due.__getitem__)
         server.now = due[number]
-        due[number] = server.now + look_at(refusals, number).again_s
+        due[number] = server.now + look_at(hindrances, number).again_s
         looks += 1
 
     busiest = max(sum(at <= each < at + 1 for each in server.times) for at in server.times)
     assert busiest <= 5
-    assert {bool(events(look_at(refusals, number))) for number in range(1500)} == {True}
+    assert {bool(events(look_at(hindrances, number))) for number in range(1500)} == {True}
     assert server.now - begun < 900
     assert looks < 5 * 1500
 
 
 def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
     """Those that are remembered keep their place, so that each gets its answer."""
-    refusals = Refusals(server, lambda: server.now)
+    hindrances = Hindrances(server, lambda: server.now)
     for number in range(REMEMBERED):
-        look_at(refusals, number)
+        look_at(hindrances, number)
     server.now += PATIENCE_S
 
-    beyond = look_at(refusals, REMEMBERED)
-    within = look_at(refusals, 0)
+    beyond = look_at(hindrances, REMEMBERED)
+    within = look_at(hindrances, 0)
 
     assert (events(beyond), {uid for uid, _ in beyond.unasked}) == ([], {f"u{REMEMBERED}"})
     assert beyond.again_s == LONGEST_PAUSE_S
@@ -149,11 +149,11 @@ def test_jobs_beyond_the_bound_are_not_asked_about_and_listed_as_such(server):
 
 def test_a_job_whose_last_pod_has_failed_lacks_one(server):
     """The second pod may be refused though the first was not."""
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, [job()], [pod("Failed")])
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [pod("Failed")])
     server.now += PATIENCE_S
 
-    assert events(refusals.of(KEY, UID, [job()], [pod("Failed")])) == [LAST]
+    assert events(hindrances.of(KEY, UID, [job()], [pod("Failed")])) == [LAST]
 
 
 @pytest.mark.parametrize(
@@ -168,11 +168,11 @@ def test_a_job_whose_last_pod_has_failed_lacks_one(server):
 )
 def test_nobody_is_asked_where_no_pod_is_lacking(jobs, pods, server):
     """While nothing changes, nothing is asked for."""
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, jobs, pods)
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, jobs, pods)
     server.now += PATIENCE_S
 
-    assert refusals.of(KEY, UID, jobs, pods) == Answers(facts={})
+    assert hindrances.of(KEY, UID, jobs, pods) == Answers(facts={})
     assert server.asked == 0
 
 
@@ -188,12 +188,12 @@ def waiting_pod(**status):
 def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
     """After some seconds, as a Job: most volumes come at once."""
     server.about = "type=Warning"
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, [], [waiting_pod()])
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, [], [waiting_pod()])
     assert server.asked == 0
     server.now += PATIENCE_S
 
-    found = refusals.of(KEY, UID, [], [waiting_pod()])
+    found = hindrances.of(KEY, UID, [], [waiting_pod()])
     assert (events(found), found.again_s) == ([LAST], RECHECK_S)
 
 
@@ -209,22 +209,22 @@ def test_a_pod_that_waits_for_its_volumes_has_its_warnings_read(server):
 )
 def test_nobody_is_asked_about_a_pod_that_waits_for_something_else(pod, server):
     """Its own status has the reason."""
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, [], [pod])
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, [], [pod])
     server.now += PATIENCE_S
 
-    assert refusals.of(KEY, UID, [], [pod]) == Answers(facts={})
+    assert hindrances.of(KEY, UID, [], [pod]) == Answers(facts={})
     assert server.asked == 0
 
 
 def test_a_job_that_is_made_again_is_asked_about_anew(server):
     """What the events of the one before said is not about it, even if a test or a backup gives it its uid."""
-    refusals = Refusals(server, lambda: server.now)
-    refusals.of(KEY, UID, [job()], [])
+    hindrances = Hindrances(server, lambda: server.now)
+    hindrances.of(KEY, UID, [job()], [])
     server.now += PATIENCE_S
-    assert events(refusals.of(KEY, UID, [job()], [])) == [LAST]
+    assert events(hindrances.of(KEY, UID, [job()], [])) == [LAST]
 
-    assert refusals.of(KEY, "another", [job()], []) == Answers(facts={}, again_s=PATIENCE_S)
+    assert hindrances.of(KEY, "another", [job()], []) == Answers(facts={}, again_s=PATIENCE_S)
 
 
 def test_a_stranger_is_looked_at_again_until_it_is_gone(server):
