@@ -346,12 +346,10 @@ class Api:
             Unreachable: the connection broke, or the command did not end `within_s`; output is missing.
             ApiError: the API server refuses.
         """
-        from palaestra.cluster.executing import output  # noqa: PLC0415 - a library of people's tools
-
         deadline = time.monotonic() + within_s
         query = {"container": container, "command": command, "stdout": "true", "stderr": "true"}
         call = _call("create", PODS, namespace, pod, subresource="exec", query=query)
-        yield from output(self._transport.channel(call), deadline)
+        yield from self._transport.output(call, deadline)
 
     def close(self) -> None:
         """Close all idle connections."""

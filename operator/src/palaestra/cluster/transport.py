@@ -7,9 +7,9 @@ and its calls have no deadline for the answer's body.
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import urlencode
 
 from urllib3 import BaseHTTPResponse, Timeout
@@ -18,9 +18,6 @@ from urllib3.exceptions import HTTPError, ProtocolError
 from palaestra.cluster.access import Access
 from palaestra.cluster.errors import ApiError, TooManyRequests, Unreachable, from_status
 from palaestra.cluster.limits import Limits
-
-if TYPE_CHECKING:
-    from websocket import WebSocket
 
 OnRequest = Callable[[str, str, int, float], None]
 CHUNK = 1 << 16
@@ -128,26 +125,26 @@ class Transport:
             self.on_request(call.verb, call.plural, error.code, time.monotonic() - started)
             raise
 
-    def channel(self, call: Call) -> "WebSocket":
-        """Return the socket of a command in a container, which the caller closes.
+    def output(self, call: Call, deadline: float) -> Iterator[bytes]:
+        """Start a command in a container, and return what yields its standard output; see `executing`.
 
         Raises:
             ApiError: the API server refuses, or cannot be reached.
         """
-        from palaestra.cluster.executing import open_socket  # noqa: PLC0415 - a library of people's tools
+        from palaestra.cluster import executing  # noqa: PLC0415 - it needs a library of people's tools
 
         started, code = time.monotonic(), 0
         try:
             headers = {"User-Agent": "palaestra", **self._authorization()}
             address, options = self.host + call.address, self._access.channel
-            socket = open_socket(address, headers, options, self.limits.call_s)
+            socket = executing.open_socket(address, headers, options, self.limits.call_s)
             code = SWITCHED
         except ApiError as error:
             code = error.code
             raise
         finally:
             self.on_request(call.verb, call.plural, code, time.monotonic() - started)
-        return socket
+        return executing.output(socket, deadline)
 
     def close(self) -> None:
         """Close all idle connections."""

@@ -12,21 +12,23 @@ import time
 # The checkpoint needs half of the default grace period, and a pending call may last twice its deadline.
 LEFT_S = 10.0
 
-_over_at = math.inf
+
+class _Limit:
+    """The end of all waits of this process, on its monotonic clock."""
+
+    at_s = math.inf
 
 
 def end(after_s: float = LEFT_S) -> None:
     """Let no wait begin later than `after_s` seconds from now."""
-    global _over_at  # noqa: PLW0603 - a process ends once
-    _over_at = time.monotonic() + after_s
+    _Limit.at_s = time.monotonic() + after_s
 
 
 def renew() -> None:
     """Remove the limit: each call waits for its own deadline again."""
-    global _over_at  # noqa: PLW0603 - as above
-    _over_at = math.inf
+    _Limit.at_s = math.inf
 
 
 def is_over() -> bool:
     """Return whether the time for waits is over."""
-    return time.monotonic() > _over_at
+    return time.monotonic() > _Limit.at_s
