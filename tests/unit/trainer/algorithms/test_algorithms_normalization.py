@@ -243,9 +243,10 @@ def test_a_policy_is_not_used_with_other_eyes(make_normal, make_env, tmp_path, s
         checkpoint.load_tensors(tmp_path / "model.zip", made(wanted))
 
 
-def test_a_run_is_not_continued_with_another_normalization(make_configuration, tmp_path):
-    """As with any other hyperparameter."""
-    one, other = ({"name": "PPO", "normalize": normalize} for normalize in ({}, {"clipRewards": 5}))
+@pytest.mark.parametrize(("saved", "wanted"), [({}, {"clipRewards": 5}), ({}, None), (None, {})])
+def test_a_run_is_not_continued_with_another_normalization(make_configuration, tmp_path, saved, wanted):
+    """As with any other hyperparameter; a manifest leaves the field out if nothing is normalized."""
+    one, other = ({"name": "PPO", "normalize": normalize} for normalize in (saved, wanted))
     found = checkpoint.Checkpoint(
         path=tmp_path, manifest=checkpoint.describe(make_configuration(algorithm=one), 0, {})
     )

@@ -66,12 +66,15 @@ class Checkpoint:
 
 
 def describe(configuration: Configuration, step: int, counters: Mapping[str, Any]) -> Manifest:
-    """Return the manifest of a checkpoint of this run, its files not named yet."""
+    """Return the manifest of a checkpoint of this run, its files not named yet.
+
+    Fields that are None are left out, so an older release finds an unknown field only if the job sets it.
+    """
     return Manifest(
         step=step,
         seed=configuration.seed,
-        algorithm=configuration.algorithm.model_dump(mode="json"),
-        environment=configuration.environment.model_dump(mode="json"),
+        algorithm=configuration.algorithm.model_dump(mode="json", exclude_none=True),
+        environment=configuration.environment.model_dump(mode="json", exclude_none=True),
         counters=dict(counters),
     )
 
@@ -103,10 +106,10 @@ def refuse_another_run(checkpoint: Checkpoint, configuration: Configuration) -> 
     Raises:
         ConfigurationError: it is of another algorithm or environment.
     """
-    wanted_run = describe(configuration, 0, {})
     for part in ("algorithm", "environment"):
-        wanted = getattr(wanted_run, part)
-        saved = _completed(getattr(checkpoint.manifest, part), type(getattr(configuration, part)))
+        section: BaseModel = getattr(configuration, part)
+        wanted = section.model_dump(mode="json")
+        saved = _completed(getattr(checkpoint.manifest, part), type(section))
         for key in wanted:
             if saved.get(key) != wanted[key]:
                 raise ConfigurationError(
