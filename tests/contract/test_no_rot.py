@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import subprocess
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,12 @@ PACKAGES = {
 }
 IGNORE = re.compile(r"# (noqa|type: ignore|pyright: ignore|pragma)")
 REASON = re.compile(r"# (noqa: [A-Z0-9, ]+ - |type: ignore\[[a-z-]+\](  # noqa: [A-Z0-9]+ - |  # ))\w")
+PATH = re.compile(
+    r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # a word of its own, by its suffix
+    r"|(?<![\w/.~-])((?:operator|trainer|sim_image|tests|docs|manifests|charts|tools)/[\w./-]*[\w/])"
+)
+NEW = {"sim_image/src/palaestra_sim/stub/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}
+CHANGE = re.compile(r"^ *```diff\n *\+\+\+ (\S+)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 BRANCH = re.compile(r"^(?P<indent>[│ ]*)[├└]── (?P<name>\w+)")
 
 
@@ -49,6 +56,28 @@ def test_the_table_of_folders_names_every_folder_with_something_to_read():
     folders = {name.partition("/")[0] for name in tracked.split() if "/" in name and not name.startswith(".")}
 
     assert set(listed) | {"images"} == folders - {"tests", "tools"}
+
+
+def test_every_path_that_contributing_names_is_there():
+    """Its walkthroughs send a stranger there; of a file that they create, the folder is there."""
+    named = {whole or begun for whole, begun in PATH.findall(page("CONTRIBUTING.md"))}
+
+    assert named >= NEW
+    assert [name for name in sorted(named - NEW) if not (ROOT / name).exists()] == []
+    assert [name for name in sorted(NEW) if not (ROOT / name).parent.is_dir()] == []
+
+
+def test_the_lines_around_a_change_in_contributing_are_those_of_its_file():
+    """They show where a new line belongs."""
+    around = [
+        (path, line[1:])
+        for path, change in CHANGE.findall(page("CONTRIBUTING.md"))
+        for line in textwrap.dedent(change).splitlines()
+        if line.startswith(" ")
+    ]
+
+    assert around
+    assert [(path, line) for path, line in around if line not in page(path).splitlines()] == []
 
 
 def test_rules_are_ignored_rarely_and_for_a_reason():
