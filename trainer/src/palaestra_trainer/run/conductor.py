@@ -142,8 +142,6 @@ class Conductor(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        for name, value in self._run.progress.scalars().items():
-            self.logger.record(name, value)
         self._rollout_ended, self._updates = time.monotonic(), self._updates_so_far()
         if self._learning_s is not None and self._learning_s >= LONG_LEARNING_S:
             self._env.pause()

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import structlog
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.logger import configure
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 from torch.utils.tensorboard.writer import SummaryWriter
 
@@ -29,6 +28,7 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
 from palaestra_trainer.run.attempt import Run
 from palaestra_trainer.run.conductor import Conductor, Resumed
+from palaestra_trainer.run.curves import Curves
 from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.rejoining import rejoin
 from palaestra_trainer.run.selection import Enough, forget_after
@@ -40,7 +40,6 @@ from palaestra_trainer.run_directory import RunDirectory, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
 from palaestra_trainer.simulators.member import Member, Spared
 from palaestra_trainer.telemetry.display import Display, Lines
-from palaestra_trainer.telemetry.figures import Logged
 from palaestra_trainer.telemetry.logs import last_lines
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
@@ -243,9 +242,7 @@ class Attempt:
         env, model = learning
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
-        logger = configure(str(self._directory.tensorboard), ["tensorboard"])
-        logger.output_formats.append(Logged(self._progress.figures))
-        model.set_logger(logger)
+        model.set_logger(Curves(self._directory.tensorboard, self._progress))
         with self._progress.spending(Cause.LEARNING):
             self._learn(model, Conductor(run, env, resumed))
         write_summary(self._directory, summarise(self._directory, self._progress))

@@ -1,0 +1,30 @@
+"""The curves of a run: Stable-Baselines3's logger, with the figures of the run in each of its points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+
+from palaestra_trainer.telemetry.figures import Logged
+from palaestra_trainer.telemetry.progress import Progress
+
+
+class Curves(Logger):
+    """Writes to TensorBoard, and to the figures of /metrics.
+
+    Args:
+        folder: of TensorBoard.
+        progress: the run; its scalars are recorded at each dump, which is rarer than a rollout.
+    """
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        formats = [TensorBoardOutputFormat(str(folder)), Logged(progress.figures)]
+        super().__init__(str(folder), formats)
+        self._progress = progress
+
+    def dump(self, step: int = 0) -> None:
+        """Write what was recorded, with the scalars of the run."""
+        for name, value in self._progress.scalars().items():
+            self.record(name, value)
+        super().dump(step)
