@@ -25,21 +25,21 @@ PERIOD_S = 2.0
 SLACK_S = 60
 TTL_S = 3600
 
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 class TrialFailed(PalaestraError):
     """The job did not succeed in time; the message is the newest in its status."""
 
 
-def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
+def attempt(api: Api, job: Object, *, within_s: float, report: Report) -> None:
     """Create a job under a name of its own, wait until it has succeeded, and delete it.
 
     Args:
         api: the cluster.
         job: the TrainingJob; the API server adds five characters to its name, so that two trials never meet.
         within_s: seconds in which it has to succeed.
-        tell: is called with a line for each phase that the job comes to, and for each reason why a
+        report: is called with a line for each phase that the job comes to, and for each reason why a
             replica waits.
 
     Raises:
@@ -49,10 +49,10 @@ def attempt(api: Api, job: Object, *, within_s: float, tell: Tell) -> None:
     made = api.create(TRAINING_JOBS, _passing(job, within_s))["metadata"]
     succeeded = False
     try:
-        _wait(api, made["namespace"], made["name"], within_s, tell)
+        _wait(api, made["namespace"], made["name"], within_s, report)
         succeeded = True
     finally:
-        _take_away(api, made, tell, or_fail=succeeded)
+        _take_away(api, made, report, or_fail=succeeded)
 
 
 def _passing(job: Object, within_s: float) -> Object:
@@ -71,8 +71,8 @@ def _passing_storage(storage: Object) -> Object:
     return {"retain": Retain.DELETE.value, **storage}
 
 
-def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:
-    """Delete the job. If that fails, report it by `tell`, or with `or_fail` raise an error.
+def _take_away(api: Api, made: Object, report: Report, *, or_fail: bool) -> None:
+    """Delete the job. If that fails, report it by `report`, or with `or_fail` raise an error.
 
     `or_fail` is for successful trials: the error of a failed trial must stay the one that is shown.
     """
@@ -85,10 +85,10 @@ def _take_away(api: Api, made: Object, tell: Tell, *, or_fail: bool) -> None:
         if or_fail and not error.retryable:
             raise
         remedy = f"delete it by hand: `kubectl delete trainingjob -n {namespace} {name}`"
-        tell(f"{namespace}/{name}: could not be deleted ({error}); {remedy}")
+        report(f"{namespace}/{name}: could not be deleted ({error}); {remedy}")
 
 
-def _wait(api: Api, namespace: str, name: str, within_s: float, tell: Tell) -> None:
+def _wait(api: Api, namespace: str, name: str, within_s: float, report: Report) -> None:
     ends = time.monotonic() + within_s
     status: Object = {}
     phase, news = "", News(f"{namespace}/{name}")
@@ -97,22 +97,22 @@ def _wait(api: Api, namespace: str, name: str, within_s: float, tell: Tell) -> N
             raise TrialFailed(f"{namespace}/{name}: {phase} after {within_s:g} s; {_why(status)}")
         if phase:
             time.sleep(PERIOD_S)
-        status = _status(api, namespace, name, tell) or status
+        status = _status(api, namespace, name, report) or status
         phase = status.get("phase", Phase.PENDING.value)
         for line in news.of(phase, _readable(status)):
-            tell(line)
+            report(line)
     if phase != Phase.SUCCEEDED.value:
         raise TrialFailed(f"{namespace}/{name}: {phase}; {_why(status)}")
 
 
-def _status(api: Api, namespace: str, name: str, tell: Tell) -> Object | None:
+def _status(api: Api, namespace: str, name: str, report: Report) -> Object | None:
     """Return the job's status; None while the API server has no answer."""
     try:
         return api.get(TRAINING_JOBS, namespace, name).get("status")
     except ApiError as error:
         if not error.retryable:
             raise
-        tell(f"{namespace}/{name}: {error}; asked again")
+        report(f"{namespace}/{name}: {error}; asked again")
         return None
 
 

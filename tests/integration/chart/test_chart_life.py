@@ -136,7 +136,7 @@ def test_the_trial_needs_no_more_rights_than_it_has_and_says_what_is_missing(rel
     told = []
 
     with pytest.raises(TrialFailed, match=r"nothing has looked at it: does the operator run"):
-        attempt(tester, _in(NAMESPACE, training_job("trial")), within_s=1.0, tell=told.append)
+        attempt(tester, _in(NAMESPACE, training_job("trial")), within_s=1.0, report=told.append)
 
     assert [line.rpartition(": ")[2] for line in told] == ["Pending"]
     assert api.list(TRAINING_JOBS, NAMESPACE) == []

@@ -40,7 +40,7 @@ def test_the_claims_of_a_trial_go_with_it_unless_its_author_keeps_them(written, 
     server = Server()
     spec = {"storage": written} if written else {}
 
-    attempt(server, {"metadata": {"name": "trial"}, "spec": spec}, within_s=1, tell=str)
+    attempt(server, {"metadata": {"name": "trial"}, "spec": spec}, within_s=1, report=str)
 
     assert server.made["spec"]["storage"] == created
 
@@ -64,4 +64,4 @@ def test_a_trial_that_did_not_succeed_reports_the_whole_message(phase, accepted,
     monkeypatch.setattr("palaestra.trial.PERIOD_S", 0.01)
 
     with pytest.raises(TrialFailed, match="ImagePull: the whole message"):
-        attempt(server, {"metadata": {"name": "trial"}, "spec": {}}, within_s=0.1, tell=str)
+        attempt(server, {"metadata": {"name": "trial"}, "spec": {}}, within_s=0.1, report=str)

@@ -7,7 +7,7 @@ import pytest
 from palaestra.decide import Decision, Record
 from palaestra.operator.controller import now
 from palaestra.operator.records import Records
-from palaestra.operator.telling import Telling
+from palaestra.operator.reporting import Reporting
 
 KEY = ("default", "job")
 OLD = {"phase": "Running", "replicas": [{"index": 0, "phase": "Running", "step": 10}]}
@@ -37,13 +37,13 @@ def notes():
 @pytest.fixture
 def tell(notes, monkeypatch):
     """`tell(step=11, clock_s=30)`: tell a step, and return the seconds until it is written."""
-    telling = Telling(notes, None, lambda *_: None, lambda _, status: status)
+    reporting = Reporting(notes, None, lambda *_: None, lambda _, status: status)
     raw = {"metadata": {"namespace": "default", "name": "job", "resourceVersion": "1"}, "status": OLD}
 
     def tell(step, clock_s):
         new = {"phase": "Running", "replicas": [{"index": 0, "phase": "Running", "step": step}]}
-        monkeypatch.setattr("palaestra.operator.telling.as_data", lambda _: new)
-        return telling.tell(raw, Decision(status=object()), {}, clock_s).again_s
+        monkeypatch.setattr("palaestra.operator.reporting.as_data", lambda _: new)
+        return reporting.report(raw, Decision(status=object()), {}, clock_s).again_s
 
     return tell
 

@@ -70,7 +70,7 @@ def schema() -> Schema:
     freeze(fields["spec"])
     for heading in ("apiVersion", "kind"):  # the API server checks these itself
         fields[heading] = {"type": "string", "maxLength": 63}
-    name = fields["metadata"]["properties"]["name"]  # and may be told about no more than the name
+    name = fields["metadata"]["properties"]["name"]  # and a schema may restrict no more of it than the name
     fields["metadata"] = {"type": "object", "properties": {"name": name}}
     # Without it kstatus would call a job reconciled that no operator has seen: generations begin at 1.
     fields["status"]["default"] = {"observedGeneration": 0}

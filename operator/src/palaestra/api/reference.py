@@ -74,7 +74,7 @@ def _default(field: Schema, *, required: bool) -> str:
 
 
 def _told(default: Any, field: Schema) -> Any:
-    """Return `default` without what the tables of its objects tell already."""
+    """Return `default` without what the tables of its objects say."""
     if isinstance(default, list):
         return [_told(item, field["items"]) for item in default]
     if not isinstance(default, dict):

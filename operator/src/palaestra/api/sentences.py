@@ -21,8 +21,8 @@ def sentence(path: Path, error: ErrorDetails) -> str:
     value = error["input"]
     if value is None and error["type"] not in _NOT_ABOUT_A_VALUE:
         return "is empty; give a value or remove the line"
-    if tell := _SENTENCES.get(error["type"]):
-        return tell(path, value, error.get("ctx", {}))
+    if sentence_of := _SENTENCES.get(error["type"]):
+        return sentence_of(path, value, error.get("ctx", {}))
     if error["type"].startswith(("date", "timezone")):
         return f"{quoted(value)} is not a time; write it as 2026-01-31T12:00:00Z"
     return error["msg"]

@@ -41,7 +41,7 @@ def _try(client: Client, options: argparse.Namespace) -> int:
     content["metadata"].setdefault("namespace", client.namespace)
     try:
         with cleaned_up(), asked(None, client.namespace):
-            attempt(client.api, content, within_s=options.within, tell=lambda line: say([line]))
+            attempt(client.api, content, within_s=options.within, report=lambda line: say([line]))
     except TrialFailed as failed:
         sys.stderr.write(f"{failed}\n")
         return REFUSED

@@ -26,7 +26,7 @@ RENEWED_WITHIN_S = 20.0  # a Lease lasts 15
 
 
 def runs(site: Site) -> Iterator[Finding]:
-    """Tell whether the operator is installed and ready."""
+    """Check whether the operator is installed and ready."""
     deployment = _deployment(site)
     remedy = _remedy(site, deployment)
     if deployment is None:
@@ -68,7 +68,7 @@ def judged_images(container: Object) -> Finding:
 
 
 def leads(site: Site) -> Iterator[Finding]:
-    """Tell whether one operator leads, by seeing it renew its Lease: no two clocks are compared."""
+    """Check whether one operator leads, by seeing it renew its Lease: no two clocks are compared."""
     deployment = _deployment(site)
     if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
         yield right("leader", "there is no election")
@@ -114,7 +114,7 @@ def operator_rights(site: Site) -> Iterator[Finding]:
 
 
 def metrics(site: Site) -> Iterator[Finding]:
-    """Tell whether an operator answers with its metrics, asked by way of the API server."""
+    """Check whether an operator answers with its metrics, asked by way of the API server."""
     pods = site.api.list(PODS, site.operator_namespace, labels=f"{OPERATOR_LABEL}=true")
     running = [pod for pod in pods if pod["status"].get("phase") == "Running"]
     if not running:

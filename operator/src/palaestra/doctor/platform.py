@@ -23,12 +23,12 @@ NO_ROOM = "exceeded quota"
 
 
 def answers(site: Site) -> Iterator[Finding]:
-    """Tell whether the API server answers, and knows sidecar containers."""
+    """Check whether the API server answers, and knows sidecar containers."""
     yield judged_version("API server", site.api.version())
 
 
 def nodes(site: Site) -> Iterator[Finding]:
-    """Tell whether the oldest kubelet knows sidecar containers."""
+    """Check whether the oldest kubelet knows sidecar containers."""
     versions = [node["status"]["nodeInfo"]["kubeletVersion"] for node in site.api.list(NODES)]
     if not versions:
         yield wrong("nodes", "there is none", "add a node, so that pods can run")
@@ -51,7 +51,7 @@ def release(text: str) -> tuple[int, int]:
 
 
 def definition(site: Site) -> Iterator[Finding]:
-    """Tell whether the cluster knows TrainingJobs, and as this release does."""
+    """Check whether the cluster knows TrainingJobs, and as this release does."""
     what, remedy = "TrainingJobs", INSTALL
     if not site.api.serves(API_VERSION):
         yield wrong(what, f"the cluster does not know {API_VERSION}", remedy)
@@ -70,7 +70,7 @@ def definition(site: Site) -> Iterator[Finding]:
 
 
 def namespace(site: Site) -> Iterator[Finding]:
-    """Tell whether the namespace of the jobs exists."""
+    """Check whether the namespace of the jobs exists."""
     what, name = "namespace", site.namespace
     try:
         site.api.get(NAMESPACES, None, name)
@@ -93,7 +93,7 @@ def difference(ours: Any, found: Any, path: str) -> str | None:
 
 
 def sidecars(site: Site) -> Iterator[Finding]:
-    """Tell whether everything that pods pass through leaves their sidecars sidecars: by a dry run."""
+    """Check whether everything that pods pass through leaves their sidecars sidecars: by a dry run."""
     what = "sidecars"
     try:
         made = site.api.create(PODS, trial_pod(site.namespace, trainer_image(site)), dry_run=True)
@@ -109,7 +109,7 @@ def sidecars(site: Site) -> Iterator[Finding]:
             "allow what it names",
         )
     except Invalid as error:  # a webhook with side effects takes part in no dry run
-        yield unknown(what, f"could not be tried: {error.message}", "start a job; its status would tell")
+        yield unknown(what, f"could not be tried: {error.message}", "start a job; its status shows it")
     else:
         yield judged_pod(made)
 
@@ -147,7 +147,7 @@ def trial_pod(namespace: str, image: str) -> Object:
 
 
 def storage(site: Site) -> Iterator[Finding]:
-    """Tell whether a claim that names no class gets a volume."""
+    """Check whether a claim that names no class gets a volume."""
     classes = site.api.list(STORAGE_CLASSES)
     default = [
         class_["metadata"]["name"]

@@ -80,13 +80,13 @@ NECESSARY = frozenset({"look at jobs", "author jobs"})  # the rest is for some p
 
 
 def own_rights(site: Site) -> Iterator[Finding]:
-    """Tell what the person who asks may not do, one line for each thing that people do."""
+    """Report what the person who asks may not do, one line for each thing that people do."""
     for deed, rights in PERSON:
         denied = missing(site, rights)
         what = f"to {deed}"
         if denied:
-            tell = wrong if deed in NECESSARY else unknown
-            yield tell(
+            report = wrong if deed in NECESSARY else unknown
+            yield report(
                 what,
                 f"you may not {', '.join(denied)} in {site.namespace}",
                 "ask for a role that has it; without it the rest works",

@@ -7,7 +7,7 @@
 - `poller`: the trainers' own reports, over the pod network
 - `schedule`: which trainer to poll next, so that silent pods delay no others
 - `trainers`: the pods to poll
-- `acting`, `telling`, `writing`: every write to the cluster; none while another operator leads
+- `acting`, `reporting`, `writing`: every write to the cluster; none while another operator leads
 - `workers`: threads that take keys from the queue
 - `families`: every metric by name, as data; `metrics`: their values
 - `health`, `logs`, `options`, `run`: the process

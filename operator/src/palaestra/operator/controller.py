@@ -34,7 +34,7 @@ from palaestra.operator.acting import Acting
 from palaestra.operator.caches import Caches
 from palaestra.operator.looking import Looking, Seen, earliest
 from palaestra.operator.records import Records
-from palaestra.operator.telling import StatusWrite, Telling
+from palaestra.operator.reporting import Reporting, StatusWrite
 from palaestra.plan import ClusterLayout
 
 log = structlog.get_logger(__name__)
@@ -52,7 +52,7 @@ class Controller:
         caches: the watched objects.
         looking: observes a job.
         acting: carries out actions.
-        telling: writes status and events.
+        reporting: writes status and events.
         layout: of this release in this cluster.
         times: returns the clocks at a reconcile, for the record of the last one.
     """
@@ -62,14 +62,14 @@ class Controller:
         caches: Caches,
         looking: Looking,
         acting: Acting,
-        telling: Telling,
+        reporting: Reporting,
         layout: ClusterLayout,
         times: Callable[[Record], Times] = now,
     ) -> None:
         self._caches = caches
         self._looking = looking
         self._acting = acting
-        self._telling = telling
+        self._reporting = reporting
         self._layout = layout
         self._times = times
         self._records = Records()
@@ -91,7 +91,7 @@ class Controller:
         raw = self._caches.training_job(key)
         if raw is None or not managed_here(raw):
             self._looking.forget(key)
-            self._telling.forget(key)
+            self._reporting.forget(key)
             self._records.forget(key)
             self._terminating.discard(key)
             return None
@@ -135,7 +135,7 @@ class Controller:
         key, decision = (raw["metadata"]["namespace"], raw["metadata"]["name"]), look.decision
         self._records.keep(key, raw["metadata"]["uid"], decision.record)
         denied = self._acting.carry_out(raw, decision.actions, confirmed=look.just_accepted)
-        written = self._telling.tell(raw, decision, denied, times.clock_s)
+        written = self._reporting.report(raw, decision, denied, times.clock_s)
         if denied:
             raise next(iter(denied.values()))
         return written

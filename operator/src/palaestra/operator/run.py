@@ -25,9 +25,9 @@ from palaestra.operator.looking import Looking
 from palaestra.operator.metrics import Metrics
 from palaestra.operator.options import NAME, Options
 from palaestra.operator.poller import Poller
+from palaestra.operator.reporting import Reporting
 from palaestra.operator.schedule import Target
 from palaestra.operator.strangers import Strangers
-from palaestra.operator.telling import Telling
 from palaestra.operator.workers import Workers
 from palaestra.operator.writing import Writer
 from palaestra.plan import ClusterLayout
@@ -66,7 +66,7 @@ class Operator:
             self._caches,
             Looking(api, self._caches, strangers, denials, self._poller.known),
             Acting(api, writer, strangers, denials),
-            Telling(writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted),
+            Reporting(writer, Recorder(api, instance=identity), metrics.written, self._definition.accepted),
             _layout(options),
         )
         self._workers = Workers(

@@ -49,7 +49,7 @@ def ros_master(replica: Replica) -> Container:
 
 
 def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, bytes]) -> Container:
-    """Return the sidecar of one simulator, which the trainer tells when to start it."""
+    """Return the sidecar of one simulator, which starts it when the trainer asks."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
     quantities = planned.resources(group.resources, planned.SIMULATOR)

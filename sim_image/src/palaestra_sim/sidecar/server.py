@@ -74,7 +74,7 @@ def health_routes(simulators: Sequence[SupervisedSimulator], registry: Collector
 
 def _state(simulator: SupervisedSimulator) -> Route:
     """Return the route of a question for a simulator's state."""
-    return lambda _: json_response(HTTPStatus.OK, simulator.told().to_json())
+    return lambda _: json_response(HTTPStatus.OK, simulator.as_answered().to_json())
 
 
 def _plain(simulator: SupervisedSimulator, event: Event) -> Route:

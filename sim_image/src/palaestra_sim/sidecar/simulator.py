@@ -98,7 +98,7 @@ class SupervisedSimulator:
         """End the simulator and make `run` return; from any thread."""
         self._inbox.put(_Message(event=Event.SHUTDOWN))
 
-    def told(self) -> SimulatorState:
+    def as_answered(self) -> SimulatorState:
         """Return the state, with the memory in use if the simulator is ready."""
         state = self.state
         ready = state.state is SidecarState.READY

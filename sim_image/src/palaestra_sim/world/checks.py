@@ -42,8 +42,8 @@ def no_robot_speaks_ros(candidate: Candidate) -> Iterator[WorldError]:
         fact = "the world has no robot"
         yield candidate.source.error(0, fact, 'add one with controller "ros" and supervisor TRUE')
         return
-    told = ", ".join(f'"{robot_name(robot)}" (controller "{_controller(robot)}")' for robot in others)
-    fact = f'no robot has the controller "ros": there are {told}'
+    others_named = ", ".join(f'"{robot_name(robot)}" (controller "{_controller(robot)}")' for robot in others)
+    fact = f'no robot has the controller "ros": there are {others_named}'
     remedy = 'set controller "ros" on those to be trained, and supervisor TRUE on one'
     yield candidate.source.error(others[0].span[0], fact, remedy)
 

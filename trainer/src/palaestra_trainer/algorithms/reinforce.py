@@ -130,19 +130,19 @@ class REINFORCE(BaseAlgorithm):
 
         `log_interval` counts updates; the other arguments are Stable-Baselines3's.
         """
-        total_timesteps, told = self._setup_learn(
+        total_timesteps, callbacks = self._setup_learn(
             total_timesteps, callback, reset_num_timesteps, tb_log_name, progress_bar
         )
-        told.on_training_start(locals(), globals())
+        callbacks.on_training_start(locals(), globals())
         while self.num_timesteps < total_timesteps:
-            batch = self.collect_episodes(told)
+            batch = self.collect_episodes(callbacks)
             if batch is None:
                 break
             self._update_current_progress_remaining(self.num_timesteps, total_timesteps)
             self.train(batch)
             if log_interval and self._n_updates % log_interval == 0:
                 self.dump_logs()
-        told.on_training_end()
+        callbacks.on_training_end()
         return self
 
     def collect_episodes(self, callback: BaseCallback) -> Batch | None:

@@ -2,7 +2,7 @@
 
 A term is a pure function of one transition, with a range of its own; its weight says
 what it is worth. An environment reports every weighted term by name, so that a curve
-in TensorBoard tells which term a policy lives on.
+in TensorBoard shows which term a policy lives on.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class Pose:
 
 
 class Movement(IntEnum):
-    """What a robot can be told to do for one control period."""
+    """The movements of a robot for one control period."""
 
     STOP = 0
     FORWARD = 1
@@ -108,7 +108,7 @@ class RobotinoAbc(ABC):
         return self
 
     def move(self, movement: Movement) -> None:
-        """Drive at the speeds of `movement` until told otherwise."""
+        """Drive at the speeds of `movement` until the next command."""
         self.drive(*movement.twist)
 
     def color_image(self) -> NDArray[np.uint8]:

@@ -125,7 +125,7 @@ class Robotino(RobotinoAbc):
 
     def _no_reading(self) -> NoReading:
         return NoReading(
-            f"{self.definition}: its sensors have told nothing yet; let a period pass by advance()"
+            f"{self.definition}: its sensors have sent nothing yet; let a period pass by advance()"
         )
 
 

@@ -299,7 +299,7 @@ def await_one(keepers: Sequence[Keeper], check: Check = go_on) -> None:
 def settle(keepers: Sequence[Keeper]) -> None:
     """End what goes on in the keepers' threads: no further tries, and those under way fail.
 
-    Waits `SETTLE_S` seconds at most, and as long as one that does not answer takes to be told.
+    Waits `SETTLE_S` seconds at most, and as long as the request to one that does not answer takes.
     """
     for keeper in keepers:
         keeper.abandon()

@@ -111,7 +111,7 @@ class SupervisorServices:
     def _get_from_device(self, request: Any) -> Fields:
         node = self._tree.of_device(self._robot, request.value)
         if node is None:
-            raise ServiceFailed(f"no device {request.value!r}; get_device_list tells the names")
+            raise ServiceFailed(f"no device {request.value!r}; get_device_list lists the names")
         return _handle(node)
 
 

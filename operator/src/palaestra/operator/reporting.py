@@ -34,7 +34,7 @@ class StatusWrite:
     again_s: float | None = None
 
 
-class Telling:
+class Reporting:
     """Writes status and events of TrainingJobs; safe to use from several threads.
 
     Args:
@@ -53,7 +53,7 @@ class Telling:
         self._written: dict[Key, float] = {}
         self._futile: dict[Key, tuple[str, Object]] = {}
 
-    def tell(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> StatusWrite:
+    def report(self, raw: Object, decision: Decision, denied: Denied, clock_s: float) -> StatusWrite:
         """Write the status if it changed, then the events; `clock_s` is the monotonic clock.
 
         Refused creations emit no `Planned` event; the next reconcile sets the reason in the status.
