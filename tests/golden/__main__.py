@@ -5,6 +5,7 @@
 - `docs/trainingjob.md`: the default hyperparameters of the algorithms
 - `docs/metrics.md`: every metric that the programs declare
 - `docs/simulators.md`: the devices of the stub
+- `docs/judging.md`: the checks on a replica, in their order
 - `charts/palaestra/README.md`: made from its values.yaml
 - `charts/palaestra/dashboards/*.json`: made by tools/dashboards
 - `manifests/install.yaml`: the chart with its default values, where Helm is built
@@ -29,6 +30,7 @@ from tests.control_plane.programs import NoPrograms
 from tools import dashboards
 from tools.devices import page as devices
 from tools.hyperparameters import page as hyperparameters
+from tools.judging import page as judging
 from tools.metrics import page as metrics
 
 ROOT = Path(__file__).parents[2]
@@ -53,6 +55,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
         yield ROOT / name, text
     yield ROOT / hyperparameters.PAGE, hyperparameters.page((ROOT / hyperparameters.PAGE).read_text())
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
+    yield ROOT / judging.PAGE, judging.page((ROOT / judging.PAGE).read_text())
     yield ROOT / devices.PAGE, devices.page((ROOT / devices.PAGE).read_text())
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text

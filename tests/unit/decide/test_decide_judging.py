@@ -1,27 +1,23 @@
-"""docs/judging.md shows the order in which a replica is judged; the code has it as one list."""
-
-from pathlib import Path
+"""The order in which a replica is judged is one list; docs/judging.md shows it."""
 
 from palaestra.decide.judging import JUDGED, Kind
-
-PAGE = Path(__file__).parents[3] / "docs/judging.md"
-
-
-def rows(text, columns):
-    """Return the rows of the tables with so many columns, heads and rules left out."""
-    lines = (line.strip("|").split("|") for line in text.splitlines() if line.startswith("|"))
-    cells = [[cell.strip() for cell in line] for line in lines if len(line) == columns]
-    return [row for row in cells if row[0].isdigit()]
+from tools.judging import page
 
 
-def test_the_page_shows_the_list_in_its_order():
-    """By class, name and first line of each check."""
-    page = rows(PAGE.read_text(encoding="utf-8"), 4)
+def test_the_page_has_a_row_for_each_check_in_its_order():
+    """Number, class, name and the first line of its docstring; test_golden.py compares it with the file."""
+    rows = page.table().splitlines()[2:]
 
-    assert page == [
-        [str(number), kind.value, f"`{check.__name__}`", check.__doc__.strip().splitlines()[0]]
-        for number, (kind, check) in enumerate(JUDGED, 1)
-    ]
+    assert len(rows) == len(JUDGED)
+    assert rows[0] == "| 1 | ended | `job_is_complete` | The Job is complete, and so is the training. |"
+
+
+def test_the_first_line_of_a_check_fits_into_a_cell():
+    """A bar in it would tear the row, and a check without a docstring would have none."""
+    firsts = [check.__doc__.strip().splitlines()[0] for _, check in JUDGED if check.__doc__]
+
+    assert len(firsts) == len(JUDGED)
+    assert [first for first in firsts if "|" in first or not first.endswith(".")] == []
 
 
 def test_each_check_is_in_the_list_once():

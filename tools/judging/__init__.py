@@ -1,0 +1,1 @@
+"""docs/judging.md: the list of checks on a replica, which is made from the code."""
