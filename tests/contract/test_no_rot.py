@@ -25,6 +25,19 @@ PATH = re.compile(
 )
 NEW = {"sim_image/src/palaestra_sim/stub/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}
 CHANGE = re.compile(r"^ *```diff\n *\+\+\+ (\S+)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
+
+
+def docstring(file):
+    """Return the docstring of a package."""
+    return ast.get_docstring(ast.parse(file.read_text())) or ""
+
+
+LISTING = [
+    file
+    for folder in PACKAGES.values()
+    for file in sorted(folder.rglob("__init__.py"))
+    if re.search(r"^- `[a-z_]+`", docstring(file), re.MULTILINE)
+]
 BRANCH = re.compile(r"^(?P<indent>[│ ]*)[├└]── (?P<name>\w+)")
 
 
@@ -47,6 +60,17 @@ def test_every_package_is_in_the_table_of_modules(package):
 
     assert rooms - {"testing", "cli"} <= listed
     assert all(exists(PACKAGES[package], name) for name in listed)
+
+
+@pytest.mark.parametrize("file", [pytest.param(file, id=file.parent.name) for file in LISTING])
+def test_a_package_that_lists_its_modules_lists_all(file):
+    """A stranger opens the module that the list names, and would never open one that it leaves out."""
+    items = re.findall(r"^- (.*)$", docstring(file), re.MULTILINE)
+    listed = {name for item in items for name in re.findall(r"`([a-z_]+)`(?=[,:]| and )", item)}
+    modules = {path.stem for path in file.parent.glob("*.py")} - {"__init__"}
+    rooms = {path.parent.name for path in file.parent.glob("*/__init__.py")}
+
+    assert listed == modules | rooms
 
 
 def test_the_table_of_folders_names_every_folder_with_something_to_read():

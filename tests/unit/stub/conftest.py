@@ -13,7 +13,7 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import service_type
 from palaestra_sim.stub.front.options import StubOptions
-from palaestra_sim.stub.front.simulator import Simulator
+from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
 from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.world import builtin
@@ -206,13 +206,15 @@ def ros():
 
 @pytest.fixture
 def start(ros, tmp_path):
-    """Start a stub: `start(world=..., mode=..., options=...)` returns the Simulator."""
+    """Start a stub: `start(world=..., mode=..., options=...)` returns the StubSimulator."""
 
     def begin(world=None, mode=Mode.FAST, **options):
         path = tmp_path / "worlds" / "arena.wbt"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(builtin("arena") if world is None else world)
-        simulator = Simulator(path, ros.make_node, options=StubOptions(**options), mode=mode, clock=ros.clock)
+        simulator = StubSimulator(
+            path, ros.make_node, options=StubOptions(**options), mode=mode, clock=ros.clock
+        )
         simulator.start()
         return simulator
 

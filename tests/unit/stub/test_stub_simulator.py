@@ -3,7 +3,7 @@
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.stub.front.simulator import Simulator
+from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.world import builtin
@@ -31,7 +31,7 @@ def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
     path.write_bytes(b"#VRML_SIM R2023b utf8\nRectangleArena { }\n")
 
     with pytest.raises(WorldError, match=r"bad.wbt:2:1: the stub simulates no RectangleArena"):
-        Simulator(path, ros.make_node)
+        StubSimulator(path, ros.make_node)
 
     assert ros.nodes == []
 

@@ -4,7 +4,8 @@ Requests and answers are plain JSON. The official client reads a kubeconfig and 
 are not used (docs/decisions/0004). These modules know Kubernetes and no TrainingJob:
 
 - `resources`: the kinds of objects and their addresses
-- `connection`: the API server and the identity to use
+- `connection`: the API server and the identity to use; `access`: its address and credentials
+- `kubeconfig`, `account`: where they come from, outside a pod and in one
 - `limits`: deadlines, and waits before the next attempt
 - `api`: one request, with a deadline
 - `transport`: the bytes of a request
@@ -13,7 +14,7 @@ are not used (docs/decisions/0004). These modules know Kubernetes and no Trainin
 - `reflector`: a cache that follows the API server
 - `store`: the objects of that cache
 - `queue`: work for the controller, one worker a key
-- `lease`: leader election
+- `lease`: leader election; `tenure`: its arithmetic
 - `recorder`: events for people
 - `lines`: the log of a running container
 - `executing`: a command in a container

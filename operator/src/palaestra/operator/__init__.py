@@ -4,12 +4,15 @@
 - `looking`: everything that the operator observes of one TrainingJob
 - `caches`, `following`: the watched objects
 - `asking`, `admissions`, `hindrances`, `switchers`, `strangers`: facts that no watch reports, read on demand
+- `denials`, `memory`, `records`: facts of earlier reconciles, bounded; a restart may lose them
+- `definition`: the cluster's definition of TrainingJobs, compared with this release's
 - `poller`: the trainers' own reports, over the pod network
 - `schedule`: which trainer to poll next, so that silent pods delay no others
 - `trainers`: the pods to poll
+- `confirming`: reads before a write, because a cache may lag
 - `acting`, `reporting`, `writing`: every write to the cluster; none while another operator leads
 - `workers`: threads that take keys from the queue
-- `families`: every metric by name, as data; `metrics`: their values
+- `families`: every metric by name, as data; `metrics`, `waiting`: their values
 - `health`, `logs`, `options`, `run`: the process
 
 `palaestra.plan` and `palaestra.decide`, which are pure, make the decisions; `palaestra.cluster` connects to

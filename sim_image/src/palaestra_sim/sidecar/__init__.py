@@ -2,13 +2,14 @@
 
 It may have a second simulator as a standby. The two share the process and its ports, and nothing else.
 
-- `cli`: the command line: check everything, then run
+- `cli`: the command line: check everything, then run; `options`: its options
 - `preparation`: the world that the simulator will run, with its own ROS names
 - `drivers`: the command lines of stub, Webots and other programs
 - `lifecycle`: the events that each state allows, as a table; pure
 - `simulator`: the one owner of the state, which takes events in order and carries out the table's actions
 - `process`: the only module that starts a process
 - `reaper`: the small program between sidecar and simulator, from which no process can escape
+- `signals`: received by one thread that waits for nothing else
 - `output`: the simulator's output, forwarded line by line
 - `server`: the routes of the two ports: control, and health with metrics and state
 - `families`: every metric by name, as data

@@ -16,7 +16,7 @@ from palaestra_protocol.numbers import milliseconds
 from palaestra_sim.errors import SimError, WorldRefusedError
 from palaestra_sim.stub import faults
 from palaestra_sim.stub.front.options import StubOptions
-from palaestra_sim.stub.front.simulator import Simulator
+from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.scene.simulation import Mode
 
@@ -69,7 +69,7 @@ class _Process:
         self._new_node = self._node_maker()
         self._nodes: dict[str, RosNode] = {}
         self._exit_code = 0
-        self._simulator = Simulator(
+        self._simulator = StubSimulator(
             options.world,
             self._make_node,
             options=StubOptions(

@@ -2,6 +2,7 @@
 
 - `kinds`: the faults, as data
 - `language`: from `crash:probability=0.0005` to data, or to a sentence about the mistake
+- `options`: the faults from the command line and the environment
 - `schedule`, pure: the faults of the k-th step, reset, call or start of a life
 - `course`, pure: the fate of each request and message, from counts and the schedule
 - `damage`, pure: wrong messages and answers, as bytes

@@ -20,7 +20,7 @@ from palaestra_sim.stub.faults.kinds import Fault
 from palaestra_sim.stub.faults.language import FaultError
 from palaestra_sim.stub.faults.options import Ordered
 from palaestra_sim.stub.faults.schedule import Life, Schedule
-from palaestra_sim.stub.front.simulator import Simulator
+from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.seam import Fields, Handler
 
@@ -55,7 +55,7 @@ def survey(world_path: Path) -> Survey:
         nodes.append(_Listener(name))
         return nodes[-1]
 
-    simulator = Simulator(world_path, make_node)
+    simulator = StubSimulator(world_path, make_node)
     simulator.start()
     for node in nodes:
         node.enable_all(simulator.simulation.basic_step_ms)

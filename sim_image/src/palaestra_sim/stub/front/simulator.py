@@ -23,7 +23,7 @@ from palaestra_sim.stub.seam import Node
 MakeNode = Callable[[str], Node]
 
 
-class Simulator:
+class StubSimulator:
     """A stub simulator whose world has been checked.
 
     Args:
