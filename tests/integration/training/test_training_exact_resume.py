@@ -32,7 +32,7 @@ ALGORITHMS = {
     "DQN": OFF_POLICY | {"exploration_fraction": 0.7},
     "PPO": ON_POLICY | {"n_steps": 64, "batch_size": 16, "n_epochs": 2},
     "A2C": ON_POLICY,
-    # Its entropy coefficient is learned, by an optimiser of its own.
+    # Its entropy coefficient is learned, by an optimizer of its own.
     "SAC": OFF_POLICY,
     "REINFORCE": ON_POLICY | {"episodes_per_update": 2},
 }
@@ -96,7 +96,7 @@ def attempt(fakes):
 
 
 def tensors(path):
-    """Return every tensor of a model and its optimisers by name, and what it normalizes by."""
+    """Return every tensor of a model and its optimizers by name, and what it normalizes by."""
     _, parameters, variables = load_from_zip_file(path, device="cpu", load_data=False)
 
     def walk(name, value):
@@ -155,7 +155,7 @@ def job(write_job):
 def test_an_interrupted_run_is_the_run_that_was_not(attempt, job, tmp_path, name, collectors):
     """By a signal, amid a rollout and by a kill, at random points; equal to the last bit.
 
-    Compared are returns, evaluations, parameters, optimisers, experience and random generators.
+    Compared are returns, evaluations, parameters, optimizers, experience and random generators.
     """
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     points = random.Random(f"{name} {collectors}")
@@ -201,7 +201,7 @@ def test_what_a_run_normalizes_by_goes_on_where_it_was(attempt, job, tmp_path, n
 def test_an_update_that_takes_too_long_is_left_in_its_middle(attempt, job, tmp_path, name):
     """A signal waits for no update of minutes; what it changed so far is put back.
 
-    In its second gradient step of an optimiser, where it takes so many; none is taken after it.
+    In its second gradient step of an optimizer, where it takes so many; none is taken after it.
     """
     whole, parts = RunDirectory(tmp_path / "whole"), RunDirectory(tmp_path / "parts")
     asked_at = 1 if name in {"A2C", "REINFORCE"} else 2

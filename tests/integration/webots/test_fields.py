@@ -88,8 +88,8 @@ def test_a_node_or_field_that_is_not_there_is_named(arena):
     """Rather than handle 0 used."""
     with pytest.raises(WrongData, match="the world has no node DEF NOTHING"):
         arena.scene.supervisor.get_field("NOTHING", "translation")
-    with pytest.raises(WrongData, match="the world has TARGET has no field colour"):
-        arena.scene.supervisor.get_field("TARGET", "colour")
+    with pytest.raises(WrongData, match="the world has TARGET has no field color"):
+        arena.scene.supervisor.get_field("TARGET", "color")
 
 
 def test_a_cylinder_that_is_moved_by_field_is_met_where_it_is(arena):
@@ -106,7 +106,7 @@ def test_a_cylinder_that_is_moved_by_field_is_met_where_it_is(arena):
 
 
 def test_a_velocity_that_is_given_is_had(arena):
-    """Metres and radians a second, in world axes; the motors take over from there."""
+    """Meters and radians a second, in world axes; the motors take over from there."""
     arena.scene.reset(1, START, (1.0, 0.0))
 
     arena.scene.supervisor.set_velocity("ROBOTINO", (0.2, 0.0, 0.0), (0.0, 0.0, 0.5))

@@ -7,7 +7,7 @@ import pytest
 
 from palaestra_trainer.errors import NoReading, NoSuchSensor, WrongData
 from palaestra_trainer.robots import Movement, Pose
-from palaestra_trainer.robots.robotino import Robotino, metres
+from palaestra_trainer.robots.robotino import Robotino, meters
 
 START = Pose(-1.5, 0.0, 0.0)
 
@@ -80,8 +80,8 @@ def test_it_feels_a_wall(arena):
 
 
 def test_volts_become_metres_within_the_sensors_range():
-    """The real robot tells metres, so the facade does."""
-    read = [metres(volts) for volts in (3.03, 0.82, 0.31, 0.0)]
+    """The real robot tells meters, so the facade does."""
+    read = [meters(volts) for volts in (3.03, 0.82, 0.31, 0.0)]
 
     assert read == pytest.approx([0.0327, 0.16, 0.40, 0.40], abs=0.01)
 

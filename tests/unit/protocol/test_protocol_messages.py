@@ -124,7 +124,7 @@ def test_a_sidecar_of_an_older_release_tells_no_memory(state) -> None:
 
 def test_a_field_that_a_newer_release_added_is_ignored_in_an_answer(state) -> None:
     """Images of one job may be of different releases."""
-    content = state().to_json() | {"colour": "green"}
+    content = state().to_json() | {"color": "green"}
 
     assert SimulatorState.from_json(content) == state()
 

@@ -36,10 +36,10 @@ class Shown(Collector):
 
 def test_the_samples_of_a_counter_have_its_labels():
     """In their order; its name is the one that was declared."""
-    colours = Label(name="colour", values=("red", "blue"))
-    family = Family(name="balls_total", kind=Kind.COUNTER, meaning="Balls.", labels=(colours,))
+    colors = Label(name="color", values=("red", "blue"))
+    family = Family(name="balls_total", kind=Kind.COUNTER, meaning="Balls.", labels=(colors,))
 
-    assert Shown(family, {("red",): 3}).samples() == {("balls_total", ("colour", "red")): 3}
+    assert Shown(family, {("red",): 3}).samples() == {("balls_total", ("color", "red")): 3}
 
 
 def test_a_family_without_a_value_is_there_with_its_meaning():
@@ -83,7 +83,7 @@ def test_a_histogram_of_what_may_be_negative_has_no_sum():
 )
 def test_series_are_counted_by_labels_and_buckets(kind, buckets, series):
     """As many as are served at most."""
-    labels = (Label(name="colour", values=("red", "blue")), Label(name="child", bound="child"))
+    labels = (Label(name="color", values=("red", "blue")), Label(name="child", bound="child"))
     family = Family(name="x", kind=kind, meaning="X.", labels=labels, buckets=buckets)
 
     assert family.series({"child": 3}) == series

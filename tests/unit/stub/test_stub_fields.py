@@ -87,10 +87,10 @@ def test_colors_are_opaque_and_vec2f_travels_as_a_vector(ros, start, world):
         node = robot.get("supervisor/get_from_def", name=def_name)
         return robot.get("supervisor/node/get_field", node=node, fieldName=name)
 
-    colour = robot.get("supervisor/field/get_color", field=find("LIGHT", "color"))
+    color = robot.get("supervisor/field/get_color", field=find("LIGHT", "color"))
     size = robot.get("supervisor/field/get_vec2f", field=find("PLANE", "size"))
 
-    assert (colour.r, colour.g, colour.b, colour.a) == pytest.approx((1.0, 0.5, 0.25, 1.0))
+    assert (color.r, color.g, color.b, color.a) == pytest.approx((1.0, 0.5, 0.25, 1.0))
     assert xyz(size) == (3.0, 4.0, 0.0)
 
 
@@ -374,7 +374,7 @@ def test_the_workaround_writes_a_rotation_of_zero(robot, field):
 
 @pytest.mark.parametrize("w", [1.0000001, -1.5, math.nan])
 def test_a_quaternion_that_is_not_of_length_1_makes_the_angle_nan(w):
-    """So it is refused: normalise first."""
+    """So it is refused: normalize first."""
     assert math.isnan(quaternion_to_axis_angle(0.0, 0.0, 0.1, w)[3])
 
 

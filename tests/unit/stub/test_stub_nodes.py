@@ -210,7 +210,7 @@ def test_fields_are_found_by_name_and_by_index(robot, find):
     assert names[:3] == ["translation", "rotation", "children"]
     assert handles[-1] == 0
     assert robot.get("supervisor/node/get_field", node=target, fieldName="rotation") == handles[1]
-    assert robot.get("supervisor/node/get_field", node=target, fieldName="colour") == 0
+    assert robot.get("supervisor/node/get_field", node=target, fieldName="color") == 0
     assert robot.get("supervisor/node/get_field", node=target, fieldName="rotation", proto=True) == 0
 
 
@@ -244,8 +244,8 @@ def test_hints_are_taken(robot, find):
     assert robot.get("supervisor/node/set_visibility", node=target, visible=0) == 1
     assert robot.get("supervisor/node/move_viewpoint", node=target) == 1
     assert robot.get("supervisor/node/get_static_balance", node=target) == 1
-    centre = robot.get("supervisor/node/get_center_of_mass", node=target)
-    assert (centre.x, centre.y) == (1.5, 0.0)
+    center = robot.get("supervisor/node/get_center_of_mass", node=target)
+    assert (center.x, center.y) == (1.5, 0.0)
 
 
 def test_a_used_node_is_a_node_of_its_own(robot, find):

@@ -1,4 +1,4 @@
-"""From metres to volts: the lookup table of a sensor, and the fan of rays of a robot."""
+"""From meters to volts: the lookup table of a sensor, and the fan of rays of a robot."""
 
 import math
 import random

@@ -258,7 +258,7 @@ def test_enabling_a_joystick_is_refused_since_its_topics_never_come(robot):
 
 
 def test_a_distance_sensor_tells_its_table(robot):
-    """What a facade needs to turn volts into metres."""
+    """What a facade needs to turn volts into meters."""
     table = robot.get("ir1/get_lookup_table")
 
     assert list(table[:6]) == [0.03, 3.03, 0.005, 0.035, 2.78, 0.005]

@@ -18,7 +18,7 @@ def scene_of(source):
 
 
 def distance(simulation):
-    """What the noiseless ray ahead of the simple robot measures in metres."""
+    """What the noiseless ray ahead of the simple robot measures in meters."""
     simulation.step(32)
     return 1.0 - simulation.robots[0].sensors["ir1"].value
 
@@ -184,7 +184,7 @@ BAD_ROBOTS = {
     ),
     "an eccentric robot": (
         ("translation 0 0 0.15 children", "translation 0.1 0 0.15 children"),
-        "centred on the robot's origin",
+        "centered on the robot's origin",
     ),
     "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
     "a ray that looks down": (

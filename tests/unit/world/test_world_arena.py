@@ -106,7 +106,7 @@ def test_time_goes_in_steps_of_32_ms_and_wheels_slide_sideways(scene: World) -> 
 
 
 def test_the_floor_is_4_by_4_m_with_its_top_at_zero(scene: World) -> None:
-    """Centred on the origin."""
+    """Centerd on the origin."""
     floor = defined(scene, "FLOOR")
     size = defined(scene, "FLOOR_BOX").numbers("size") or ()
 
@@ -119,12 +119,12 @@ def test_walls_stand_with_their_inner_faces_2_m_from_the_origin(
     scene: World, wall: int, axis: int, side: int
 ) -> None:
     """0.1 m thick, 0.3 m high, felt as they are seen."""
-    centre = defined(scene, f"WALL_{wall}").numbers("translation") or ()
+    center = defined(scene, f"WALL_{wall}").numbers("translation") or ()
     size = defined(scene, f"WALL_{wall}_BOX").numbers("size") or ()
 
-    assert abs(centre[axis]) - size[axis] / 2 == pytest.approx(2)
-    assert math.copysign(1, centre[axis]) == side
-    assert (size[axis], size[2], centre[2]) == (0.1, 0.3, 0.15)
+    assert abs(center[axis]) - size[axis] / 2 == pytest.approx(2)
+    assert math.copysign(1, center[axis]) == side
+    assert (size[axis], size[2], center[2]) == (0.1, 0.3, 0.15)
     assert size[1 - axis] >= 4
     assert defined(scene, f"WALL_{wall}").nodes("boundingObject")[0].uses == f"WALL_{wall}_BOX"
 
@@ -192,11 +192,11 @@ def test_infrared_sensors_answer_in_volts_with_noise(scene: World) -> None:
     """The table of the Sharp GP2Y0A41SK0F: farther is less."""
     for sensor in of_type(scene, "DistanceSensor"):
         table = sensor.numbers("lookupTable") or ()
-        metres, volts, noise = table[0::3], table[1::3], table[2::3]
-        assert (metres[0], volts[0]) == (0.03, 3.03)
-        assert (metres[-1], volts[-1]) == (0.4, 0.31)
-        assert len(metres) == 18
-        assert all(near < far for near, far in pairwise(metres))
+        meters, volts, noise = table[0::3], table[1::3], table[2::3]
+        assert (meters[0], volts[0]) == (0.03, 3.03)
+        assert (meters[-1], volts[-1]) == (0.4, 0.31)
+        assert len(meters) == 18
+        assert all(near < far for near, far in pairwise(meters))
         assert all(more > less for more, less in pairwise(volts))
         assert set(noise) == {0.005}
 

@@ -10,8 +10,8 @@ SCENE = """EXTERNPROTO "https://example.org/Lamp.proto"
 IMPORTABLE EXTERNPROTO "webots://Chair.proto"
 WorldInfo { basicTimeStep 32 title "Arena" }
 DEF BOX Solid {
-  translation 1 -2.5 0   # metres
-  children [ DEF SHAPE Shape { castShadows FALSE } Lamp { colour [ 1 1 0, 0 0 1 ] } ]
+  translation 1 -2.5 0   # meters
+  children [ DEF SHAPE Shape { castShadows FALSE } Lamp { color [ 1 1 0, 0 0 1 ] } ]
   boundingObject USE SHAPE
   physics NULL
   hidden position_0_0 0.25
@@ -56,8 +56,8 @@ def test_a_list_of_vectors_comes_flat(scene: World) -> None:
     """How many numbers belong together depends on the field, which the reader doesn't know."""
     lamp = next(node for node in scene.walk() if node.type_name == "Lamp")
 
-    assert lamp.numbers("colour") == (1, 1, 0, 0, 0, 1)
-    assert lamp.fields["colour"].bracketed
+    assert lamp.numbers("color") == (1, 1, 0, 0, 0, 1)
+    assert lamp.fields["color"].bracketed
 
 
 def test_a_field_that_is_absent_or_of_another_kind_has_no_numbers(scene: World) -> None:

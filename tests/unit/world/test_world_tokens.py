@@ -35,7 +35,7 @@ def test_a_comment_ends_with_its_line_even_glued_to_a_word() -> None:
 
 
 def test_a_number_sign_in_a_string_is_data() -> None:
-    """Addresses and colours have them."""
+    """Addresses and colors have them."""
     assert words('url "https://host/a#b"') == ["url", '"https://host/a#b"']
 
 

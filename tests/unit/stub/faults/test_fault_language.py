@@ -109,7 +109,7 @@ def test_a_value_may_be_no_number():
         ("crash:on=call", "it cannot be at a call; use step or reset"),
         ("crash:start=1", "it cannot be at a start; use step or reset"),
         ("lost:reset=1", "it cannot be at a reset; use step"),
-        ("crash:colour=red", "colour is not known here; use signal, step, reset, every, probability, on"),
+        ("crash:color=red", "color is not known here; use signal, step, reset, every, probability, on"),
         ("lost:service=a/b", "service is not known here; use topic, step, every, probability, on"),
         ("slow", "it does not say how long; add latency_ms=100"),
         ("slow:latency_ms=4000000", "latency_ms is '4000000'; give a number from 0 to 3,600,000"),

@@ -107,7 +107,7 @@ def test_a_job_that_asks_for_no_gpu_trains_on_the_cpu_without_a_word(monkeypatch
     ],
 )
 def test_a_run_goes_on_from_a_checkpoint_of_either_device(make, tmp_path, name, before, after):
-    """Its networks, optimisers and noise come to where it goes on, and it learns there."""
+    """Its networks, optimizers and noise come to where it goes on, and it learns there."""
     trained, env, configuration = make(name, before)
     trained.learn(40)
     state = checkpoint.State.of(trained, env.snapshot(), {"returns": [0.0]})

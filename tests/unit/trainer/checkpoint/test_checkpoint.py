@@ -108,7 +108,7 @@ def equal(one, other):
 
 @pytest.mark.parametrize("name", ["DQN", "PPO"])
 def test_what_is_saved_is_restored(trained, name):
-    """Networks, optimiser, counts, statistics and random generators."""
+    """Networks, optimizer, counts, statistics and random generators."""
     before, after = trained(name), trained(name, steps=0)
     before.save()
 

@@ -105,7 +105,7 @@ def test_rewards_are_on_the_sheet_with_their_weights():
     outcome=st.sampled_from(Outcome),
 )
 def test_terms_stay_in_the_ranges_on_the_sheet(driven_m, nearest_m, outcome):
-    """A weight is chosen by what a term can be; a step drives a tenth of a metre."""
+    """A weight is chosen by what a term can be; a step drives a tenth of a meter."""
     step = Transition(before_m=1.0, after_m=1.0 - driven_m, nearest_m=nearest_m, outcome=outcome)
 
     for row in REWARD:

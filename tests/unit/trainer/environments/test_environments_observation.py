@@ -24,8 +24,8 @@ SITUATION = Situation(
 )
 
 angles = st.floats(-math.pi, math.pi, exclude_min=True)
-metres = st.floats(-2.0, 2.0)
-poses = st.builds(Pose, metres, metres, angles)
+meters = st.floats(-2.0, 2.0)
+poses = st.builds(Pose, meters, meters, angles)
 
 
 def numbers(part: str, **changes) -> list[float]:
@@ -39,7 +39,7 @@ def test_the_target_is_seen_from_the_robot():
     assert replace(SITUATION, target=(0.0, 0.0)).target_ahead == pytest.approx((0.0, 1.0))
 
 
-@given(pose=poses, target=st.tuples(metres, metres))
+@given(pose=poses, target=st.tuples(meters, meters))
 def test_the_distance_to_the_target_does_not_depend_on_where_the_robot_looks(pose, target):
     """Turning on the spot is no progress."""
     seen = replace(SITUATION, pose=pose, target=target)
@@ -92,7 +92,7 @@ def test_parts_follow_each_other_in_the_order_they_are_named(parts):
     assert seen.dtype == np.float32
 
 
-@given(before=poses, ahead=st.tuples(metres, metres))
+@given(before=poses, ahead=st.tuples(meters, meters))
 def test_velocity_without_turning_is_the_way_over_the_time(before, ahead):
     """Forward and left of where the robot looked, divided by the seconds that passed."""
     c, s = math.cos(before.heading_rad), math.sin(before.heading_rad)

@@ -23,7 +23,7 @@ def transition(
 
 
 def test_progress_is_what_was_gained_toward_the_target():
-    """In metres, so that a whole drive earns the distance it began with."""
+    """In meters, so that a whole drive earns the distance it began with."""
     assert rewards.progress(transition(1.0, 0.9)) == pytest.approx(0.1)
     assert rewards.progress(transition(0.9, 1.0)) == pytest.approx(-0.1)
 

@@ -42,7 +42,7 @@ def test_a_run_goes_on_without_a_simulator_that_was_given_up(play, pool, directo
 
 @pytest.mark.parametrize("name", DISCRETE)
 def test_training_begins_without_a_simulator_that_does_not_come_up(play, pool, directory, name):
-    """Its rows have no observation yet, and nothing is learnt from them."""
+    """Its rows have no observation yet, and nothing is learned from them."""
     code, members = play(pool(name, least=1), {"collect-0": {"starts": range(1, 1000)}})
 
     assert code == 0

@@ -128,7 +128,7 @@ def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member
 
 
 def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env, make_member):
-    """There is nobody else to go on; the row is one more that nothing is learnt from."""
+    """There is nobody else to go on; the row is one more that nothing is learned from."""
     member = make_member(steps=[2], held=True)
     env = make_env(member)
     env.reset()
@@ -514,10 +514,10 @@ def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_membe
     env = make_env(*members)
     env.set_options({"easy": True})
     env.reset()
-    env.set_attr("colour", "red", indices=1)
+    env.set_attr("color", "red", indices=1)
 
     assert env.get_attr("options") == [{"easy": True}] * 2
-    assert env.get_attr("colour", indices=[1]) == ["red"]
+    assert env.get_attr("color", indices=[1]) == ["red"]
     assert env.env_method("has_wrapper_attr", "seeds", indices=0) == [True]
     assert env.env_is_wrapped(Wrapper) == [True, False]
     assert env.seed(9) == [episode_seed(9, COLLECT, index, 1) for index in (0, 1)]

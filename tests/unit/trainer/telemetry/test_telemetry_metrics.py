@@ -207,7 +207,7 @@ def train(job, directory, make_member):
 
 
 def test_a_run_tells_of_its_checkpoints_and_losses(train):
-    """Of a whole run, once it has ended: when, how long and how large; by what it learnt."""
+    """Of a whole run, once it has ended: when, how long and how large; by what it learned."""
     progress = train()
 
     size = values(progress, "palaestra_trainer_checkpoint_size_bytes")[()]

@@ -29,7 +29,7 @@ class Tensors:
     """A copy of all tensors that an update changes, to go back to from its middle.
 
     Attributes:
-        parameters: those of networks and optimisers, as Stable-Baselines3 names them.
+        parameters: those of networks and optimizers, as Stable-Baselines3 names them.
         variables: those that are learned besides.
     """
 

@@ -17,7 +17,7 @@ import numpy as np
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RADIUS_M, Pose
 
-HALF_SIDE_M = 2.0  # from the centre to the inner faces of the walls
+HALF_SIDE_M = 2.0  # from the center to the inner faces of the walls
 CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
 CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
 OUTLINE_M = 0.2286  # radius of the body and its bumper in the shipped world
@@ -29,14 +29,14 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One episode's task: from `start` to `target` (x, y in metres)."""
+    """One episode's task: from `start` to `target` (x, y in meters)."""
 
     start: Pose
     target: Point
 
 
 def gap(x_m: float, y_m: float) -> float:
-    """Return metres from a point to the nearest wall or cylinder; negative inside one."""
+    """Return meters from a point to the nearest wall or cylinder; negative inside one."""
     wall = HALF_SIDE_M - max(abs(x_m), abs(y_m))
     cylinder = min(math.hypot(x_m - x, y_m - y) for x, y in CYLINDERS) - CYLINDER_RADIUS_M
     return min(wall, cylinder)

@@ -88,7 +88,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
     | term      | Dense | Sparse | min  | max | is                                                  |
     |-----------|-------|--------|------|-----|-----------------------------------------------------|
-    | progress  | 1     |        | -0.1 | 0.1 | metres gained toward the target, by one movement    |
+    | progress  | 1     |        | -0.1 | 0.1 | meters gained toward the target, by one movement    |
     | success   | 1     | 1      | 0    | 1   | 1 when the robot came to stand on it                |
     | collision | -1    | -1     | 0    | 1   | 1 when it ran into something                        |
     | proximity | -0.1  |        | 0    | 1   | grows in a line as things come from 0.18 to 0.03 m  |
@@ -159,7 +159,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
 
         Args:
             seed: decides the episode; without one, the seed is derived from the last.
-            options: `start` (x, y, heading) and `target` (x, y), in metres and radians.
+            options: `start` (x, y, heading) and `target` (x, y), in meters and radians.
 
         Raises:
             ConfigurationError: an option is unknown, or is in a wall or a cylinder.

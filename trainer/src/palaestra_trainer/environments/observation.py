@@ -28,7 +28,7 @@ class Situation:
         bumped: whether the bumper touches something.
         pose: in the world's frame.
         velocity: forward, left (m/s), counter-clockwise (rad/s): means over the last step.
-        target: x, y in metres, in the world's frame.
+        target: x, y in meters, in the world's frame.
         time_left: of the episode, from 1 to 0.
     """
 
@@ -46,12 +46,12 @@ class Situation:
 
     @property
     def target_distance_m(self) -> float:
-        """Metres from the robot's centre to the target."""
+        """Meters from the robot's center to the target."""
         return math.hypot(*self.target_ahead)
 
     @property
     def target_ahead(self) -> Point:
-        """The target in the robot's frame: metres forward, metres to the left."""
+        """The target in the robot's frame: meters forward, meters to the left."""
         return in_frame(self.pose.heading_rad, self.target[0] - self.pose.x_m, self.target[1] - self.pose.y_m)
 
 

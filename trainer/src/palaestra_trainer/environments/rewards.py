@@ -35,9 +35,9 @@ class Transition:
     """One step, as far as rewards look at it.
 
     Attributes:
-        before_m: metres to the target before the step.
-        after_m: metres to the target after it.
-        nearest_m: metres to the nearest thing after it, as far as sensors see it.
+        before_m: meters to the target before the step.
+        after_m: meters to the target after it.
+        nearest_m: meters to the nearest thing after it, as far as sensors see it.
         outcome: what the step led to.
     """
 
@@ -51,7 +51,7 @@ Term = Callable[[Transition], float]
 
 
 def progress(step: Transition) -> float:
-    """Return metres gained toward the target; negative when the robot moved away.
+    """Return meters gained toward the target; negative when the robot moved away.
 
     Bounded by the distance driven, so standing still earns exactly 0.
     """

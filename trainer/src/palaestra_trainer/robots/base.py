@@ -29,7 +29,7 @@ Twist = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a robot is: metres in the world's frame, heading in (-pi, pi], 0 along x."""
+    """Where a robot is: meters in the world's frame, heading in (-pi, pi], 0 along x."""
 
     x_m: float
     y_m: float
@@ -78,7 +78,7 @@ class RobotinoAbc(ABC):
 
     @abstractmethod
     def distances(self) -> NDArray[np.float32]:
-        """Return metres to the nearest obstacle, shape (9,), in `SENSOR_RANGE_M`.
+        """Return meters to the nearest obstacle, shape (9,), in `SENSOR_RANGE_M`.
 
         The first looks forward, the others follow counter-clockwise every 40 degrees.
         """
@@ -115,12 +115,12 @@ class RobotinoAbc(ABC):
         """Return what the camera sees, shape (height, width, 3), RGB.
 
         Raises:
-            NoSuchSensor: the robot has no colour camera.
+            NoSuchSensor: the robot has no color camera.
         """
-        raise NoSuchSensor(f"{type(self).__name__} has no colour camera; use distances()")
+        raise NoSuchSensor(f"{type(self).__name__} has no color camera; use distances()")
 
     def depth_image(self) -> NDArray[np.float32]:
-        """Return metres for each pixel, shape (height, width).
+        """Return meters for each pixel, shape (height, width).
 
         Raises:
             NoSuchSensor: the robot has no depth camera.
@@ -132,7 +132,7 @@ class Scene(Protocol):
     """What can be arranged in a simulation, and nowhere else."""
 
     def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
-        """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings.
+        """Begin anew: robot at rest at `start`, mark at `target` (x, y in meters), fresh readings.
 
         All chance until the next reset follows from `seed`, in [0, 2**31).
         """

@@ -28,7 +28,7 @@ _WHEEL_RADIUS_M = 0.063
 _WHEEL_DISTANCE_M = 0.1826
 _SIN_60 = math.sqrt(0.75)
 
-# Metres from volts for the GP2Y0A41, the default sensor of the model: a * V**b + c.
+# Meters from volts for the GP2Y0A41, the default sensor of the model: a * V**b + c.
 # Source: the sample controller of that model, R2023b.
 _RANGE_SCALE, _RANGE_EXPONENT, _RANGE_OFFSET_M = 0.1594, -0.8533, -0.02916
 _LEAST_VOLTS = 0.05  # below the sensor's range; keeps the power finite
@@ -90,11 +90,11 @@ class Robotino(RobotinoAbc):
         self.simulation.connect()
 
     def distances(self) -> NDArray[np.float32]:
-        """Return metres to the nearest obstacle, shape (9,), forward first, counter-clockwise."""
+        """Return meters to the nearest obstacle, shape (9,), forward first, counter-clockwise."""
         volts = [sensor.value for sensor in self._infrared]
         if None in volts:
             raise self._no_reading()
-        return np.array([metres(volt) for volt in volts], dtype=np.float32)
+        return np.array([meters(volt) for volt in volts], dtype=np.float32)
 
     def bumped(self) -> bool:
         """Return whether the bumper touches something."""
@@ -160,7 +160,7 @@ class RobotinoScene:
         return self
 
     def reset(self, seed: int, start: Pose, target: tuple[float, float]) -> None:
-        """Begin anew: robot at rest at `start`, mark at `target` (x, y in metres), fresh readings.
+        """Begin anew: robot at rest at `start`, mark at `target` (x, y in meters), fresh readings.
 
         All chance until the next reset follows from `seed`, in [0, 2**31).
 
@@ -187,7 +187,7 @@ def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
     )
 
 
-def metres(volts: float) -> float:
-    """Return the distance in metres, within the sensor's range, for a reading in volts."""
+def meters(volts: float) -> float:
+    """Return the distance in meters, within the sensor's range, for a reading in volts."""
     distance: float = _RANGE_SCALE * max(volts, _LEAST_VOLTS) ** _RANGE_EXPONENT + _RANGE_OFFSET_M
     return min(max(distance, SENSOR_RANGE_M[0]), SENSOR_RANGE_M[1])

@@ -148,7 +148,7 @@ class Keeper:
         return observation, info
 
     def step(self, action: Any) -> Step:
-        """Return what the environment's step returns, all of it numbers that can be learnt from.
+        """Return what the environment's step returns, all of it numbers that can be learned from.
 
         Raises:
             SimulatorFault: it broke; begin to mend it.

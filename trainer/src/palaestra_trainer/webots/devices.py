@@ -134,7 +134,7 @@ class TouchSensor(Sensor):
 
 
 class PositionSensor(Sensor):
-    """The position of a joint; `value` in radians or metres."""
+    """The position of a joint; `value` in radians or meters."""
 
     __slots__ = ()
 

@@ -64,7 +64,7 @@ class Observer:
         return bool(self._services.get("supervisor/get_from_def", "supervisor_get_from_def")(name=name).node)
 
     def pose(self, name: str) -> tuple[float, float, float]:
-        """Return x and y in metres and the heading in radians of the node with DEF `name`."""
+        """Return x and y in meters and the heading in radians of the node with DEF `name`."""
         self.begin_pose(name)
         return self.finish_pose(name)
 
@@ -90,7 +90,7 @@ class Observer:
         return pose
 
     def translation(self, name: str) -> tuple[float, float, float]:
-        """Return the translation field, in metres, of the node with DEF `name`."""
+        """Return the translation field, in meters, of the node with DEF `name`."""
         field = self.field(name, "translation")
         value = self._services.get("supervisor/field/get_vec3f", "field_get_vec3f")(field=field).value
         return (value.x, value.y, value.z)

@@ -59,7 +59,7 @@ class Simulation:
         self._tracked[name] = None
 
     def pose(self, name: str) -> tuple[float, float, float]:
-        """Return x, y (metres) and heading (radians) of a tracked node after the last step.
+        """Return x, y (meters) and heading (radians) of a tracked node after the last step.
 
         Raises:
             KeyError: the node is not tracked.

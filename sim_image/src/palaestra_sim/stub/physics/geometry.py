@@ -18,7 +18,7 @@ IDENTITY: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Pose(NamedTuple):
-    """A position in metres and a rotation, in a frame that the holder of the pose knows."""
+    """A position in meters and a rotation, in a frame that the holder of the pose knows."""
 
     position: Vector = (0.0, 0.0, 0.0)
     rotation: Matrix = IDENTITY

@@ -73,7 +73,7 @@ class Robot:
     def look(
         self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
     ) -> Callable[[], Sequence[float]]:
-        """Return a function that returns how far each ray travels now, in metres; see `Carrier`."""
+        """Return a function that returns how far each ray travels now, in meters; see `Carrier`."""
         fan = Fan(rays, reach_m)
         self._fans.append((fan, (min(heights_m), max(heights_m))))
         cast, frame = fan.cast, self._frame

@@ -100,7 +100,7 @@ class _RobotReader:
         for shape in shapes:
             x, y, _ = shape.pose.position
             if shape.kind != "cylinder" or not shape.upright or math.hypot(x, y) > _CENTRED_M:
-                fact = "the stub's robots are upright cylinders, centred on the robot's origin"
+                fact = "the stub's robots are upright cylinders, centered on the robot's origin"
                 self._reading.refuse(shape.node, fact)
         motors = self._devices.motors
         wheels = [motors[name] for name in WHEELS if name in motors]

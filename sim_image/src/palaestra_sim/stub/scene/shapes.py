@@ -20,7 +20,7 @@ _UPSIDE_DOWN: Final = -1.0 + 0.5e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """A box or cylinder in the frame of its place. Metres: `size` is x, y, z or 2 r, 2 r, height."""
+    """A box or cylinder in the frame of its place. Meters: `size` is x, y, z or 2 r, 2 r, height."""
 
     kind: Literal["box", "cylinder"]
     size: tuple[float, float, float]

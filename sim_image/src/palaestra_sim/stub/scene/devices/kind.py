@@ -91,7 +91,7 @@ class Carrier(Protocol):
     def look(
         self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
     ) -> Callable[[], Sequence[float]]:
-        """Return a function that returns how far each ray travels now, in metres.
+        """Return a function that returns how far each ray travels now, in meters.
 
         Args:
             rays: in the robot's frame.
