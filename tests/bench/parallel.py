@@ -65,7 +65,7 @@ class Member:
     def pause(self):
         """It is always busy."""
 
-    def run(self):
+    def unpause(self):
         """It runs already."""
 
 

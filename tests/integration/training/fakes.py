@@ -87,7 +87,7 @@ class FakeSimulator:
         """Note it."""
         self.log.append("pause")
 
-    def run(self) -> None:
+    def unpause(self) -> None:
         """Note it."""
         self.log.append("run")
 
