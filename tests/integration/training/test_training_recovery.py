@@ -21,7 +21,7 @@ from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
-from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.member import NullWatcher
 from palaestra_trainer.simulators.simulator import Simulator
 from tests.waiting import eventually
 
@@ -29,7 +29,7 @@ STAND = np.zeros(1, dtype=np.int64)
 PATIENCE_S = 60.0
 
 
-class Restarts(Nobody):
+class Restarts(NullWatcher):
     """A watcher that counts them."""
 
     def __init__(self):

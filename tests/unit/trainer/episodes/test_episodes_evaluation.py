@@ -8,11 +8,11 @@ from palaestra_trainer.episodes.evaluation import evaluate, evaluate_on_all
 from palaestra_trainer.errors import FaultBudgetSpent
 from palaestra_trainer.simulators.budget import Group, RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.member import NullWatcher
 from palaestra_trainer.waiting.interruption import Interrupted
 
 
-class Losses(Nobody):
+class Losses(NullWatcher):
     """A watcher that adds up the steps of episodes that faults cut."""
 
     steps = 0

@@ -128,7 +128,7 @@ def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member
 
 
 def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env, make_member):
-    """There is nobody else to go on; the row is one more that nothing is learned from."""
+    """No other simulator steps meanwhile, and the policy learns nothing from this row."""
     member = make_member(steps=[2], held=True)
     env = make_env(member)
     env.reset()

@@ -9,7 +9,7 @@ import pytest
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorDead, SimulatorHung
 from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.member import NullWatcher
 from palaestra_trainer.simulators.meter import Pace
 from palaestra_trainer.waiting.turns import let_others, take_turns
 
@@ -91,7 +91,7 @@ def test_a_simulator_that_has_become_slower_is_not_reported_for_ever():
 def test_who_waits_for_a_slow_simulator_is_not_slow(make_member):
     """Steps are taken in turns of one thread; each is measured by its own part of the time."""
     told = []
-    watcher = Nobody()
+    watcher = NullWatcher()
     watcher.slow = lambda name, seconds: told.append((name, seconds > 0.05))
     members = [make_member("collect-0"), make_member("collect-1")]
     keepers = [Keeper(member, watcher=watcher) for member in members]

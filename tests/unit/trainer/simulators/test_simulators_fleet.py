@@ -22,13 +22,13 @@ from palaestra_trainer.errors import (
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.fleet import Fleet, resting
 from palaestra_trainer.simulators.keeper import Keeper, await_one
-from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.member import NullWatcher
 from palaestra_trainer.waiting.interruption import Interrupted, Interruption
 
 DEADLINE_S = 5.0
 
 
-class Told(Nobody):
+class Told(NullWatcher):
     """A watcher that records its calls."""
 
     def __init__(self):
@@ -54,7 +54,7 @@ def make_fleet(make_configuration, make_member):
 
     def make(first=None, **faults):
         members = [first or make_member("collect-0", **faults), make_member("evaluate-0")]
-        return Fleet(make_configuration(), members, Nobody()), members
+        return Fleet(make_configuration(), members, NullWatcher()), members
 
     return make
 
@@ -193,7 +193,7 @@ def test_one_that_fails_after_the_others_are_up_is_not_waited_for(make_configura
 
     late.start = fail
     configuration = with_fewer(make_configuration(collectors=2, evaluators=0), 1)
-    fleet = Fleet(configuration, [late, make_member("collect-1")], Nobody())
+    fleet = Fleet(configuration, [late, make_member("collect-1")], NullWatcher())
 
     fleet.start(lambda: fleet.collecting[1].up() and up.set())
 
@@ -217,7 +217,7 @@ def test_training_does_not_begin_before_every_one_was_tried(make_configuration, 
     fleet = Fleet(
         with_fewer(make_configuration(collectors=2, evaluators=0), 1),
         [slow, make_member("collect-1")],
-        Nobody(),
+        NullWatcher(),
     )
 
     fleet.start(check)

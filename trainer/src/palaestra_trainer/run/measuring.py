@@ -16,7 +16,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run.training import MakeMembers, use_threads
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.fleet import Fleet
-from palaestra_trainer.simulators.member import Nobody
+from palaestra_trainer.simulators.member import NullWatcher
 
 
 def measure(
@@ -43,7 +43,7 @@ def measure(
     use_threads()
     only = configuration.model_copy(update={"simulators": evaluating})
     with ExitStack() as stack:
-        fleet = Fleet(only, make_members(only), Nobody())
+        fleet = Fleet(only, make_members(only), NullWatcher())
         stack.callback(fleet.stop)
         fleet.start()
         env = SimulatorsVecEnv(fleet.evaluating[:1], configuration.seed)

@@ -23,7 +23,7 @@ from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
-from palaestra_trainer.simulators.member import Member, Nobody, Step, Watcher
+from palaestra_trainer.simulators.member import Member, NullWatcher, Step, Watcher
 from palaestra_trainer.simulators.meter import Meter
 from palaestra_trainer.simulators.numbers import check_observation, check_reward
 from palaestra_trainer.waiting.interruption import Check, go_on
@@ -60,12 +60,11 @@ class Keeper:
         group: Group | None = None,
     ) -> None:
         self.member = member
-        self.watcher: Watcher = watcher or Nobody()
+        self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
         self._misfit = False  # whether the last process had a world that lacks what is needed
-        self._limit = limit or RestartLimit()
-        self._budget = RestartBudget(member.name, self._limit, clock)
+        self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
         self.meter = Meter(member, self._budget)

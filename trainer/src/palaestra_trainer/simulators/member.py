@@ -104,7 +104,7 @@ class Watcher(Protocol):
         ...
 
 
-class Nobody:
+class NullWatcher:
     """A watcher that ignores all events."""
 
     def stepped(self, steps: int) -> None:

@@ -125,7 +125,7 @@ class Controller:
 
     def _serve(self, *services: Service) -> None:
         for path, type_name, handler in services:
-            self.node.serve(path, type_name, _told(handler))
+            self.node.serve(path, type_name, _reporting_errors(handler))
 
     def _serve_devices(self) -> None:
         for name, (kind, device) in self.robot.parts.devices.rows.items():
@@ -191,7 +191,7 @@ class Controller:
         return delay_s
 
 
-def _told(handler: Handler) -> Handler:
+def _reporting_errors(handler: Handler) -> Handler:
     """Return the handler with our errors turned into failures that the client receives."""
 
     def handle(request: Any) -> Any:

@@ -5,9 +5,9 @@ services, its topics with their messages, and the rule of its `enable`. The effe
 follows from the message. A new device is one file in this package and one line in `DEVICES`; CONTRIBUTING.md
 has the steps.
 
-kind              what a row is
-distance_sensor, touch_sensor, position_sensor, rotational_motor    the rows
-pseudo            battery, keyboard and joystick, which every robot has
+- `kind`: what a row is
+- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`: the rows
+- `pseudo`: battery, keyboard and joystick, which every robot has
 """
 
 from __future__ import annotations
