@@ -124,7 +124,7 @@ def test_a_node_a_class_and_a_leader_that_are_there_are_right(found, place):
     leadership.stop(5.0)
     place.api.delete(NODES, None, node["metadata"]["name"])
     place.api.delete(STORAGE_CLASSES, None, "usual")
-    assert findings["nodes"].fact == "v1.36.0 knows sidecar containers"
+    assert findings["nodes"].fact == "v1.36.0 supports sidecar containers"
     assert findings["storage class"].fact == "usual is the default"
     assert findings["leader"].fact == "is me"
 
@@ -225,10 +225,10 @@ def test_a_quota_with_room_is_no_hindrance_and_a_spent_one_hides_what_follows(fo
     place.api.merge(QUOTAS, place.name, "few", {"spec": {"hard": {"pods": "0"}}})
     spent = eventually(lambda: (each := found()["sidecars"]).verdict is not Verdict.RIGHT and each)
 
-    assert with_room.fact == "stay as they are on their way to the nodes"
+    assert with_room.fact == "stay unchanged when a pod is created"
     assert spent.verdict is Verdict.UNKNOWN
     assert "exceeded quota: few" in spent.fact
-    assert spent.remedy == "try again when there is room"
+    assert spent.remedy == "try again when the quota has room"
 
 
 def test_something_that_drops_restart_policy_is_found_by_a_dry_run(found, place):

@@ -2,11 +2,11 @@
 
 - `finding`: the result of a check
 - `examining`: all checks in their order
-- `platform`: the cluster: version, sidecars, storage, the CRD
-- `installation`: the operator: running, leading, its rights, its metrics
+- `platform`: the cluster: version, CRD, namespace, sidecars and storage
+- `installation`: the operator: its replicas, images, leader, rights and metrics
 - `rights`: the rights of the operator and of users
 
-Nothing is changed: if a check has to try something, it does a dry run.
+No check changes anything; a check that must create an object does a dry run.
 """
 
 from palaestra.doctor.examining import CHECKS, examine

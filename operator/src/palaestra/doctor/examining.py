@@ -1,4 +1,4 @@
-"""All checks, in the order in which one may be the cause of the next."""
+"""All checks, ordered so that causes come before their consequences."""
 
 from collections.abc import Iterator, Mapping
 

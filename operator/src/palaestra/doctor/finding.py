@@ -11,7 +11,7 @@ class Verdict(StrEnum):
     """The result of a check."""
 
     RIGHT = "ok"
-    WARNING = "warning"  # it works; something about it may surprise later
+    WARNING = "warning"  # it works, but may cause problems later
     WRONG = "wrong"
     UNKNOWN = "unknown"
 
@@ -39,8 +39,8 @@ class Site:
 
     Attributes:
         api: the cluster, with the user's credentials.
-        namespace: of the user's jobs.
-        operator_namespace: of the operator.
+        namespace: namespace of the user's jobs.
+        operator_namespace: namespace of the operator.
     """
 
     api: Api

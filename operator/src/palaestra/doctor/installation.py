@@ -1,4 +1,4 @@
-"""The operator: is it there, are its images fixed, does one lead, may it do its work, can it be measured?"""
+"""Checks of the operator: its replicas, images, leader, rights and metrics."""
 
 import time
 from collections.abc import Iterator
@@ -16,13 +16,13 @@ from palaestra.plan import Images
 from palaestra.plan.network_policy import OPERATOR_LABEL
 
 ROLES = "install the roles of this release, for this namespace too"
-LOGS = "`kubectl logs -n {namespace} deploy/{name}` says why"
+LOGS = "read `kubectl logs -n {namespace} deploy/{name}`"
 TRAINER_IMAGE = "--trainer-image="
 STUB_IMAGE = "--stub-image="
 DIGEST = "@sha256:"
 NOT_ELECTED = "--no-leader-elect"
 PORT_NAME = "metrics"
-RENEWED_WITHIN_S = 20.0  # a Lease lasts 15
+RENEWED_WITHIN_S = 20.0  # a Lease is valid for 15 s
 
 
 def runs(site: Site) -> Iterator[Finding]:
@@ -30,7 +30,7 @@ def runs(site: Site) -> Iterator[Finding]:
     deployment = _deployment(site)
     remedy = _remedy(site, deployment)
     if deployment is None:
-        yield wrong("operator", f"there is none in {site.operator_namespace}", remedy)
+        yield wrong("operator", f"is not installed in {site.operator_namespace}", remedy)
         return
     image = _container(deployment)["image"]
     wanted = _wanted(deployment)
@@ -43,14 +43,14 @@ def runs(site: Site) -> Iterator[Finding]:
 
 
 def images(site: Site) -> Iterator[Finding]:
-    """Check that the operator's image, and those of jobs that name none, are named by digest."""
+    """Check whether the operator's image and the default images of jobs are pinned by digest."""
     deployment = _deployment(site)
-    if deployment is not None:  # `runs` reports that there is none
+    if deployment is not None:  # `runs` reports a missing Deployment
         yield judged_images(_container(deployment))
 
 
 def judged_images(container: Object) -> Finding:
-    """Return what the images mean that the operator's container names: a tag can come to name another."""
+    """Return the finding for the images in the operator's container: a warning if one has no digest."""
     release = Images.of_release(version("palaestra"))
     named = (
         container["image"],
@@ -59,19 +59,19 @@ def judged_images(container: Object) -> Finding:
     )
     tags = [image for image in named if DIGEST not in image]
     if not tags:
-        return right("images", "are named by digest")
+        return right("images", "are pinned by digest")
     return warning(
         "images",
-        f"{', '.join(tags)}: a tag may name another image tomorrow, also for the next pod of a job",
-        "set images.<name>.digest of the chart, see docs/install.md",
+        f"{', '.join(tags)}: a tag may be moved to another image, which a job's next pod would use",
+        "set the chart's values images.<name>.digest, see docs/install.md",
     )
 
 
 def leads(site: Site) -> Iterator[Finding]:
-    """Check whether one operator leads, by seeing it renew its Lease: no two clocks are compared."""
+    """Check whether an operator leads: wait for a renewal of its Lease, without comparing two clocks."""
     deployment = _deployment(site)
     if deployment is not None and NOT_ELECTED in _container(deployment).get("command", ()):
-        yield right("leader", "there is no election")
+        yield right("leader", "leader election is disabled")
         return
     remedy = _remedy(site, deployment)
     if deployment is not None and _wanted(deployment) == 0:
@@ -81,7 +81,7 @@ def leads(site: Site) -> Iterator[Finding]:
     seen = False
     try:
         for lease in changes(site.api, LEASES, site.operator_namespace, NAME, deadline=deadline):
-            holder = lease["spec"].get("holderIdentity")  # empty: its last leader gave it back
+            holder = lease["spec"].get("holderIdentity")  # empty: the last leader released it
             if seen and holder:
                 yield right("leader", f"is {holder}")
                 return
@@ -93,9 +93,9 @@ def leads(site: Site) -> Iterator[Finding]:
 
 
 def operator_rights(site: Site) -> Iterator[Finding]:
-    """Report what the operator's account may not do in the namespace of the person who asks.
+    """Report the rights that the operator's account lacks in the namespace of the jobs.
 
-    The rights for Kueue are checked where the cluster serves the Workloads that the operator reads.
+    The rights for Kueue are checked if the cluster serves Kueue's Workloads.
     """
     what, deployment = "operator's rights", _deployment(site)
     name = deployment["spec"]["template"]["spec"]["serviceAccountName"] if deployment else NAME
@@ -108,13 +108,15 @@ def operator_rights(site: Site) -> Iterator[Finding]:
         yield wrong(what, fact, ROLES)
     if unread:
         fact = f"service account {name} may not {', '.join(unread)} in {site.namespace}"
-        yield warning(what, f"{fact}; a queued job does not say why Kueue does not admit it", ROLES)
+        yield warning(
+            what, f"{fact}; the status of a queued job does not explain why Kueue does not admit it", ROLES
+        )
     if not denied and not unread:
         yield right(what, f"suffice in {site.namespace}")
 
 
 def metrics(site: Site) -> Iterator[Finding]:
-    """Check whether an operator answers with its metrics, asked by way of the API server."""
+    """Check whether an operator serves its metrics; the request goes through the API server."""
     pods = site.api.list(PODS, site.operator_namespace, labels=f"{OPERATOR_LABEL}=true")
     running = [pod for pod in pods if pod["status"].get("phase") == "Running"]
     if not running:
@@ -130,17 +132,18 @@ def metrics(site: Site) -> Iterator[Finding]:
         yield unknown(
             "metrics",
             f"port {port} of pod {name} does not answer the API server: {error}",
-            "a NetworkPolicy may let Prometheus in alone: look at its targets; else " + _logs(site),
+            "if a NetworkPolicy admits only Prometheus, look at Prometheus' targets; otherwise "
+            + _logs(site),
         )
         return
     if "palaestra_" in text:
-        yield right("metrics", f"are at port {port} of pod {name}")
+        yield right("metrics", f"are served on port {port} of pod {name}")
     else:
-        yield wrong("metrics", f"port {port} of pod {name} serves something else", _logs(site))
+        yield wrong("metrics", f"port {port} of pod {name} does not serve Palaestra's metrics", _logs(site))
 
 
 def trainer_image(site: Site) -> str:
-    """Return the trainer's image where a job names none: the operator's choice, else the release's."""
+    """Return the default image of trainers: from the operator's options, else that of this release."""
     try:
         deployment = _deployment(site)
     except Forbidden:
@@ -150,7 +153,7 @@ def trainer_image(site: Site) -> str:
 
 
 def _chosen(container: Object, option: str, otherwise: str) -> str:
-    """Return the value of an option of the operator's command line."""
+    """Return the value of an option of the operator's command line; `otherwise` if it is not given."""
     given = container.get("command", ())
     return next(
         (argument.removeprefix(option) for argument in given if argument.startswith(option)), otherwise
@@ -179,7 +182,7 @@ def _wanted(deployment: Object) -> int:
 
 
 def _remedy(site: Site, deployment: Object | None) -> str:
-    """Return what helps against an operator that does not do its work."""
+    """Return the remedy for an operator that is missing, scaled to 0 or not working."""
     if deployment is None:
         return "install Palaestra, or name its namespace with --operator-namespace"
     if _wanted(deployment) == 0:

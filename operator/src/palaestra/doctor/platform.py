@@ -1,4 +1,4 @@
-"""The cluster itself: is it new enough, does it leave sidecars as they are, can it keep runs?"""
+"""Checks of the cluster: version, definition of TrainingJobs, namespace, sidecars and storage."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -17,44 +17,44 @@ from palaestra.objects import Object
 from palaestra.plan.containers import SECURITY
 from palaestra.plan.pod import UNPRIVILEGED
 
-FIRST = (1, 33)
+FIRST = (1, 33)  # the first version in which sidecar containers are stable
 DEFAULT_CLASS = "storageclass.kubernetes.io/is-default-class"
-NO_ROOM = "exceeded quota"
+OVER_QUOTA = "exceeded quota"
 
 
 def answers(site: Site) -> Iterator[Finding]:
-    """Check whether the API server answers, and knows sidecar containers."""
+    """Check whether the API server responds and supports sidecar containers."""
     yield judged_version("API server", site.api.version())
 
 
 def nodes(site: Site) -> Iterator[Finding]:
-    """Check whether the oldest kubelet knows sidecar containers."""
+    """Check whether the oldest kubelet supports sidecar containers."""
     versions = [node["status"]["nodeInfo"]["kubeletVersion"] for node in site.api.list(NODES)]
     if not versions:
-        yield wrong("nodes", "there is none", "add a node, so that pods can run")
+        yield wrong("nodes", "there are none", "add a node, so that pods can run")
         return
     yield judged_version("nodes", min(versions, key=release))
 
 
 def judged_version(what: str, text: str) -> Finding:
-    """Return what a version such as `v1.33.2+k3s1` means for sidecar containers."""
+    """Return whether a version such as `v1.33.2+k3s1` supports sidecar containers, as a finding."""
     if release(text) < FIRST:
-        fact = f"{text} is older than 1.33, from which on sidecar containers are there for good"
+        fact = f"{text} is older than 1.33, the first version with stable sidecar containers"
         return wrong(what, fact, "update to 1.33 or newer")
-    return right(what, f"{text} knows sidecar containers")
+    return right(what, f"{text} supports sidecar containers")
 
 
 def release(text: str) -> tuple[int, int]:
-    """Return major and minor of a version, (0, 0) for what is none."""
+    """Return major and minor of a version; (0, 0) if `text` is not a version."""
     found = re.match(r"v?(\d+)\.(\d+)", text)
     return (int(found[1]), int(found[2])) if found else (0, 0)
 
 
 def definition(site: Site) -> Iterator[Finding]:
-    """Check whether the cluster knows TrainingJobs, and as this release does."""
+    """Check whether the cluster serves TrainingJobs, with the definition of this release."""
     what, remedy = "TrainingJobs", INSTALL
     if not site.api.serves(API_VERSION):
-        yield wrong(what, f"the cluster does not know {API_VERSION}", remedy)
+        yield wrong(what, f"the cluster does not serve {API_VERSION}", remedy)
         return
     ours = crd()
     found = site.api.get(DEFINITIONS, None, ours["metadata"]["name"])
@@ -62,11 +62,11 @@ def definition(site: Site) -> Iterator[Finding]:
     if place:
         yield wrong(
             what,
-            f"their CustomResourceDefinition is not that of {version('palaestra')}: {place} differs",
+            f"their CustomResourceDefinition differs from that of {version('palaestra')} in {place}",
             f"{remedy}, or use the command line of the installed release",
         )
     else:
-        yield right(what, f"are known as {version('palaestra')} knows them")
+        yield right(what, f"have the definition of {version('palaestra')}")
 
 
 def namespace(site: Site) -> Iterator[Finding]:
@@ -82,7 +82,7 @@ def namespace(site: Site) -> Iterator[Finding]:
 
 
 def difference(ours: Any, found: Any, path: str) -> str | None:
-    """Return the path of the first part of `ours` that is not so in `found`, which may hold more."""
+    """Return the path of the first part of `ours` that differs in `found`, which may contain more."""
     if isinstance(ours, Mapping) and isinstance(found, Mapping):
         pairs = [(f"{path}.{key}", value, found.get(key)) for key, value in ours.items()]
     elif isinstance(ours, list) and isinstance(found, list) and len(ours) == len(found):
@@ -93,44 +93,44 @@ def difference(ours: Any, found: Any, path: str) -> str | None:
 
 
 def sidecars(site: Site) -> Iterator[Finding]:
-    """Check whether everything that pods pass through leaves their sidecars sidecars: by a dry run."""
+    """Check by a dry run whether the sidecars of a pod stay unchanged when the API server admits it."""
     what = "sidecars"
     try:
         made = site.api.create(PODS, trial_pod(site.namespace, trainer_image(site)), dry_run=True)
     except Forbidden as error:
         if error.lacks_right:
             raise
-        if NO_ROOM in error.message:
-            yield unknown(what, f"could not be tried: {error.message}", "try again when there is room")
+        if OVER_QUOTA in error.message:
+            yield unknown(what, f"could not be checked: {error.message}", "try again when the quota has room")
             return
         yield wrong(
             what,
-            f"a pod as jobs have them is refused in {site.namespace}: {error.message}",
-            "allow what it names",
+            f"a pod like those of jobs is refused in {site.namespace}: {error.message}",
+            "allow what the message names",
         )
-    except Invalid as error:  # a webhook with side effects takes part in no dry run
-        yield unknown(what, f"could not be tried: {error.message}", "start a job; its status shows it")
+    except Invalid as error:  # a dry run fails if a webhook has side effects
+        yield unknown(what, f"could not be checked: {error.message}", "start a job and read its status")
     else:
         yield judged_pod(made)
 
 
 def judged_pod(made: Object) -> Finding:
-    """Return what came of the trial pod's sidecar."""
+    """Return the finding for the trial pod as the API server returned it."""
     found = {
         container["name"]: container.get("restartPolicy")
         for container in made["spec"].get("initContainers", ())
     }
     if found.get("sidecar") == "Always":
-        return right("sidecars", "stay as they are on their way to the nodes")
+        return right("sidecars", "stay unchanged when a pod is created")
     return wrong(
         "sidecars",
-        "something on the way drops restartPolicy of init containers: no pod of a job would get ready",
+        "something drops restartPolicy of init containers, so no pod of a job would become ready",
         "update or remove the mutating webhook: `kubectl get mutatingwebhookconfigurations`",
     )
 
 
 def trial_pod(namespace: str, image: str) -> Object:
-    """Return a pod that is never made: restricted, with one sidecar."""
+    """Return the pod of the dry run: it meets *restricted* Pod Security and has one sidecar."""
     common = {"image": image, "command": ["true"], "securityContext": SECURITY, "resources": RESOURCES}
     return {
         "apiVersion": "v1",
@@ -147,7 +147,7 @@ def trial_pod(namespace: str, image: str) -> Object:
 
 
 def storage(site: Site) -> Iterator[Finding]:
-    """Check whether a claim that names no class gets a volume."""
+    """Check whether a claim that names no class gets a default storage class."""
     classes = site.api.list(STORAGE_CLASSES)
     default = [
         class_["metadata"]["name"]
@@ -160,6 +160,6 @@ def storage(site: Site) -> Iterator[Finding]:
     names = ", ".join(class_["metadata"]["name"] for class_ in classes)
     yield wrong(
         "storage class",
-        f"none is the default; there is {names}" if names else "there is none",
+        f"none is the default; the classes are {names}" if names else "there is none",
         f"annotate one with {DEFAULT_CLASS}=true, or name one in spec.storage.storageClassName of each job",
     )

@@ -1,6 +1,6 @@
 """Rights, checked with access reviews of the API server instead of by reading roles.
 
-The table of the operator's rights is compared with the installed role by a test.
+A test compares the table of the operator's rights with the installed role.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,14 +13,14 @@ from palaestra.objects import Object
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Right:
-    """What may be done with one kind of objects; `resource` is `pods`, or `pods/log`."""
+    """The right to use `verbs` on one resource, such as `pods` or `pods/log`."""
 
     group: str
     resource: str
     verbs: tuple[str, ...]
 
-    def asked(self, namespace: str) -> Iterator[tuple[str, Object]]:
-        """Yield, for each verb, how a person says it and how the API server is asked."""
+    def reviewed(self, namespace: str) -> Iterator[tuple[str, Object]]:
+        """Yield for each verb a text such as `list pods`, and the attributes for an access review."""
         plural, _, subresource = self.resource.partition("/")
         for verb in self.verbs:
             attributes = {"namespace": namespace, "group": self.group, "resource": plural, "verb": verb}
@@ -38,13 +38,13 @@ class Account:
 
     @property
     def subject(self) -> Object:
-        """Return it as the API server sees it when it asks."""
+        """Return the user and groups that the account has in requests to the API server."""
         groups = ["system:serviceaccounts", f"system:serviceaccounts:{self.namespace}"]
         return {"user": f"system:serviceaccount:{self.namespace}:{self.name}", "groups": groups}
 
 
 def may(group: str, resource: str, verbs: str) -> Right:
-    """Return a right from words."""
+    """Return the right to use `verbs`, separated by spaces."""
     return Right(group=group, resource=resource, verbs=tuple(verbs.split()))
 
 
@@ -60,10 +60,10 @@ OPERATOR = (
     may("networking.k8s.io", "networkpolicies", "list watch create patch"),
     may("", "events", "get list create patch"),
 )
-# For the words of a status alone: without it the operator works, as with a role of an earlier release.
+# Used only for messages in a status; an operator with the role of an earlier release works without it.
 OPERATOR_WITH_KUEUE = (may("kueue.x-k8s.io", "workloads", "list"),)
 
-PERSON: tuple[tuple[str, tuple[Right, ...]], ...] = (
+TASKS: tuple[tuple[str, tuple[Right, ...]], ...] = (
     ("look at jobs", (may("palaestra.dev", "trainingjobs", "get list watch"), may("", "events", "list"))),
     ("author jobs", (may("palaestra.dev", "trainingjobs", "create patch delete"),)),
     ("read logs", (may("", "pods/log", "get"),)),
@@ -76,37 +76,37 @@ PERSON: tuple[tuple[str, tuple[Right, ...]], ...] = (
         ),
     ),
 )
-NECESSARY = frozenset({"look at jobs", "author jobs"})  # the rest is for some people only
+NECESSARY = frozenset({"look at jobs", "author jobs"})  # only some people need the others
 
 
 def own_rights(site: Site) -> Iterator[Finding]:
-    """Report what the person who asks may not do, one line for each thing that people do."""
-    for deed, rights in PERSON:
+    """Report the rights that the user lacks, one finding for each task."""
+    for task, rights in TASKS:
         denied = missing(site, rights)
-        what = f"to {deed}"
+        what = f"to {task}"
         if denied:
-            report = wrong if deed in NECESSARY else unknown
+            report = wrong if task in NECESSARY else unknown
             yield report(
                 what,
                 f"you may not {', '.join(denied)} in {site.namespace}",
-                "ask for a role that has it; without it the rest works",
+                "ask for a role with these rights; other tasks may work without them",
             )
         else:
             yield right(what, f"you have the rights in {site.namespace}")
 
 
 def missing(site: Site, rights: Iterable[Right], *, account: Account | None = None) -> list[str]:
-    """Return which rights the person who asks, or an account, lacks in the namespace: `list pods`."""
+    """Return the rights that the user, or `account`, lacks in the namespace: `list pods`."""
     return [
-        said
+        text
         for needed in rights
-        for said, attributes in needed.asked(site.namespace)
+        for text, attributes in needed.reviewed(site.namespace)
         if not allowed(site, attributes, account=account)
     ]
 
 
 def allowed(site: Site, attributes: Object, *, account: Account | None = None) -> bool:
-    """Return whether the person who asks may do something, or whether an account may."""
+    """Return whether the user, or `account`, has the right that `attributes` describe."""
     kind, subject = (OWN_RIGHTS, {}) if account is None else (RIGHTS, account.subject)
     review = {
         "apiVersion": kind.api_version,
