@@ -2,19 +2,20 @@
 
 The status is the memory. It names the pod of the current attempt (`pod`), and every pod created after that
 one is a new attempt. Trainers record their attempts in the run directory, and report the number in /status
-and in the termination message; this adds attempts whose pods the operator never saw.
+and in the termination message; this module adds attempts whose pods the operator never saw.
 Each replaced pod has one of four causes. The attempt's number is 1 + trainer + disruption + suspension +
 operator:
 
 - trainer: the pod failed by itself, by its own evidence or by the Job's count of failures.
 - operator: the operator replaced the pod, by the mark on its Job.
 - suspension: the operator suspended the Job while the pod ran, by the mark on the Job. If another controller
-  suspended it, the status between the two pods shows that, or the times of the Job do.
+  suspended it, the status between the two pods or the times of the Job show it.
 - disruption: all others. The cluster or a person deleted the pod, or it exited with 75.
 
-A failed pod that has no successor yet is no restart. The trainer counts the restarts of simulators within
-its attempt. The status holds that count (`simulatorRestarts`) beside the sum, so that only the difference is
-added. All counts are one write, based on the status that was read, so nothing is counted twice.
+A failed pod without a successor is not counted as a restart yet. The trainer counts the restarts of
+simulators within its attempt. The status holds that count (`simulatorRestarts`) beside the sum, so that only
+the difference is added. One write of the status updates all counts, and it fails if the job has changed since
+it was read. So nothing is counted twice.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,15 +28,15 @@ from palaestra.observe.reading import MOST_COUNT
 from palaestra.observe.views import JobView, PodView, ReplicaObserved
 from palaestra_protocol.pod.status import ExitCode
 
-MOST_UNSEEN = 100  # unseen pods that a trainer's record may add; a pod may report anything
+MOST_UNSEEN = 100  # Attempts that a trainer's record may add to the pods seen; a pod can report any number.
 
-# The Job controller creates the pod first and takes the time of the resumption then, both in whole seconds.
-_DATED_LATE = timedelta(seconds=2)
+# The Job controller creates the pod before it records the time of the resumption; both are whole seconds.
+_RESUMED_LATE = timedelta(seconds=2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Counted:
-    """The counts of a replica, each as the field of `ReplicaStatus` that it becomes."""
+    """The counts of a replica; `ReplicaStatus` has a field of the same name for each."""
 
     attempt: int
     pod: PodReference | None
@@ -51,8 +52,8 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
     attempt = _attempt(old, seen, newer)
     restarts = _restarts(old, seen, newer, attempt)
     furthest = _furthest(old, seen)
-    came_forward = furthest is not None and furthest > (old.furthest_step or 0)
-    taken = min(restarts.disruption - old.restarts.disruption, _have_run(old, seen, newer))
+    progressed = furthest is not None and furthest > (old.furthest_step or 0)
+    fruitless = min(restarts.disruption - old.restarts.disruption, _have_run(old, seen, newer))
     within = _within_attempt(old, seen, newer)
     return Counted(
         attempt=attempt,
@@ -60,7 +61,7 @@ def counted(old: ReplicaStatus, seen: ReplicaObserved) -> Counted:
         restarts=restarts.model_copy(update={"simulator": _simulators(old, seen, newer, within)}),
         simulator_restarts=within,
         furthest_step=furthest,
-        fruitless=0 if came_forward or not furthest else _bounded(old.fruitless + taken),
+        fruitless=0 if progressed or not furthest else _bounded(old.fruitless + fruitless),
     )
 
 
@@ -129,14 +130,14 @@ def _restarts(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 
 def _by_evidence(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return how many of the pods replaced since the status failed by themselves."""
+    """Return how many of the pods replaced since the last status failed by themselves."""
     named = [pod for pod in seen.pods if old.pod is not None and pod.uid == old.pod.uid]
     chain = [*named, *newer]
     return sum(failed_by_itself(pod) for pod in chain[:-1])
 
 
 def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return for how many of the pods replaced since the status a trainer is known to have run."""
+    """Return how many of the pods replaced since the last status are known to have run a trainer."""
     named = [pod for pod in seen.pods if old.pod is not None and pod.uid == old.pod.uid]
     chain = [*named, *newer]
     gone = old.pod is not None and not named and old.phase is Phase.RUNNING
@@ -144,7 +145,7 @@ def _have_run(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView
 
 
 def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
-    """Return how many failures of older pods the Job has counted that the status has not."""
+    """Return the number of older pods whose failure the Job has counted and the status has not."""
     if seen.job is None:
         return 0
     last = seen.pod is not None and failed_by_itself(seen.pod)
@@ -152,7 +153,7 @@ def _by_the_job(old: ReplicaStatus, seen: ReplicaObserved) -> int:
 
 
 def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
-    """Return how many older pods the operator has replaced that are not counted yet."""
+    """Return the number of older pods that the operator replaced and the status does not count yet."""
     mark = seen.job.replaced if seen.job is not None else None
     if mark is None:
         return 0
@@ -161,7 +162,7 @@ def _by_the_operator(old: ReplicaStatus, seen: ReplicaObserved) -> int:
 
 
 def _suspended(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
-    """Return 1 if a suspension ended one of the pods replaced since the status."""
+    """Return 1 if a suspension ended one of the pods replaced since the last status."""
     if not newer or seen.job is None:
         return 0
     replaced = {old.pod.uid if old.pod is not None else "", *(pod.uid for pod in newer[:-1])}
@@ -189,7 +190,7 @@ def _suspended_by_times(old: ReplicaStatus, job: JobView, newer: Sequence[PodVie
     if (paused := job.paused) is not None:  # the new pod is seen before the Job's resumption
         return int(named <= paused < newest)
     resumed = job.resumed
-    return int(resumed is not None and named + _DATED_LATE < resumed <= newest + _DATED_LATE)
+    return int(resumed is not None and named + _RESUMED_LATE < resumed <= newest + _RESUMED_LATE)
 
 
 def _within_attempt(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodView]) -> int:
@@ -204,11 +205,11 @@ def _simulators(old: ReplicaStatus, seen: ReplicaObserved, newer: Sequence[PodVi
     """Return the restarts of simulators over all attempts."""
     if not newer:
         return _bounded(old.restarts.simulator + within - old.simulator_restarts)
-    words = seen.terminations
-    named = words.get(old.pod.uid) if old.pod else None
+    messages = seen.terminations
+    named = messages.get(old.pod.uid) if old.pod else None
     late = max((named.restarts or 0) - old.simulator_restarts, 0) if named else 0
-    passed = sum(_told(words[pod.uid].restarts) for pod in newer[:-1] if pod.uid in words)
-    return _bounded(old.restarts.simulator + late + passed + within)
+    between = sum(messages[pod.uid].restarts or 0 for pod in newer[:-1] if pod.uid in messages)
+    return _bounded(old.restarts.simulator + late + between + within)
 
 
 def _furthest(old: ReplicaStatus, seen: ReplicaObserved) -> int | None:
@@ -217,18 +218,14 @@ def _furthest(old: ReplicaStatus, seen: ReplicaObserved) -> int | None:
 
 
 def _steps(seen: ReplicaObserved) -> Iterable[int]:
-    for word in seen.terminations.values():
-        yield word.step
+    for message in seen.terminations.values():
+        yield message.step
     if seen.polled:
         yield seen.polled.status.step
 
 
 def _reference(pod: PodView) -> PodReference:
     return PodReference(name=pod.name or "unknown", uid=pod.uid or "unknown", created=pod.created)
-
-
-def _told(number: int | None) -> int:
-    return number or 0
 
 
 def _bounded(number: int) -> int:
