@@ -132,12 +132,12 @@ WRONG = [
     (
         "spec.trainer.evaluation",
         {"everySteps": 0, "stopAtSuccessRate": 0.9},
-        "stopAtSuccessRate.*nothing is evaluated while everySteps is 0",
+        "stopAtSuccessRate.*has no effect while everySteps is 0",
     ),
     (
         "spec.trainer.evaluation",
         {"everySteps": 0, "confirmEpisodes": 10},
-        "confirmEpisodes.*nothing is evaluated while everySteps is 0",
+        "confirmEpisodes.*has no effect while everySteps is 0",
     ),
     ("spec.trainer.checkpoint", {"keep": 0}, "spec.trainer.checkpoint.keep"),
     ("spec.storage", {"size": "much"}, "spec.storage.size"),
@@ -175,7 +175,7 @@ def test_suspending_a_queued_job_by_hand_is_refused(create):
     code, said = create(make_job(spec__suspend=True, spec__scheduling__queueName="team"))
 
     assert code == 1
-    assert_says(said, "spec.suspend.*because Kueue suspends the job then; remove one of them")
+    assert_says(said, "spec.suspend.*because Kueue then suspends and resumes the job; remove one of them")
 
 
 def test_a_driver_that_is_a_command_needs_one(create):

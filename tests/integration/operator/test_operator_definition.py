@@ -56,7 +56,7 @@ def test_an_outdated_definition_is_logged_and_measured(older, tmp_path):
     try:
         [said] = eventually(lambda: operator.said("definition outdated"))
 
-        types = "status.conditions[].type: does not know Reconciling, Stalled"
+        types = "status.conditions[].type: lacks Reconciling, Stalled"
         assert sorted(said["lacks"]) == [types, "status.running: is missing"]
         assert f"{OUTDATED} 1.0" in operator.ask("/metrics").splitlines()
     finally:

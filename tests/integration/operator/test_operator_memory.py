@@ -40,7 +40,7 @@ def test_a_large_job_is_refused_by_what_it_holds_and_not_by_what_is_kept_of_it(p
     place.train(trainer={"algorithm": {"hyperparameters": {"x": [0] * 30_000}}})
 
     status = place.until("Failed")
-    assert "holds more than 1000 values" in status["conditions"][0]["message"]
+    assert "contains more than 1000 values" in status["conditions"][0]["message"]
 
 
 def all_have_failed(place):

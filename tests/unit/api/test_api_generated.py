@@ -133,7 +133,7 @@ def test_only_the_marked_part_of_a_page_is_made_anew(repository) -> None:
 
 def test_a_page_without_marks_is_refused() -> None:
     """Otherwise the tables would silently be nowhere."""
-    with pytest.raises(ValueError, match="put both in"):
+    with pytest.raises(ValueError, match="add both"):
         page("# The TrainingJob\n")
 
 

@@ -105,7 +105,7 @@ def test_two_groups_of_one_name_are_found_beside_another_mistake(problems) -> No
 
     assert problems({"simulators": groups}) == [
         "spec.simulators[0].count: 0 is less than 1; use 1 or more",
-        'spec.simulators: "a" is the name of two of them; give each its own',
+        'spec.simulators: "a" is the name of two entries; make the names unique',
     ]
 
 

@@ -34,7 +34,7 @@ def test_this_release_s_own_definition_lacks_nothing():
             lambda status: status["step"].update(type="string"),
             "status.step: is of type string, not of type integer",
         ),
-        (lambda status: status["phase"]["enum"].remove("Suspended"), "status.phase: does not know Suspended"),
+        (lambda status: status["phase"]["enum"].remove("Suspended"), "status.phase: lacks Suspended"),
     ],
 )
 def test_what_an_older_definition_lacks_is_named_with_its_path(change, fact):

@@ -58,5 +58,5 @@ def test_operations_has_a_row_for_each_reason(repository) -> None:
 
 def test_a_page_without_its_marks_raises_an_error() -> None:
     """A table that is silently left out would not be noticed."""
-    with pytest.raises(ValueError, match=r"no <!-- generated from the reasons.*; put both in"):
+    with pytest.raises(ValueError, match=r"lacks <!-- generated from the reasons.*; add both"):
         reasons_page("# Operations")

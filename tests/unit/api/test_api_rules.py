@@ -50,7 +50,7 @@ BROKEN = {
     "suspended by two": (
         {"suspend": True, "scheduling.queueName": "robots"},
         (
-            "spec.suspend: cannot be true with queueName, because Kueue suspends the job then; "
+            "spec.suspend: cannot be true with queueName, because Kueue then suspends and resumes the job; "
             "remove one of them"
         ),
     ),
@@ -105,8 +105,8 @@ BROKEN = {
     "an evaluation that never is": (
         {"trainer.evaluation": {"everySteps": 0, "stopAtSuccessRate": 0.9}},
         (
-            "spec.trainer.evaluation.stopAtSuccessRate: nothing is evaluated while everySteps is 0; "
-            "remove it or evaluate"
+            "spec.trainer.evaluation.stopAtSuccessRate: has no effect while everySteps is 0; "
+            "remove it or raise everySteps"
         ),
     ),
     "SAC with movements": (

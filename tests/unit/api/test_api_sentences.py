@@ -85,7 +85,7 @@ SENTENCES = [
      "give the absolute path of a .wbt file")),
     ({"trainer.environment.id": "MoveToTarget"},
      ('spec.trainer.environment.id: "MoveToTarget" is not the id of an environment; '
-     "write it as gymnasium knows it, as MoveToTargetEnv-v0")),
+     "write it as in gymnasium's registry, such as MoveToTargetEnv-v0")),
     ({"storage": {"existingClaim": "runs", "resumeFrom": "../other"}},
      ('spec.storage.resumeFrom: "../other" is not the name of a folder; '
      "use letters, digits, '-', '_' and '.', no '/'")),
@@ -108,23 +108,23 @@ SENTENCES = [
     ({"trainer.environment.options": {"a": [[[[[[[[[]]]]]]]]]}},
      "spec.trainer.environment.options: is nested deeper than 8; flatten it"),
     ({"trainer.environment.options": {"a": list(range(1000))}},
-     "spec.trainer.environment.options: holds more than 1000 values; shorten it"),
+     "spec.trainer.environment.options: contains more than 1000 values; shorten it"),
     ({"trainer.environment.options": {"a": "x" * 5000}},
-     "spec.trainer.environment.options: holds a text over 4096 characters; shorten it"),
+     "spec.trainer.environment.options: contains a text over 4096 characters; shorten it"),
     ({"trainer.algorithm.hyperparameters": {"gamma": float("nan")}},
-     ("spec.trainer.algorithm.hyperparameters: holds a number that is not finite; "
-     "choose a finite one")),
+     ("spec.trainer.algorithm.hyperparameters: contains a number that is not finite; "
+     "use a finite one")),
     ({"trainer.algorithm.hyperparameters": {"gamma": {1: 2}}},
      "spec.trainer.algorithm.hyperparameters: has a key that is not text; quote it"),
     ({"trainer.algorithm.hyperparameters": {"gamma": {1, 2}}},
-     ("spec.trainer.algorithm.hyperparameters: holds what JSON cannot carry; "
+     ("spec.trainer.algorithm.hyperparameters: contains a value that JSON cannot represent; "
      "use text and numbers")),
     ({"simulators.0.recycle": {"aboveMemory": "400"}},
      ('spec.simulators[0].recycle.aboveMemory: "400" is not an amount of memory; '
      "write a whole number and a unit, as 400Mi or 2Gi")),
     # Twice.
     ({"imagePullSecrets": [{"name": "pull"}, {"name": "pull"}]},
-     'spec.imagePullSecrets: "pull" is the name of two of them; give each its own'),
+     'spec.imagePullSecrets: "pull" is the name of two entries; make the names unique'),
     # Unknown fields, with the nearest known name.
     ({"trainer.stepps": 1}, "spec.trainer.stepps: is not a field; did you mean steps?"),
     ({"simulators.0.start_deadline_seconds": 1},

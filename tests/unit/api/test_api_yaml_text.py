@@ -53,27 +53,27 @@ def test_anchors_and_merges_are_followed() -> None:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("a: 1\na: 2", "2:1: a is given twice; keep one"),
-        ("x:\n  on: 1", '2:3: on is no text, as a key must be; quote it: "on"'),
-        ("[1]: 2", "1:1: a key that is a list or a mapping; write a word"),
-        ("a: .inf", "1:4: .inf is no finite number; choose one"),
-        ("a: 1e999", "1:4: 1e999 is no finite number; choose one"),
-        ("a: {<<: 3}", "1:9: << takes a mapping; name one with *"),
+        ("a: 1\na: 2", "2:1: duplicate key a; keep one"),
+        ("x:\n  on: 1", '2:3: the key on is not text; quote it: "on"'),
+        ("[1]: 2", "1:1: a key is a list or a mapping; use text as the key"),
+        ("a: .inf", "1:4: .inf is not a finite number; use a finite one"),
+        ("a: 1e999", "1:4: 1e999 is not a finite number; use a finite one"),
+        ("a: {<<: 3}", "1:9: << needs a mapping; refer to one with *"),
         ("a: 1\n---\nb: 1", "2:1: a second document begins here; put one TrainingJob in a file"),
-        ("a: \x07", "1:4: a character that YAML forbids; remove it"),
-        ("a: !!int x", "1:4: not a value of its tag, or too large; mend it"),
-        (f"a: {'9' * 5000}", "1:4: not a value of its tag, or too large; mend it"),
+        ("a: \x07", "1:4: YAML does not allow this character; remove it"),
+        ("a: !!int x", "1:4: the value does not match its tag, or is too large; correct it"),
+        (f"a: {'9' * 5000}", "1:4: the value does not match its tag, or is too large; correct it"),
         (
             "a: !!binary eA==",
-            "1:4: the tag tag:yaml.org,2002:binary is not for job files; remove it",
+            "1:4: the tag tag:yaml.org,2002:binary is not allowed in job files; remove it",
         ),
         (
             "a: !!python/name:os.system x",
-            "1:4: the tag tag:yaml.org,2002:python/name:os.system is not for job files; remove it",
+            "1:4: the tag tag:yaml.org,2002:python/name:os.system is not allowed in job files; remove it",
         ),
         (
             "a: b: c",
-            "1:5: not YAML: mapping values are not allowed here; mend the line or quote the text",
+            "1:5: not YAML: mapping values are not allowed here; correct the line or quote the text",
         ),
     ],
 )
@@ -88,9 +88,9 @@ def test_the_error_for_text_that_cannot_be_read_has_line_and_column(text, proble
 @pytest.mark.parametrize(
     ("text", "fact"),
     [
-        ("&a [*a]", "nested too deep, or into itself"),
-        ("[" * 1500, "nested too deep, or into itself"),
-        ("x" * 1_500_001, "longer than 1500000 characters"),
+        ("&a [*a]", "is nested too deeply, or contains itself"),
+        ("[" * 1500, "is nested too deeply, or contains itself"),
+        ("x" * 1_500_001, "is longer than 1500000 characters"),
     ],
 )
 def test_a_document_without_end_is_refused(text, fact) -> None:

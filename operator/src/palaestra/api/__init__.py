@@ -1,7 +1,7 @@
-"""The TrainingJob: what a person writes, checked, and everything that is generated from it.
+"""The TrainingJob: its models, its validation, and everything that is generated from the models.
 
-The models are the one source: the custom resource definition, its rules and the reference page are
-made from them. Nothing here touches a cluster, a file or a clock.
+The models are the only source: the CustomResourceDefinition, its rules and the reference page are generated
+from them. No module here uses a cluster, a file or a clock.
 """
 
 from palaestra.api.job import API_VERSION, KIND, Metadata, Spec, TrainingJob

@@ -1,7 +1,7 @@
-"""The CustomResourceDefinition, made from the models.
+"""The CustomResourceDefinition, generated from the models.
 
-What an API server is to check stands in the models; what is Kubernetes' own, names, scope, columns,
-selectable fields and the status subresource, stands here.
+The models define what an API server checks. This module adds the names, the scope, the columns, the
+selectable fields and the status subresource.
 """
 
 from typing import Any
@@ -12,22 +12,22 @@ from palaestra.api.structural import Schema, freeze, structural, without_marks
 GROUP, VERSION = API_VERSION.split("/")
 
 _COLUMNS = (
-    ("Status", "string", ".status.phase", "Where the job stands", 0),
-    ("Reason", "string", '.status.conditions[?(@.type=="Running")].reason', "Why it stands there", 0),
-    ("Replicas", "string", ".status.running", "Replicas that run or have succeeded, of all", 0),
+    ("Status", "string", ".status.phase", "Phase of the job", 0),
+    ("Reason", "string", '.status.conditions[?(@.type=="Running")].reason', "Reason for the phase", 0),
+    ("Replicas", "string", ".status.running", "Replicas that run or have succeeded, of all replicas", 0),
     ("Step", "integer", ".status.step", "Step of the replica that is furthest behind", 0),
     ("Target", "integer", ".spec.trainer.steps", "Environment steps of the whole run", 0),
     ("Success", "number", ".status.successRate", "Success rate of the worst replica", 0),
     ("Algorithm", "string", ".spec.trainer.algorithm.name", "The learning algorithm", 1),
     ("Started", "date", ".status.startTime", "When the first pod started", 1),
     ("Completed", "date", ".status.completionTime", "When the last replica ended", 1),
-    ("Age", "date", ".metadata.creationTimestamp", "When the job was made", 0),
+    ("Age", "date", ".metadata.creationTimestamp", "When the job was created", 0),
 )
 
 _SELECTABLE = (
     ".status.phase",
     ".spec.scheduling.queueName",
-)  # by `--field-selector`; Kubernetes 1.32 or newer
+)  # for `--field-selector`; needs Kubernetes 1.32 or newer
 
 
 def crd() -> dict[str, Any]:
@@ -70,9 +70,10 @@ def schema() -> Schema:
     freeze(fields["spec"])
     for heading in ("apiVersion", "kind"):  # the API server checks these itself
         fields[heading] = {"type": "string", "maxLength": 63}
-    name = fields["metadata"]["properties"]["name"]  # and a schema may restrict no more of it than the name
+    name = fields["metadata"]["properties"]["name"]  # of metadata, a schema may restrict only the names
     fields["metadata"] = {"type": "object", "properties": {"name": name}}
-    # Without it kstatus would call a job reconciled that no operator has seen: generations begin at 1.
+    # Generations begin at 1. Without this default, kstatus would report a job as reconciled before an
+    # operator has read it.
     fields["status"]["default"] = {"observedGeneration": 0}
     plain: Schema = without_marks(whole)
     return plain

@@ -1,8 +1,8 @@
 """The types of a TrainingJob's values, each bounded.
 
 Every type has a largest size: an API server estimates the cost of a rule from the largest object that the
-schema allows, and refuses a schema with unbounded strings, lists or maps. Two engines read the patterns,
-Rust's here and Go's in the API server, so they use plain ASCII classes only.
+schema allows, and refuses a schema with unbounded strings, lists or maps. Two regular expression engines read
+the patterns, Rust's here and Go's in the API server, so the patterns use plain ASCII classes only.
 """
 
 import json
@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
-# Marks, in a field's JSON schema, what may be changed after the job was accepted.
+# The mark, in a field's JSON schema, that the field may be changed after the job was accepted.
 MAY_CHANGE = "x-may-change"
 
 LABEL = "^[a-z]([-a-z0-9]*[a-z0-9])?$"
@@ -38,7 +38,7 @@ FOLDER = "^[A-Za-z0-9][-A-Za-z0-9._]*$"
 WORLD_FILE = "^/.+[.]wbt$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
-# For each pattern: what a value that does not match is not, and what to write instead.
+# The message for a value that does not match: <value> is not <first text>; <second text>
 PATTERNS: dict[str, tuple[str, str]] = {
     LABEL: ("a name", "use a-z first, then a-z, 0-9 and '-', no '-' at the end"),
     DIGIT_LABEL: ("a namespace", "use a-z, 0-9 and '-', no '-' at the beginning or the end"),
@@ -54,15 +54,15 @@ PATTERNS: dict[str, tuple[str, str]] = {
     WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt file"),
     ENVIRONMENT_ID: (
         "the id of an environment",
-        "write it as gymnasium knows it, as MoveToTargetEnv-v0",
+        "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",
     ),
 }
 
 # The pods' names, hash included, have to be DNS labels of at most 63 characters.
 JobName = Annotated[str, Field(min_length=1, max_length=48, pattern=LABEL)]
 GroupName = Annotated[str, Field(min_length=1, max_length=20, pattern=LABEL)]
-# A name of a job becomes part of names of Services and ROS nodes, which begin with a letter; a namespace
-# does not. Source: RFC 1123
+# The name of a job becomes part of the names of Services and ROS nodes, which must begin with a letter. The
+# name of a namespace may begin with a digit. Source: RFC 1123
 Namespace = Annotated[str, Field(min_length=1, max_length=63, pattern=DIGIT_LABEL)]
 ObjectName = Annotated[str, Field(min_length=1, max_length=253, pattern=SUBDOMAIN)]
 FileKey = Annotated[str, Field(min_length=1, max_length=253, pattern=FILE_KEY)]
@@ -76,13 +76,13 @@ Minutes = Annotated[int, Field(ge=1, le=525_600)]
 Count = Annotated[int, Field(ge=0, le=2_000_000_000)]
 Memory = Annotated[str, Field(max_length=32, pattern=MEMORY)]
 
-# Lists come from YAML as lists and are kept as tuples, so that a job cannot change.
+# Lists of the YAML become tuples, so that a job is immutable.
 Listed = Annotated[tuple[T, ...], Field(strict=False)]
 Words = Annotated[Listed[Word], Field(max_length=64)]
 
 
-def _without_unknown_words(items: Any, read: ValidatorFunctionWrapHandler) -> Any:
-    """Return what `read` makes of the items, without those that have an unknown value of an enum."""
+def _without_unknown_items(items: Any, read: ValidatorFunctionWrapHandler) -> Any:
+    """Return the items as `read` validates them, without items that have an unknown enum value."""
     try:
         return read(items)
     except ValidationError as error:
@@ -94,9 +94,9 @@ def _without_unknown_words(items: Any, read: ValidatorFunctionWrapHandler) -> An
         return read([item for place, item in enumerate(items) if place not in unknown])
 
 
-# For a list of a status that is only shown, or made anew at each look: a newer release may report items
-# of a kind that this one does not have.
-KNOWN_ONES = WrapValidator(_without_unknown_words)
+# For a list of a status that is only displayed, or built again in each reconcile: a newer release may report
+# items of a kind that this one lacks.
+KNOWN_ITEMS = WrapValidator(_without_unknown_items)
 
 
 class Named(Protocol):
@@ -111,22 +111,22 @@ class Named(Protocol):
 N = TypeVar("N", bound=Named)
 
 
-def _told_apart(items: tuple[N, ...]) -> tuple[N, ...]:
-    """Return `items` when no two have the same name."""
+def _uniquely_named(items: tuple[N, ...]) -> tuple[N, ...]:
+    """Return `items` if no two have the same name."""
     names = [item.name for item in items]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise PydanticCustomError(
             "twice",
-            "{name} is the name of two of them; give each its own",
+            "{name} is the name of two entries; make the names unique",
             {"name": json.dumps(twice[0])},
         )
     return items
 
 
-# In the CRD the API server itself sees to it that no two names are equal.
+# The keywords make the API server refuse equal names itself.
 NamedList = Annotated[
     Listed[N],
-    AfterValidator(_told_apart),
+    AfterValidator(_uniquely_named),
     Field(
         json_schema_extra={
             "x-kubernetes-list-type": "map",
@@ -145,7 +145,7 @@ LabelMap = Annotated[
 
 
 def _as_text(value: object) -> object:
-    """Return a whole number as the text of a quantity; a fraction must be quoted by its author."""
+    """Return a whole number as text, and any other value unchanged; authors must quote a fraction."""
     if isinstance(value, int) and not isinstance(value, bool):
         return str(value)
     return value
@@ -167,7 +167,7 @@ _MOST_VALUES = 1000
 
 
 def _plain(value: object, depth: int) -> int:
-    """Return how many values `value` holds; raise ValueError where JSON could not carry one."""
+    """Return the number of values in `value`; raise an error for one that JSON cannot represent."""
     if depth > _DEEPEST:
         raise PydanticCustomError("free", "is nested deeper than 8; flatten it")
     if isinstance(value, dict):
@@ -177,23 +177,23 @@ def _plain(value: object, depth: int) -> int:
     if isinstance(value, list):
         return 1 + sum(_plain(item, depth + 1) for item in value)
     if isinstance(value, str) and len(value) > _LONGEST_TEXT:
-        raise PydanticCustomError("free", "holds a text over 4096 characters; shorten it")
+        raise PydanticCustomError("free", "contains a text over 4096 characters; shorten it")
     if isinstance(value, float) and not (abs(value) < float("inf")):
-        raise PydanticCustomError("free", "holds a number that is not finite; choose a finite one")
+        raise PydanticCustomError("free", "contains a number that is not finite; use a finite one")
     if value is not None and not isinstance(value, str | int | float):
-        raise PydanticCustomError("free", "holds what JSON cannot carry; use text and numbers")
+        raise PydanticCustomError("free", "contains a value that JSON cannot represent; use text and numbers")
     return 1
 
 
 def _free(value: dict[str, Any]) -> dict[str, Any]:
-    """Return `value` when it is plain, finite and small."""
+    """Return `value` if it is plain, finite and small."""
     if _plain(value, 0) > _MOST_VALUES:
-        raise PydanticCustomError("free", "holds more than 1000 values; shorten it")
+        raise PydanticCustomError("free", "contains more than 1000 values; shorten it")
     return value
 
 
-# A map to anything, not an object with unknown fields: an API server that compares two of the latter
-# overlooks a key that was renamed, and what is frozen could be changed.
+# A map to values of any type, not an object with unknown fields: an API server misses a renamed key when it
+# compares two objects with unknown fields, so a frozen field could be changed.
 FreeObject = Annotated[
     dict[str, Any],
     Field(max_length=64),

@@ -18,9 +18,9 @@ def crd_text() -> str:
 
 
 def generated_files(root: Path) -> dict[str, str]:
-    """Return path, relative to the repository's `root`, and text of each generated file.
+    """Return the text of each generated file, by path relative to the repository's `root`.
 
-    Only the tables of the two pages are generated; the rest of them is read from `root`.
+    Only the tables of the two pages are generated; the rest of each page is read from `root`.
     """
     reference, operations = "docs/trainingjob.md", "docs/operations.md"
     return {
@@ -32,7 +32,7 @@ def generated_files(root: Path) -> dict[str, str]:
 
 
 def reasons_page(text: str) -> str:
-    """Return docs/operations.md, whose old text is `text`, with a new table of reasons.
+    """Return the page docs/operations.md, now `text`, with its table of reasons updated.
 
     Raises:
         ValueError: a mark is missing.

@@ -126,4 +126,4 @@ class MemoryKills(Reported):
     """UID of the pod of the last kill; absent: an older release counted it."""
 
     run: Count | None = None
-    """Run of the container in that pod that was killed last, from 0; absent if `pod` is absent."""
+    """Number of the container's run that was killed last in that pod, from 0; absent if `pod` is absent."""

@@ -1,4 +1,4 @@
-"""The TrainingJob itself."""
+"""The TrainingJob: metadata, spec and status."""
 
 from typing import Annotated, Any, Final, Literal
 
@@ -27,7 +27,7 @@ from palaestra_protocol.pod.terms import Role
 
 API_VERSION: Final = "palaestra.dev/v1alpha1"
 KIND: Final = "TrainingJob"
-START_TIMEOUT_S = 21_600  # Six hours survive a night without the registry, not a weekend.
+START_TIMEOUT_S = 21_600  # Six hours: a job survives a registry outage of a night, not of a weekend.
 
 FRUITLESS_PODS = 6  # Equal to Kubernetes' default backoffLimit.
 
@@ -37,7 +37,7 @@ MOST_INLINE = 900_000  # Characters of all inline worlds together; the plan also
 
 
 # Metadata that the API server writes; a file exported with `kubectl get -o yaml` contains it.
-_WRITTEN_BY_SERVERS = frozenset(
+_SERVER_FIELDS = frozenset(
     {
         "creationTimestamp",
         "deletionGracePeriodSeconds",
@@ -77,12 +77,12 @@ class Metadata(ApiModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _drop_what_servers_write(cls, data: Any) -> Any:
+    def _drop_server_fields(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
         if "generateName" in data and "name" not in data:
             raise PydanticCustomError("generated", "has generateName and no name; add a name")
-        return {key: value for key, value in data.items() if key not in _WRITTEN_BY_SERVERS}
+        return {key: value for key, value in data.items() if key not in _SERVER_FIELDS}
 
 
 class PullSecret(ApiModel):
@@ -207,7 +207,8 @@ class Spec(ApiModel):
             field="suspend",
             holds=lambda spec: not (spec.suspend and spec.scheduling.queue_name is not None),
             cel="!(self.suspend && has(self.scheduling.queueName))",
-            message="cannot be true with queueName, because Kueue suspends the job then; remove one of them",
+            message="cannot be true with queueName, because Kueue then suspends and resumes the job;"
+            " remove one of them",
         ),
     )
 

@@ -1,4 +1,4 @@
-"""Text that comes from elsewhere, made fit for a status and a terminal."""
+"""Text of other programs, made printable for a status and a terminal."""
 
 import re
 
@@ -6,12 +6,12 @@ _SPACES = re.compile(" +")
 
 
 def one_line(text: str, most: int) -> str:
-    """Return `text` on one line of printable characters, cut to `most` of them."""
+    """Return `text` as one line of at most `most` printable characters."""
     return flat(text.strip(), most).strip()
 
 
 def flat(text: str, most: int) -> str:
-    """Return the same with a space at either end where there was some."""
+    """Return the same, but keep a space at either end if `text` has one there."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])
     words = _SPACES.sub(" ", plain)
     return words if len(words) <= most else words[: most - 3] + "..."

@@ -19,7 +19,7 @@ from palaestra.api.tree import objects
 from palaestra.api.yaml_text import NotYaml, read, write
 from palaestra.errors import SpecErrors
 
-_KEY = "[key]"  # pydantic's last piece of a path when a mapping's key is wrong, not its value
+_KEY = "[key]"  # last item of pydantic's path if the key of a mapping is wrong, not its value
 
 _HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
 
@@ -31,7 +31,7 @@ def load(text: str, name: str = "job") -> TrainingJob:
     """Return the one TrainingJob in `text`, a YAML document; `name` is its file's path.
 
     Raises:
-        SpecErrors: with every mistake; when the text is no YAML, with the place of the first.
+        SpecErrors: the job is invalid; lists every mistake, or only the first if the text is not YAML.
     """
     try:
         data = read(text, name)
@@ -41,19 +41,21 @@ def load(text: str, name: str = "job") -> TrainingJob:
 
 
 def validate(data: Any, name: str = "job") -> TrainingJob:
-    """Return the TrainingJob that `data`, as of an API server, describes.
+    """Return the TrainingJob in plain `data`, such as an API server returns.
 
     Raises:
-        SpecErrors: with every mistake.
+        SpecErrors: the job is invalid; lists every mistake.
     """
     if not isinstance(data, Mapping):
         fact = "empty" if data is None else f"{quoted(data)}, not a mapping"
         problem = f"{name}: the document is {fact}; begin it with apiVersion: {API_VERSION}"
         raise SpecErrors(name, (problem,))
     other = [
-        f"{key}: {_not_ours(data[key], ours)}" for key, ours in _HEADING if key in data and data[key] != ours
+        f"{key}: {_unsupported(data[key], ours)}"
+        for key, ours in _HEADING
+        if key in data and data[key] != ours
     ]
-    if len(other) == len(_HEADING):  # another kind of object: its fields need no judgement
+    if len(other) == len(_HEADING):  # another kind of object, so its fields are not checked
         raise SpecErrors(name, tuple(other))
     missing = [f"{key}: is missing; add {key}: {ours}" for key, ours in _HEADING if key not in data]
     job, problems = _examine(data)
@@ -63,23 +65,23 @@ def validate(data: Any, name: str = "job") -> TrainingJob:
 
 
 def dump(job: TrainingJob) -> str:
-    """Return the job as YAML, defaults included; what is absent is left out."""
+    """Return the job as YAML with its defaults; absent fields are omitted."""
     return write(as_data(job))
 
 
 def as_data(job: TrainingJob) -> dict[str, Any]:
-    """Return the job as plain data in camelCase, defaults included; what is absent is left out."""
+    """Return the job as plain data in camelCase with its defaults; absent fields are omitted."""
     return job.model_dump(mode="json", by_alias=True, exclude_none=True)
 
 
-def _not_ours(value: Any, ours: str) -> str:
+def _unsupported(value: Any, ours: str) -> str:
     return f"{quoted(value)} is not known; use {ours}"
 
 
 def _examine(data: Mapping[str, Any]) -> tuple[TrainingJob | None, list[str]]:
-    """Return what can be made of `data`, None if nothing, and one line for each mistake."""
+    """Return the job without its wrong fields, None if no job is left, and a line for each mistake."""
     pruned = Pruned(data)
-    taken: list[Path] = []
+    removed: list[Path] = []
     problems: list[str] = []
     while True:
         try:
@@ -89,55 +91,55 @@ def _examine(data: Mapping[str, Any]) -> tuple[TrainingJob | None, list[str]]:
                 (pruned.original(_place(detail["loc"])), detail) for detail in error.errors(include_url=False)
             ]
             for path, detail in found:
-                if not (detail["type"] in _ECHOES and _touches(path, taken)):
+                if not (detail["type"] in _CONSEQUENCES and _touches(path, removed)):
                     problems.append(f"{shown(path)}: {sentence(path, detail)}")
-            if not _take(pruned, [path for path, _ in found], taken):
+            if not _remove(pruned, [path for path, _ in found], removed):
                 return None, problems
             continue
-        return job, problems + _broken_rules(job, pruned, taken)
+        return job, problems + _broken_rules(job, pruned, removed)
 
 
-# Mistakes that may only be there because something was taken away.
-_ECHOES = {"missing", "too_short"}
+# Errors that may be consequences of a removed field.
+_CONSEQUENCES = {"missing", "too_short"}
 
 
 def _place(loc: tuple[int | str, ...]) -> Path:
     return loc[:-1] if loc[-1:] == (_KEY,) else loc
 
 
-def _touches(path: Path, taken: list[Path]) -> bool:
-    """Return whether `path` lies on the way to something taken, or is it."""
-    return any(other[: len(path)] == path for other in taken)
+def _touches(path: Path, removed: list[Path]) -> bool:
+    """Return whether `path` was removed, or contains a removed field."""
+    return any(other[: len(path)] == path for other in removed)
 
 
-def _take(pruned: Pruned, paths: list[Path], taken: list[Path]) -> bool:
-    """Take what is wrong away, or what it is missing from; return whether anything went."""
-    before = len(taken)
+def _remove(pruned: Pruned, paths: list[Path], removed: list[Path]) -> bool:
+    """Remove the wrong fields, or the nearest object that exists; return whether anything was removed."""
+    before = len(removed)
     for path in paths:
-        if any(path[: len(other)] == other != path for other in taken):
-            continue  # it went with something larger
+        if any(path[: len(other)] == other != path for other in removed):
+            continue  # its parent was removed
         gone = path
         while gone and not pruned.take(gone, _STAND_INS.get(gone)):
             gone = gone[:-1]
         if not gone:
             return False
-        taken.append(gone)
-    return len(taken) > before
+        removed.append(gone)
+    return len(removed) > before
 
 
-def _broken_rules(job: TrainingJob, pruned: Pruned, taken: list[Path]) -> list[str]:
+def _broken_rules(job: TrainingJob, pruned: Pruned, removed: list[Path]) -> list[str]:
     problems = []
-    for place, thing in objects(job):
+    for place, part in objects(job):
         path = pruned.original(place)
-        for rule in thing.rules:
-            if not _reads_taken(rule, path, taken) and not rule.holds(thing):
+        for rule in part.rules:
+            if not _reads_removed(rule, path, removed) and not rule.holds(part):
                 field = (*path, *rule.field.split(".")) if rule.field else path
                 problems.append(f"{shown(field)}: {rule.message}")
     return problems
 
 
-def _reads_taken(rule: Rule, path: Path, taken: list[Path]) -> bool:
-    """Return whether a part of the object at `path` that the rule names was taken away."""
+def _reads_removed(rule: Rule, path: Path, removed: list[Path]) -> bool:
+    """Return whether the rule reads a removed field of the object at `path`."""
     named = {*rule.reads, *re.findall(r"\w+", rule.cel)}
-    below = [other[len(path) :] for other in taken if other[: len(path)] == path]
+    below = [other[len(path) :] for other in removed if other[: len(path)] == path]
     return any(named.issuperset(p for p in rest if isinstance(p, str)) for rest in below)

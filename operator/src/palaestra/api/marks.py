@@ -1,10 +1,10 @@
-"""Pages of which a part is generated: it stands between two marks, and the rest is written by people."""
+"""Pages with a generated part between two marks; people write the rest."""
 
 END = "<!-- end of the generated part -->"
 
 
 def between_marks(text: str, begin: str, part: str) -> str:
-    """Return the page `text` with what stands between the mark `begin` and the next `END` replaced by `part`.
+    """Return the page `text` with `part` between the mark `begin` and the next `END`.
 
     Raises:
         ValueError: a mark is missing.
@@ -12,5 +12,5 @@ def between_marks(text: str, begin: str, part: str) -> str:
     before, mark, rest = text.partition(begin)
     _, other_mark, after = rest.partition(END)
     if not (mark and other_mark):
-        raise ValueError(f"no {begin} and {END} in the page; put both in")
+        raise ValueError(f"the page lacks {begin} or the next {END}; add both")
     return f"{before}{begin}\n\n{part}\n{END}{after}"

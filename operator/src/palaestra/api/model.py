@@ -1,8 +1,7 @@
-"""What every part of a TrainingJob has in common: its configuration and its rules.
+"""The base class of all models of a TrainingJob, and the rules that check several fields together.
 
-A rule is a sentence about several fields at once. Its Python check, its CEL expression and its
-message are in one `Rule`, so that a laptop and an API server refuse the same job with the same message.
-Broken rules are collected, so that all mistakes are reported at once.
+The Python check, the CEL expression and the message of a rule are in one `Rule`, so that `palaestra` and an
+API server refuse the same job with the same message. All broken rules are collected and reported at once.
 """
 
 from collections.abc import Callable
@@ -20,14 +19,14 @@ from pydantic.alias_generators import to_camel
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-# A validation context: look at each field, leave the rules to `palaestra.api.loading`, which
-# judges them even where some fields are wrong.
+# The validation context that skips the rules. `palaestra.api.loading` then checks them itself, even if some
+# fields are wrong.
 FIELDS_ONLY: Final = {"rules": "later"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """One claim about an object that several of its fields must hold together.
+    """One condition on several fields of an object.
 
     `message` is "<fact>; <remedy>". `field` is the path of the reported field below the object, in camelCase
     with dots; empty for the object itself. In `cel`, `self` is the object with its defaults; the expression
@@ -48,7 +47,7 @@ class Rule:
 
 
 class RulesBroken(ValueError):
-    """The rules that one object breaks, together."""
+    """An object breaks one or more rules; `rules` lists all of them."""
 
     def __init__(self, rules: tuple[Rule, ...]) -> None:
         super().__init__(" ".join(rule.message for rule in rules))
@@ -56,7 +55,7 @@ class RulesBroken(ValueError):
 
 
 class ApiModel(BaseModel):
-    """One object of the API: camelCase outside, snake_case inside, frozen, nothing unknown."""
+    """One object of the API: camelCase in YAML, snake_case in Python, frozen; unknown fields are refused."""
 
     model_config = ConfigDict(
         alias_generator=to_camel,
@@ -91,10 +90,10 @@ class ApiModel(BaseModel):
 
 
 class Reported(ApiModel):
-    """One object of a status: as every other, but fields that it does not have are ignored.
+    """One object of a status: like every other object, but unknown fields are ignored.
 
-    A program reads statuses that another release wrote. A newer one may report more, and what a
-    person writes is never read through here.
+    A newer release may have written the status, with more fields. No model of what a person writes inherits
+    from this class.
     """
 
     model_config = ConfigDict(extra="ignore")

@@ -1,8 +1,7 @@
-"""What a served definition of TrainingJobs lacks of this release's own.
+"""Compare the definition of TrainingJobs in a cluster with that of this release.
 
-An API server drops a field of a status that its definition does not have, and refuses a status with a
-word that it does not know. Fields that a served definition has besides are of a newer release and are
-not looked at.
+An API server drops status fields that its definition lacks, and refuses a status with an enum value that its
+definition lacks. Additional fields of the served definition are of a newer release and are ignored.
 """
 
 from collections.abc import Iterator, Mapping
@@ -12,16 +11,16 @@ Schema = Mapping[str, Any]
 
 
 def lacks(served: Schema, ours: Schema, path: str = "") -> Iterator[str]:
-    """Yield, for each field that `served` does not have as `ours` does, its path and the fact.
+    """Yield "<path>: <fact>" for each field of `ours` that is missing or different in `served`.
 
-    Both are structural schemas. A field that is missing is named, not the fields below it.
+    Both are structural schemas. The fields below a missing field are not listed.
     """
     kind, wanted = served.get("type"), ours.get("type")
     if kind != wanted:
-        yield f"{path}: is {_article(kind)}, not {_article(wanted)}"
+        yield f"{path}: is {_of_type(kind)}, not {_of_type(wanted)}"
         return
     if unknown := [choice for choice in ours.get("enum", ()) if choice not in served.get("enum", (choice,))]:
-        yield f"{path}: does not know {', '.join(map(str, unknown))}"
+        yield f"{path}: lacks {', '.join(map(str, unknown))}"
     for name, inner in ours.get("properties", {}).items():
         below = f"{path}.{name}" if path else name
         if name in served.get("properties", {}):
@@ -33,5 +32,5 @@ def lacks(served: Schema, ours: Schema, path: str = "") -> Iterator[str]:
             yield from lacks(served.get(keyword, {}), ours[keyword], f"{path}{mark}")
 
 
-def _article(kind: object) -> str:
+def _of_type(kind: object) -> str:
     return "of no type" if kind is None else f"of type {kind}"

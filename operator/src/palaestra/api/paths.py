@@ -1,6 +1,6 @@
-"""Paths of fields, as messages show them, and data with parts taken away.
+"""Paths of fields in messages, and a copy of plain data from which parts can be removed.
 
-`spec.simulators[1].role` is, in pieces, `("spec", "simulators", 1, "role")`.
+The path `spec.simulators[1].role` is the tuple `("spec", "simulators", 1, "role")`.
 """
 
 import json
@@ -13,7 +13,7 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def shown(path: Path) -> str:
-    """Return `path` as a person writes it; keys that are no plain words stand in brackets."""
+    """Return `path` as text, as in `a.b[1]["c.d"]`; keys that are not plain words are in brackets."""
     text = ""
     for piece in path:
         if isinstance(piece, int):
@@ -26,19 +26,18 @@ def shown(path: Path) -> str:
 
 
 class Pruned:
-    """A copy of plain data from which parts are taken, while the rest keeps its place.
+    """A copy of plain data from which parts can be removed.
 
-    Lists are held as mappings from index to item, so that what is left of a list still knows its
-    numbers in the original.
+    Lists are stored as mappings from index to item, so that the remaining items keep their original indices.
     """
 
     def __init__(self, data: Any) -> None:
         self._tree = _sparse(data)
 
     def take(self, path: Path, stand_in: Any = None) -> bool:
-        """Take what lies at `path` away; return False when there was nothing to take.
+        """Remove the value at `path`; return False if there was none.
 
-        A `stand_in` that is not None is put there, once, whether or not there was anything.
+        If a `stand_in` is given, put it there instead; return False if it was there already.
         """
         *above, last = path
         tree = self._tree
@@ -55,11 +54,11 @@ class Pruned:
         return changed
 
     def data(self) -> Any:
-        """Return what is left, as plain data."""
+        """Return the remaining parts as plain data."""
         return _dense(self._tree)
 
     def original(self, path: Path) -> Path:
-        """Return where the original had what now lies at `path`."""
+        """Return the original path of the value that is at `path` in `data()`."""
         tree, found = self._tree, []
         for piece in path:
             if isinstance(tree, _SparseList) and isinstance(piece, int):
@@ -74,7 +73,7 @@ _NOTHING = object()
 
 
 class _SparseList(dict[Any, Any]):
-    """The items of a list that are left, by their index."""
+    """The remaining items of a list, by their original index."""
 
 
 def _sparse(data: Any) -> Any:

@@ -124,7 +124,7 @@ WAITING = (
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The texts of a reason: `message` has the facts in braces; `warning` is the event's type."""
+    """The texts of a reason: `message` is a template; `warning`: whether its event has the type Warning."""
 
     message: str
     meaning: str
@@ -146,8 +146,8 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.STATUS_UNREADABLE: Row(
         "{problem}; the operator ignores the job; upgrade the operator, or create a new TrainingJob",
-        "this release cannot read the status that another release or program wrote, so it cannot know which "
-        "replicas have ended",
+        "this release cannot read the status that another release or program wrote, so it cannot "
+        "determine which replicas have ended",
         "run the release that wrote it, or create a new TrainingJob",
     ),
     Reason.WORLD_MISSING: Row(
@@ -158,7 +158,7 @@ ROWS: dict[Reason, Row] = {
     Reason.WORLD_INVALID: Row(
         "{problem}",
         "a world is not a readable `.wbt` file, or refers to other files",
-        "correct the world; the operator reads a changed ConfigMap again by itself",
+        "correct the world; the operator reads a changed ConfigMap automatically",
     ),
     Reason.CONFIG_MAP_NOT_FOR_JOBS: Row(
         '{field}: ConfigMap {name} is not for jobs; label it palaestra.dev/for-jobs: "true"',
@@ -302,7 +302,7 @@ ROWS: dict[Reason, Row] = {
         "the API server refuses a pod or its claim because of a quota, a LimitRange, Pod Security, a webhook "
         "or a missing PriorityClass; the message quotes it",
         "raise the quota, or allow what the message names ([queues and quotas](queues.md#quotas)); "
-        "the creation is retried by itself",
+        "the creation is retried automatically",
     ),
     Reason.RESTART_POLICY_DROPPED: Row(
         "pod {pod}: {containers} lost restartPolicy: Always, so the trainer would wait forever; "

@@ -1,4 +1,4 @@
-"""The field tables of docs/trainingjob.md, made from the schema that the CRD carries."""
+"""The field tables of docs/trainingjob.md, generated from the schema of the CRD."""
 
 import json
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ BEGIN = "<!-- generated from the models: palaestra.api.reference -->"
 
 
 def page(text: str) -> str:
-    """Return docs/trainingjob.md, of which `text` is what it was, with its tables made anew.
+    """Return the page docs/trainingjob.md, now `text`, with its tables updated.
 
     Raises:
         ValueError: a mark is missing.
@@ -23,12 +23,12 @@ def page(text: str) -> str:
 
 
 def tables() -> str:
-    """Return a section for each object of a TrainingJob: its fields, and below them its rules."""
+    """Return a section for each object of a TrainingJob: a table of its fields, then its rules."""
     return "\n".join(line for path, at in _objects(schema(), ()) for line in _section(path, at))
 
 
 def _objects(at: Schema, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Schema]]:
-    """Yield every object below `at` that has fields, each with the way to it."""
+    """Yield every object below `at` that has fields, with its path."""
     if "items" in at:
         yield from _objects(at["items"], (*path[:-1], f"{path[-1]}[]"))
     elif path != ("metadata",):
@@ -57,7 +57,7 @@ def _rules(path: tuple[str, ...]) -> Iterator[str]:
     model = model_at(TrainingJob, tuple(piece.removesuffix("[]") for piece in path))
     if model is None or not model.rules:
         return
-    yield "Refused otherwise:"
+    yield "A job that breaks a rule is refused with one of these messages:"
     yield ""
     for rule in model.rules:
         yield f"- `{rule.field}`: {rule.message}" if rule.field else f"- {rule.message}"
@@ -69,19 +69,19 @@ def _default(field: Schema, *, required: bool) -> str:
         return "*required*"
     if "default" not in field:
         return "absent"
-    text = json.dumps(_told(field["default"], field))
+    text = json.dumps(_without_nested_defaults(field["default"], field))
     return "" if text in {"{}", "[]"} else f"`{text}`"
 
 
-def _told(default: Any, field: Schema) -> Any:
-    """Return `default` without what the tables of its objects say."""
+def _without_nested_defaults(default: Any, field: Schema) -> Any:
+    """Return `default` without values that equal the defaults of its fields, which other tables show."""
     if isinstance(default, list):
-        return [_told(item, field["items"]) for item in default]
+        return [_without_nested_defaults(item, field["items"]) for item in default]
     if not isinstance(default, dict):
         return default
     inner = field.get("properties", {})
     return {
-        name: _told(value, inner[name])
+        name: _without_nested_defaults(value, inner[name])
         for name, value in default.items()
         if name in inner and value != inner[name].get("default")
     }

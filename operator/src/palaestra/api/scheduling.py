@@ -68,7 +68,7 @@ class Toleration(ApiModel):
     )
 
 
-def _has_none_of_ours(keys: dict[str, str]) -> bool:
+def _has_no_reserved_key(keys: dict[str, str]) -> bool:
     return not any(key.startswith(("palaestra.dev/", "kueue.x-k8s.io/")) for key in keys)
 
 
@@ -77,13 +77,13 @@ def _domain(key: str) -> str:
     return domain if slash else ""
 
 
-def _is_selected_by_nobody(key: str) -> bool:
-    """Return whether a label has a domain that is not Kubernetes' own."""
+def _has_foreign_domain(key: str) -> bool:
+    """Return whether a key has a domain, and the domain is not one of Kubernetes."""
     return _domain(key) != "" and not _domain(key).endswith(("kubernetes.io", "k8s.io"))
 
 
-def _confines(key: str) -> bool:
-    """Return whether an annotation selects a seccomp or AppArmor profile; nodes still apply AppArmor's."""
+def _selects_security_profile(key: str) -> bool:
+    """Return whether an annotation selects a seccomp or AppArmor profile; kubelets still apply AppArmor's."""
     return "security" in _domain(key) and _domain(key).endswith(".kubernetes.io")
 
 
@@ -126,7 +126,7 @@ class Scheduling(ApiModel):
         ),
         Rule(
             field="podLabels",
-            holds=lambda scheduling: all(_is_selected_by_nobody(key) for key in scheduling.pod_labels),
+            holds=lambda scheduling: all(_has_foreign_domain(key) for key in scheduling.pod_labels),
             cel="self.podLabels.all(key, key.contains('/') && !key.startsWith('/')"
             " && !key.split('/')[0].endsWith('kubernetes.io') && !key.split('/')[0].endsWith('k8s.io'))",
             message="Services and NetworkPolicies of other users may select pods by a label without your"
@@ -134,21 +134,23 @@ class Scheduling(ApiModel):
         ),
         Rule(
             field="podAnnotations",
-            holds=lambda scheduling: not any(_confines(key) for key in scheduling.pod_annotations),
+            holds=lambda scheduling: (
+                not any(_selects_security_profile(key) for key in scheduling.pod_annotations)
+            ),
             cel="!self.podAnnotations.exists(key, key.contains('/') && key.split('/')[0].contains('security')"
             " && key.split('/')[0].endsWith('.kubernetes.io'))",
             message="a job must not select AppArmor or seccomp profiles; remove those annotations",
         ),
         Rule(
             field="podLabels",
-            holds=lambda scheduling: _has_none_of_ours(scheduling.pod_labels),
+            holds=lambda scheduling: _has_no_reserved_key(scheduling.pod_labels),
             cel="self.podLabels.all(key, !key.startsWith('palaestra.dev/')"
             " && !key.startsWith('kueue.x-k8s.io/'))",
             message="Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; remove them",
         ),
         Rule(
             field="podAnnotations",
-            holds=lambda scheduling: _has_none_of_ours(scheduling.pod_annotations),
+            holds=lambda scheduling: _has_no_reserved_key(scheduling.pod_annotations),
             cel="self.podAnnotations.all(key, !key.startsWith('palaestra.dev/')"
             " && !key.startsWith('kueue.x-k8s.io/'))",
             message="Palaestra sets the keys of palaestra.dev and kueue.x-k8s.io; remove them",

@@ -17,7 +17,7 @@ _LONGEST_QUOTE = 60
 
 
 def sentence(path: Path, error: ErrorDetails) -> str:
-    """Return "<fact>; <remedy>" for what pydantic found at `path`."""
+    """Return "<fact>; <remedy>" for the error that pydantic found at `path`."""
     value = error["input"]
     if value is None and error["type"] not in _NOT_ABOUT_A_VALUE:
         return "is empty; give a value or remove the line"
@@ -29,7 +29,7 @@ def sentence(path: Path, error: ErrorDetails) -> str:
 
 
 def quoted(value: Any) -> str:
-    """Return `value` as its author may have written it, on one line, cut when it is long."""
+    """Return `value` as its author may have written it, on one line, truncated if it is long."""
     if isinstance(value, dict | list):
         return "a mapping" if isinstance(value, dict) else "a list"
     text = json.dumps(value, ensure_ascii=False, default=str)
@@ -95,7 +95,7 @@ def _no_number(_: Path, value: Any, __: dict[str, Any]) -> str:
     return f"{quoted(value)} is not a number; write one"
 
 
-def _no_switch(_: Path, value: Any, __: dict[str, Any]) -> str:
+def _no_boolean(_: Path, value: Any, __: dict[str, Any]) -> str:
     return f"{quoted(value)} is neither true nor false; write one of them, without quotes"
 
 
@@ -122,13 +122,13 @@ _SENTENCES: dict[str, Callable[[Path, Any, dict[str, Any]], str]] = {
     "string_type": _no_text,
     "int_type": _no_integer,
     "float_type": _no_number,
-    "bool_type": _no_switch,
+    "bool_type": _no_boolean,
     "tuple_type": _no_list,
     "dict_type": lambda _, value, __: f"{quoted(value)} is not a mapping; write lines of 'key: value'",
     "model_type": lambda _, value, __: f"{quoted(value)} is not a mapping; write lines of 'field: value'",
     "string_too_short": lambda *_: "is empty; give a value or remove the line",
     "string_too_long": lambda _, __, ctx: f"is longer than {ctx['max_length']} characters; shorten it",
-    "string_unicode": lambda *_: "holds a character that is none; remove it",
+    "string_unicode": lambda *_: "contains an invalid Unicode character; remove it",
     "too_short": lambda *_: "has no entry; give one or remove the line",
     "too_long": _too_many,
     "greater_than_equal": lambda _, value, ctx: (

@@ -14,7 +14,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from palaestra.api.fields import KNOWN_ONES, Count, Fraction, Image, Listed, Sentence, Word
+from palaestra.api.fields import KNOWN_ITEMS, Count, Fraction, Image, Listed, Sentence, Word
 from palaestra.api.history import Faults, Goodput, LastAttempt, MemoryKills
 from palaestra.api.model import Reported
 from palaestra_protocol.control import SidecarState
@@ -207,7 +207,7 @@ class ReplicaStatus(Reported):
     steps_per_second: Annotated[float, Field(ge=0)] | None = None
     """Recent environment steps per second; absent: not known, or not running."""
 
-    simulators: Annotated[Listed[SimulatorStatus], Field(max_length=32), KNOWN_ONES] = ()
+    simulators: Annotated[Listed[SimulatorStatus], Field(max_length=32), KNOWN_ITEMS] = ()
     """Simulators of the replica; empty: not known yet."""
 
     last_checkpoint: LastCheckpoint | None = None
@@ -282,10 +282,10 @@ class Status(Reported):
                 "x-kubernetes-list-map-keys": ["type"],
             },
         ),
-        KNOWN_ONES,
+        KNOWN_ITEMS,
     ] = ()
     """`Accepted`, `Running`, `Suspended`, `Succeeded` and `Failed`, each with its reason; `Reconciling` while
-    the job approaches its spec; `Stalled` if it needs a person to get there."""
+    the job has not reached the state in its spec; `Stalled` if a person must act first."""
 
     start_time: datetime | None = Field(default=None, strict=False)
     """Time at which the first pod started, by its node's clock; absent: no pod has started."""

@@ -1,7 +1,7 @@
-"""JSON Schema, as pydantic writes it, into the structural schema of an API server.
+"""Convert pydantic's JSON Schema into the structural schema that an API server requires.
 
-Structural: no reference, no alternative, every type spelled out, everything bounded. What differs
-is rewritten here, field by field; what is said about a field stays what the model says.
+A structural schema has no references and no alternatives, and names the type and the bounds of every value.
+Descriptions are copied from the models.
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ Schema = dict[str, Any]
 
 FROZEN = "cannot be changed; make a new TrainingJob"
 
-# Keywords that mean the same in both, and are taken over as they are.
+# Keywords that have the same meaning in both schemas and are copied.
 _KEPT = (
     "description", "type", "format", "pattern", "enum", "minimum", "maximum", "required",
     "minLength", "maxLength", "minItems", "maxItems", "minProperties", "maxProperties",
@@ -51,7 +51,7 @@ def structural(schema: Schema, definitions: dict[str, Schema]) -> Schema:
 
 
 def _whole(schema: Schema, definitions: dict[str, Schema]) -> Schema:
-    """Return `schema` without `$ref` and without `or null`, with all that is said of it."""
+    """Return `schema` with its `$ref` replaced by the definition, and without the alternative null."""
     here = {key: value for key, value in schema.items() if key not in {"$ref", "anyOf"}}
     if "anyOf" in schema:
         (choice,) = (choice for choice in schema["anyOf"] if choice != {"type": "null"})
@@ -61,7 +61,7 @@ def _whole(schema: Schema, definitions: dict[str, Schema]) -> Schema:
     there = definitions[schema["$ref"].removeprefix("#/$defs/")]
     both = there | here
     if there.get("type") == "object" and "description" in here:
-        _, *more = there["description"].split("\n\n")  # the first is the field's in other words
+        _, *more = there["description"].split("\n\n")  # the first paragraph repeats the field's description
         both["description"] = "\n\n".join((here["description"], *more))
     return both
 
@@ -72,7 +72,7 @@ def _unwrapped(text: str) -> str:
 
 
 def _name_bounds(schema: Schema) -> None:
-    """Give the bounds of lists and maps the names that belong to their type."""
+    """Rename the bounds of lists and maps to the keywords for their type."""
     kind = _BOUNDS_OF.get(schema.get("type", ""))
     for bound in ("min", "max"):
         if kind and f"{bound}Length" in schema:
@@ -80,7 +80,7 @@ def _name_bounds(schema: Schema) -> None:
 
 
 def _present(default: Any) -> Any:
-    """Return `default` without what is absent; rules are tried on it as it stands here."""
+    """Return `default` without null values, because the API server applies the rules to the default."""
     if isinstance(default, list):
         return [_present(item) for item in default]
     if isinstance(default, dict):
@@ -89,16 +89,16 @@ def _present(default: Any) -> Any:
 
 
 def freeze(schema: Schema) -> None:
-    """Add rules to the object `schema` that keep each field, but for those that may change."""
-    whole = False  # an API server takes no rule for a field of any content, only for what it is in
+    """Add rules to the object `schema` that refuse a change of any field without the mark `MAY_CHANGE`."""
+    whole = False  # an API server accepts no rule on a field of arbitrary content, but one on its parent
     for name, inner in schema["properties"].items():
         if inner.get(MAY_CHANGE):
             continue
         always = "default" in inner or name in schema.get("required", ())
-        if _has_what_may_change(inner):
+        if _has_changeable_field(inner):
             _freeze_items(inner)
         elif always and "properties" in inner:
-            freeze(inner)  # the message names the field that was changed, not the part that it is in
+            freeze(inner)  # the message then names the changed field, not its parent
         elif _OPAQUE in inner.get("additionalProperties", ()):
             whole = True
         elif always:
@@ -114,7 +114,7 @@ def freeze(schema: Schema) -> None:
 
 
 def _freeze_items(inner: Schema) -> None:
-    freeze(inner["items"])  # the API server finds an item's old self by its name
+    freeze(inner["items"])  # the API server matches old and new items by name
     same_names = "size(self) == size(oldSelf) && self.all(item, oldSelf.exists(old, old.name == item.name))"
     _add(inner, {"rule": same_names, "message": FROZEN})
 
@@ -123,13 +123,13 @@ def _add(schema: Schema, rule: dict[str, str]) -> None:
     schema["x-kubernetes-validations"] = [*schema.get("x-kubernetes-validations", ()), rule]
 
 
-def _has_what_may_change(schema: Schema) -> bool:
+def _has_changeable_field(schema: Schema) -> bool:
     below = [*schema.get("properties", {}).values(), schema.get("items")]
-    return any(inner.get(MAY_CHANGE) or _has_what_may_change(inner) for inner in below if inner)
+    return any(inner.get(MAY_CHANGE) or _has_changeable_field(inner) for inner in below if inner)
 
 
 def without_marks(schema: Any) -> Any:
-    """Return `schema` without the marks that only `freeze` reads."""
+    """Return `schema` without the marks `MAY_CHANGE`, which only `freeze` reads."""
     if isinstance(schema, list):
         return [without_marks(item) for item in schema]
     if not isinstance(schema, dict):

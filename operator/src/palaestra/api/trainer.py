@@ -130,13 +130,13 @@ class Evaluation(ApiModel):
             field="stopAtSuccessRate",
             holds=lambda evaluation: evaluation.stop_at_success_rate is None or evaluation.every_steps > 0,
             cel="!has(self.stopAtSuccessRate) || self.everySteps > 0",
-            message="nothing is evaluated while everySteps is 0; remove it or evaluate",
+            message="has no effect while everySteps is 0; remove it or raise everySteps",
         ),
         Rule(
             field="confirmEpisodes",
             holds=lambda evaluation: not evaluation.confirm_episodes or evaluation.every_steps > 0,
             cel="!has(self.confirmEpisodes) || self.confirmEpisodes == 0 || self.everySteps > 0",
-            message="nothing is evaluated while everySteps is 0; remove it or evaluate",
+            message="has no effect while everySteps is 0; remove it or raise everySteps",
         ),
     )
 

@@ -1,4 +1,4 @@
-"""The tree that the models form: which field holds which model."""
+"""The tree of the models: which field contains which model."""
 
 from collections.abc import Iterator
 from types import UnionType
@@ -11,7 +11,7 @@ from palaestra.api.paths import Path
 
 
 def model_in(annotation: Any) -> type[ApiModel] | None:
-    """Return the model that a field of this annotation holds, alone or in a list, if any."""
+    """Return the model in a field's annotation, alone or in a list; None if there is none."""
     if isinstance(annotation, type) and issubclass(annotation, ApiModel):
         return annotation
     if get_origin(annotation) in {Annotated, Union, UnionType, tuple, dict}:
@@ -26,7 +26,7 @@ def fields_of(model: type[ApiModel]) -> dict[str, FieldInfo]:
 
 
 def model_at(root: type[ApiModel], path: Path) -> type[ApiModel] | None:
-    """Return the model of the object at `path` below `root`; None where there is none."""
+    """Return the model of the object at `path` below `root`; None if there is none."""
     model: type[ApiModel] | None = root
     for piece in path:
         if isinstance(piece, int) or model is None:
@@ -37,7 +37,7 @@ def model_at(root: type[ApiModel], path: Path) -> type[ApiModel] | None:
 
 
 def walk(root: type[ApiModel], path: Path = ()) -> Iterator[tuple[Path, type[ApiModel]]]:
-    """Yield `root` and every model below it, each with the path of the field that holds it."""
+    """Yield `root` and every model below it, each with the path of the field that contains it."""
     yield path, root
     for name, field in fields_of(root).items():
         if inner := model_in(field.annotation):

@@ -1,8 +1,8 @@
-"""One YAML document as plain data and back, read as a Kubernetes client reads it.
+"""Read and write one YAML document as Kubernetes clients do.
 
-PyYAML's own reading differs from kubectl's where it hurts: `5e-4` is text to it, `1:30` the number
-90, a date an object, and a key given twice silently counts once. Here the file means on a laptop
-what it means on a cluster, and what would mean something else is refused with its place.
+PyYAML differs from kubectl: it reads `5e-4` as text, `1:30` as the number 90 and a date as an object, and it
+silently accepts a duplicate key. Here a file has the same meaning on a laptop and on a cluster; a value whose
+meaning would differ is refused with its line and column.
 """
 
 import math
@@ -21,12 +21,12 @@ _TEXT = "tag:yaml.org,2002:str"
 
 _TAGS = {_BOOL, _FLOAT, _INT, _NULL, _TEXT, "tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"}
 
-_MOST_NODES = 50_000  # aliases counted as often as they are used
-_LARGEST_FILE = 1_500_000  # characters; an API server takes no more either
+_MOST_NODES = 50_000  # an alias counts each time it is used
+_LARGEST_FILE = 1_500_000  # characters; an API server accepts no more
 
 
 class NotYaml(ValueError):
-    """The text cannot be read; `problem` says where and why, on one line."""
+    """The text cannot be read; `problem` is one line with the place, the fact and the remedy."""
 
     def __init__(self, problem: str) -> None:
         super().__init__(problem)
@@ -40,11 +40,11 @@ class _Loader(yaml.SafeLoader):
 
 
 class _Dumper(yaml.SafeDumper):
-    """PyYAML's safe dumper, which quotes what either reading would take for something else."""
+    """PyYAML's safe dumper, which quotes text that PyYAML or kubectl would read as another type."""
 
 
 def _represent_text(dumper: _Dumper, text: str) -> ScalarNode:
-    """Return the node of `text`; what YAML folds as line breaks stays when it is escaped."""
+    """Return the node of `text`, quoted if it contains line breaks that YAML would fold."""
     style = '"' if re.search("[\x85\u2028\u2029\r]", text) else None
     return dumper.represent_scalar(_TEXT, text, style)
 
@@ -64,7 +64,7 @@ for _tag, _pattern in _SCALARS.items():
 
 
 def write(data: Any) -> str:
-    """Return `data` as YAML that `read` reads as equal data, in the order that it has."""
+    """Return `data` as YAML in the same order; `read` returns equal data."""
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
 
 
@@ -72,10 +72,10 @@ def read(text: str, name: str) -> Any:
     """Return the one document in `text` as dicts, lists, text, numbers, booleans and None.
 
     Raises:
-        NotYaml: with "<name>:<line>:<column>: <fact>; <remedy>".
+        NotYaml: the text is not valid; its `problem` is "<name>:<line>:<column>: <fact>; <remedy>".
     """
     if len(text) > _LARGEST_FILE:
-        raise NotYaml(f"{name}: longer than {_LARGEST_FILE} characters; shorten it")
+        raise NotYaml(f"{name}: is longer than {_LARGEST_FILE} characters; shorten it")
     try:
         loader = _Loader(text)
         try:
@@ -84,12 +84,12 @@ def read(text: str, name: str) -> Any:
         finally:
             loader.dispose()
     except RecursionError:
-        raise NotYaml(f"{name}: nested too deep, or into itself; flatten it") from None
+        raise NotYaml(f"{name}: is nested too deeply, or contains itself; flatten it") from None
     except yaml.MarkedYAMLError as error:
         raise NotYaml(_describe(error, name)) from error
     except yaml.reader.ReaderError as error:
         place = _place_of(text, error.position, name)
-        raise NotYaml(f"{place}: a character that YAML forbids; remove it") from error
+        raise NotYaml(f"{place}: YAML does not allow this character; remove it") from error
 
 
 def _describe(error: yaml.MarkedYAMLError, name: str) -> str:
@@ -98,7 +98,7 @@ def _describe(error: yaml.MarkedYAMLError, name: str) -> str:
     if error.problem == "but found another document":
         return f"{place}: a second document begins here; put one TrainingJob in a file"
     fact = error.problem or error.context or "not readable"
-    return f"{place}: not YAML: {fact}; mend the line or quote the text"
+    return f"{place}: not YAML: {fact}; correct the line or quote the text"
 
 
 def _place_of(text: str, position: int, name: str) -> str:
@@ -107,7 +107,7 @@ def _place_of(text: str, position: int, name: str) -> str:
 
 
 class _Builder:
-    """Turns nodes into data, and refuses what JSON could not carry."""
+    """Converts nodes into data, and refuses values that JSON cannot represent."""
 
     def __init__(self, name: str, loader: _Loader) -> None:
         self._name = name
@@ -115,12 +115,12 @@ class _Builder:
         self._left = _MOST_NODES
 
     def value(self, node: Node) -> Any:
-        """Return the data of `node` and all below it."""
+        """Return the data of `node` and of the nodes below it."""
         self._left -= 1
         if self._left < 0:
             raise self._refused(node, "more than 50000 values; shorten the file")
         if node.tag not in _TAGS:
-            raise self._refused(node, f"the tag {node.tag} is not for job files; remove it")
+            raise self._refused(node, f"the tag {node.tag} is not allowed in job files; remove it")
         if isinstance(node, MappingNode):
             return self._mapping(node)
         if isinstance(node, SequenceNode):
@@ -136,32 +136,34 @@ class _Builder:
                 continue
             key = self._key(key_node)
             if key in own:
-                raise self._refused(key_node, f"{key} is given twice; keep one")
+                raise self._refused(key_node, f"duplicate key {key}; keep one")
             own[key] = self.value(value_node)
         return merged | own
 
     def _merged(self, node: Node) -> dict[str, Any]:
-        """Return what `<<` brings in; of several mappings the first wins."""
+        """Return the entries that `<<` merges; if several mappings have the same key, the first wins."""
         value = self.value(node)
         sources = value if isinstance(value, list) else [value]
         if not all(isinstance(source, dict) for source in sources):
-            raise self._refused(node, "<< takes a mapping; name one with *")
+            raise self._refused(node, "<< needs a mapping; refer to one with *")
         return {key: item for source in reversed(sources) for key, item in source.items()}
 
     def _key(self, node: Node) -> str:
         if isinstance(node, ScalarNode) and node.tag == _TEXT:
             return str(node.value)
         if not isinstance(node, ScalarNode):
-            raise self._refused(node, "a key that is a list or a mapping; write a word")
-        raise self._refused(node, f'{node.value} is no text, as a key must be; quote it: "{node.value}"')
+            raise self._refused(node, "a key is a list or a mapping; use text as the key")
+        raise self._refused(node, f'the key {node.value} is not text; quote it: "{node.value}"')
 
     def _scalar(self, node: Node) -> Any:
         try:
             value = self._loader.construct_object(node)
         except (ValueError, KeyError):
-            raise self._refused(node, "not a value of its tag, or too large; mend it") from None
+            raise self._refused(
+                node, "the value does not match its tag, or is too large; correct it"
+            ) from None
         if isinstance(value, float) and not math.isfinite(value):
-            raise self._refused(node, f"{node.value} is no finite number; choose one")
+            raise self._refused(node, f"{node.value} is not a finite number; use a finite one")
         return value
 
     def _refused(self, node: Node, problem: str) -> NotYaml:
