@@ -275,7 +275,15 @@ def world():
 
 
 def _wheel(index):
+    """Return a wheel of the Robotino 3: 0.1826 m from its middle, of radius 0.063 m, on a radial axle."""
+    azimuth = math.radians(180 + 120 * index)
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    place = f"{0.1826 * c!r} {0.1826 * s!r} 0.063"
     return f"""HingeJoint {{
+      jointParameters HingeJointParameters {{ axis {c!r} {s!r} 0 anchor {place} }}
+      endPoint Solid {{ translation {place} rotation 0 0 1 {azimuth!r}
+        boundingObject Pose {{ rotation 0 1 0 1.5707963
+          children [ Cylinder {{ radius 0.063 height 0.01 }} ] }} }}
       device [ RotationalMotor {{ name "wheel{index}_joint" maxVelocity 137.46 }}
                PositionSensor {{ name "wheel{index}_joint_sensor" }} ] }}"""
 

@@ -11,9 +11,9 @@ from palaestra_sim.stub.faults.damage import damaged_message
 from palaestra_sim.stub.faults.language import parse
 from palaestra_sim.stub.ros.topics import Publisher, Topic
 from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.stub.scene.tree.catalogue import field_kinds, type_number
+from palaestra_sim.stub.scene.nodes.types import type_number
+from palaestra_sim.stub.scene.tree.catalogue import field_kinds
 from palaestra_sim.stub.scene.tree.effects import require_effect
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.seam import UnsimulatedError
 
 COMMON = {"get_model", "get_name", "get_node_type"}
@@ -77,7 +77,7 @@ def test_its_node_has_the_fields_of_webots(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
     """A success without effect would leave a client with a world that is not the one it wrote."""
-    tree = SceneTree(stub(name).simulation)
+    tree = stub(name).simulation.tree
     node = next(it for it in tree.nodes if it.type_name == name)
 
     with pytest.raises(UnsimulatedError, match=f"the stub cannot change {name}.name"):

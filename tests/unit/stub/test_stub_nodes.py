@@ -119,8 +119,8 @@ def test_positions_are_in_the_world(robot, position, drive):
     sensor = robot.get("supervisor/get_from_device", value="ir1")
     point = robot.get("supervisor/node/get_position", node=sensor)
 
-    assert position(robot, "ROBOTINO") == pytest.approx((0.32, 0.0, 0.0))
-    assert (point.x, point.y, point.z) == pytest.approx((0.32 + 0.2264, 0.0, 0.0566))
+    assert position(robot, "ROBOTINO") == pytest.approx((0.32, 0.0, 0.0), rel=1e-4)
+    assert (point.x, point.y, point.z) == pytest.approx((0.32 + 0.2264, 0.0, 0.0566), rel=1e-4)
 
 
 def test_orientations_are_quaternions(robot, find, drive):
@@ -131,7 +131,7 @@ def test_orientations_are_quaternions(robot, find, drive):
     turned = robot.get("supervisor/node/get_orientation", node=find("ROBOTINO"))
 
     assert (turned.x, turned.y) == (0.0, 0.0)
-    assert 2 * math.atan2(turned.z, turned.w) == pytest.approx(1.6)
+    assert 2 * math.atan2(turned.z, turned.w) == pytest.approx(1.6, rel=1e-3)
 
 
 def test_the_velocity_is_in_world_axes(robot, find, drive):
@@ -144,7 +144,7 @@ def test_the_velocity_is_in_world_axes(robot, find, drive):
 
     velocity = robot.get("supervisor/node/get_velocity", node=find("ROBOTINO"))
 
-    assert (velocity.linear.x, velocity.linear.y) == pytest.approx((0.0, 0.2), abs=1e-6)
+    assert (velocity.linear.x, velocity.linear.y) == pytest.approx((0.0, 0.2), abs=1e-5)
     assert velocity.angular.z == 0.0
 
 
@@ -259,16 +259,18 @@ def test_a_used_node_is_a_node_of_its_own(robot, find):
     assert robot.get("supervisor/node/get_type_name", node=used) == "Box"
 
 
-@pytest.mark.parametrize("question", ["get_position", "get_orientation"])
-def test_the_pose_of_what_hangs_on_a_joint_is_refused(ros, start, world, simple_robot, question):
-    """It would turn in Webots, and stands still in the stub."""
-    wheel = "HingeJoint { endPoint Solid { children [ DEF SPOKE Pose { } ] }"
-    start(world(robot=simple_robot.replace("HingeJoint {", wheel, 1)))
+def test_what_hangs_on_a_joint_moves_with_it(ros, start, world, simple_robot):
+    """A quarter turn about x: what was 1 m to the left is 1 m up."""
+    arm = """HingeJoint { jointParameters HingeJointParameters { anchor 0 0 0.5 }
+      device RotationalMotor { name "arm" }
+      endPoint Solid { translation 0 0 0.5 children [ DEF HAND Pose { translation 0 1 0 } ] } }
+      DEF IR"""
+    start(world(robot=simple_robot.replace("DEF IR", arm, 1)))
     robot = ros.node("robotino")
-    spoke = robot.get("supervisor/get_from_def", name="SPOKE")
-    field = robot.get("supervisor/node/get_field", node=spoke, fieldName="rotation")
+    hand = robot.get("supervisor/get_from_def", name="HAND")
 
-    with pytest.raises(ServiceFailed, match="a Pose on a joint stands still in the stub"):
-        robot.call(f"supervisor/node/{question}", node=spoke)
-    with pytest.raises(ServiceFailed, match="a Pose on a joint stands still in the stub"):
-        robot.call("supervisor/field/get_rotation", field=field)
+    robot.call("arm/set_position", value=math.pi / 2)
+    robot.call("robot/time_step", value=3200)
+    position = robot.get("supervisor/node/get_position", node=hand)
+
+    assert (position.x, position.y, position.z) == pytest.approx((0.0, 0.0, 1.5), abs=1e-3)

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.body import WHEELS, wheel_speeds
 from palaestra_sim.stub.scene.robot import seed_of
 from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.stub.scene.tree.catalogue import FieldType
 from palaestra_sim.world import builtin
+from tests.unit.stub.robotino import WHEELS, wheel_speeds
 
 
 @pytest.fixture
@@ -250,16 +251,16 @@ def test_a_reset_restores_motors_and_rest(simulation):
 
 def test_a_reset_restores_the_places_of_all_solids(simulation):
     """The target and the cylinders too, and what rays see of them."""
-    cylinder = next(it.place for it in simulation.scene.solids if it.kind == "cylinder")
-    cylinder.translation = (0.5, 0.0, 0.2)
-    simulation.moved(cylinder)
+    cylinder = simulation.tree.of_def("CYLINDER_0")
+    translation = simulation.tree.field_of(cylinder, "translation", simulation)
+    translation.set(FieldType.VEC3F, 0, (0.5, 0.0, 0.2))
     simulation.step(32)
     assert simulation.robots[0].sensors["ir1"].value > 1.0
 
     simulation.reset()
     simulation.step(32)
 
-    assert cylinder.translation == (0.8, 0.8, 0.2)
+    assert cylinder.place.translation == (0.8, 0.8, 0.2)
     assert simulation.robots[0].sensors["ir1"].value == pytest.approx(0.31, rel=0.05)
 
 

@@ -14,15 +14,20 @@ Pure: bytes in, bytes out. No clock, no network, and no file except the worlds t
 from palaestra_sim.errors import UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path
 from palaestra_sim.world.checks import check
+from palaestra_sim.world.externs import LocalProtos, local_protos
 from palaestra_sim.world.generate import generate, rename
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
-from palaestra_sim.world.reader import parse
+from palaestra_sim.world.reader import parse, parse_proto
 from palaestra_sim.world.robots import WorldRobot, robots
-from palaestra_sim.world.tree import Item, Node, Value, World
+from palaestra_sim.world.tree import Is, Item, Node, Proto, ProtoField, Value, World
 
 __all__ = [
+    "Is",
     "Item",
+    "LocalProtos",
     "Node",
+    "Proto",
+    "ProtoField",
     "RunIdentity",
     "UnknownWorldError",
     "Value",
@@ -33,8 +38,10 @@ __all__ = [
     "builtin_path",
     "check",
     "generate",
+    "local_protos",
     "name_prefix",
     "parse",
+    "parse_proto",
     "rename",
     "robots",
     "ros_name",

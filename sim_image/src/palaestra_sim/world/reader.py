@@ -1,4 +1,4 @@
-"""Parse the tokens of a world file into its tree.
+"""Parse the tokens of a world file, or of a PROTO file, into a tree.
 
 Recursive descent with one function for each rule of the grammar. A number limits the depth, not Python's
 stack. For any bytes the result is a World or a WorldError.
@@ -9,7 +9,7 @@ import re
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token, tokenize, unquoted
-from palaestra_sim.world.tree import Item, Node, Value, World
+from palaestra_sim.world.tree import Is, Item, Node, Proto, ProtoField, Value, World
 
 # Four Python calls a level, so 400 of the 1000 that Python allows. An arm nests two nodes a joint.
 MAX_DEPTH = 100
@@ -18,6 +18,10 @@ _GLANCE = 40  # characters of a token in an error
 _RESERVED = frozenset(
     (b"DEF", b"USE", b"IS", b"NULL", b"TRUE", b"FALSE", b"PROTO", b"EXTERNPROTO", b"IMPORTABLE")
 )
+_DECLARING = frozenset(
+    (b"field", b"hiddenField", b"vrmlField", b"w3dField", b"unconnectedField", b"deprecatedField")
+)
+_TEMPLATE = re.compile(rb"^[^#\n]*?(%[<{])", re.MULTILINE)
 _NAME = re.compile(rb"""[^"'.\\]+""")
 _CONSTANTS: dict[bytes, bool | None] = {b"TRUE": True, b"FALSE": False, b"NULL": None}
 
@@ -33,13 +37,28 @@ def parse(source: bytes, name: str = "world") -> World:
     return _Reader(text, tokenize(text)).world(header)
 
 
+def parse_proto(source: bytes, name: str = "PROTO") -> Proto:
+    """Return the PROTO that a file without templates describes; `name` is its name in errors.
+
+    Raises:
+        WorldError: the bytes are no such file; the message has the place, the fact and the remedy.
+    """
+    text = Source(data=source, name=name)
+    text.header()
+    if template := _TEMPLATE.search(source):
+        remedy = "describe it in a file of stand-ins, or leave it out"
+        raise text.error(template.start(), "a template, which only Webots can run", remedy)
+    return _Reader(text, tokenize(text), in_proto=True).proto()
+
+
 class _Reader:
     """A position in a sequence of tokens, and the rules that move it."""
 
-    def __init__(self, source: Source, tokens: tuple[Token, ...]) -> None:
+    def __init__(self, source: Source, tokens: tuple[Token, ...], *, in_proto: bool = False) -> None:
         self._source = source
         self._tokens = tokens
         self._at = 0
+        self._in_proto = in_proto
 
     def world(self, header: str) -> World:
         """Read `file := header (["IMPORTABLE"] "EXTERNPROTO" string | node)*`."""
@@ -56,6 +75,50 @@ class _Reader:
             externs=tuple(externs),
             tokens=self._tokens,
         )
+
+    def proto(self) -> Proto:
+        """Read `file := header extern* "PROTO" name "[" declaration* "]" "{" node "}"`."""
+        externs = []
+        while self._peek().text in (b"IMPORTABLE", b"EXTERNPROTO"):
+            externs.append(self._extern())
+        self._expect(b"PROTO")
+        name = self._name("the name of a PROTO")
+        self._expect(b"[")
+        fields: dict[str, ProtoField] = {}
+        while not self._skip(b"]"):
+            declared, field = self._declaration()
+            fields[declared] = field
+        self._expect(b"{")
+        body = self._node(1)
+        self._expect(b"}")
+        return Proto(name=name, source=self._source, externs=tuple(externs), fields=fields, body=body)
+
+    def _declaration(self) -> tuple[str, ProtoField]:
+        """Read `declaration := "field" type ["{" token* "}"] name value`."""
+        keyword = self._take()
+        if keyword.text not in _DECLARING:
+            fact = f"{_shown(keyword)} where the field of a PROTO should be"
+            raise self._error(keyword, fact, "write field SFFloat name 0")
+        type_name = self._name("the type of a field")
+        if self._skip(b"{"):
+            self._skip_to_close()
+        name = self._name("the name of a field")
+        return name, ProtoField(type_name=type_name, default=self._value(name, 1))
+
+    def _skip_to_close(self) -> None:
+        """Skip the values to which a PROTO's field is restricted."""
+        depth = 1
+        while depth:
+            token = self._take()
+            if token.kind == "end":
+                raise self._error(token, 'a "{" is never closed', 'add the missing "}"')
+            depth += (token.text == b"{") - (token.text == b"}")
+
+    def _expect(self, text: bytes) -> None:
+        token = self._take()
+        if token.text != text:
+            fact = f"{_shown(token)} where {text.decode()} should be"
+            raise self._error(token, fact, "a PROTO is written PROTO Name [ fields ] { node }")
 
     def _extern(self) -> Token:
         """Return the address of `["IMPORTABLE"] "EXTERNPROTO" string`."""
@@ -108,8 +171,11 @@ class _Reader:
     def _value(self, name: str, depth: int) -> Value:
         """Read `value := "[" item* "]" | number+ | item`."""
         first = self._peek()
-        if first.text == b"IS":
-            raise self._error(first, "IS outside a PROTO file", f"write the value of {name}")
+        if self._skip(b"IS"):
+            if not self._in_proto:
+                raise self._error(first, "IS outside a PROTO file", f"write the value of {name}")
+            bound = Is(self._name("the name of a PROTO's field"))
+            return Value(items=(bound,), bracketed=False, span=self._span(first))
         items: list[Item] = []
         if bracketed := self._skip(b"["):
             while not self._skip(b"]"):

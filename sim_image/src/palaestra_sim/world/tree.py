@@ -9,14 +9,22 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token
 
-Item: TypeAlias = "float | bool | str | Node | None"
+Item: TypeAlias = "float | bool | str | Node | Is | None"
+
+
+@dataclass(frozen=True, slots=True)
+class Is:
+    """In a PROTO, `field IS name`: the value that an instance gives to the PROTO's own field `name`."""
+
+    name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """The value of a field: numbers, booleans, strings, nodes, `None` for NULL; in source order.
+    """The value of a field: numbers, booleans, strings, nodes, `None` for NULL, `Is`; in source order.
 
     `translation 0 0 1` has three items and is not bracketed. The span is (start, end) in bytes,
     brackets included.
@@ -72,6 +80,28 @@ class Node:
     def _items(self, name: str) -> tuple[Item, ...]:
         value = self.fields.get(name)
         return () if value is None else value.items
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProtoField:
+    """The declaration of a PROTO's field: its type, such as "SFVec3f", and its default."""
+
+    type_name: str
+    default: Value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proto:
+    """A PROTO without templates: its fields by name, the node that it stands for, and its file.
+
+    `externs` are the string tokens of its EXTERNPROTO lines.
+    """
+
+    name: str
+    source: Source
+    externs: tuple[Token, ...] = field(repr=False)
+    fields: dict[str, ProtoField]
+    body: Node
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,6 +19,7 @@ import math
 from typing import Any
 
 from palaestra_sim.errors import SimError
+from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.front.services.devices import Outlet, device_services
 from palaestra_sim.stub.front.services.robot import RobotServices
@@ -31,7 +32,6 @@ from palaestra_sim.stub.scene.devices.pseudo import PSEUDO_DEVICES
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.seam import Handler, Node, Publisher, Service
 
 _MODEL_NAME = "/model_name"
@@ -45,10 +45,10 @@ class Controller:
         blocked: whether a step is pending, so that all other requests have to wait.
     """
 
-    def __init__(self, host: Host, stepping: Stepping, tree: SceneTree, robot: Robot, node: Node) -> None:
+    def __init__(self, host: Host, stepping: Stepping, handles: Handles, robot: Robot, node: Node) -> None:
         self._host = host
-        self.simulation: Simulation = tree.simulation
-        self._tree = tree
+        self.simulation: Simulation = handles.simulation
+        self._handles = handles
         self.robot = robot
         self.node = node
         self.blocked = False
@@ -90,9 +90,9 @@ class Controller:
         self._serve(Service("robot/time_step", "webots_ros/set_int", self._time_step))
         self._serve(*services.table())
         if self.robot.parts.node.flag("supervisor", False):
-            self._serve(*SupervisorServices(self._host, self._tree, self.robot).table())
-            self._serve(*NodeServices(self._host, self._tree).table())
-            self._serve(*FieldServices(self._tree).table())
+            self._serve(*SupervisorServices(self._host, self._handles, self.robot).table())
+            self._serve(*NodeServices(self._host, self._handles).table())
+            self._serve(*FieldServices(self._handles).table())
         self._serve_devices()
         if self._arguments.auto_publish:
             for outlet in self._outlets.values():

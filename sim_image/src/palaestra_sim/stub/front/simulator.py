@@ -12,12 +12,12 @@ from pathlib import Path
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.stub.front.controller import Controller
+from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.scene.arguments import Arguments
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.seam import Node
 
 MakeNode = Callable[[str], Node]
@@ -64,8 +64,7 @@ class StubSimulator:
 
     def start(self) -> None:
         """Start the controllers of the robots."""
-        tree = SceneTree(self.simulation, self._loads)
-        self._tree = tree
+        self._handles = Handles(self.simulation, self._loads)
         for robot in self._arguments:
             self._start_controller(robot)
 
@@ -127,7 +126,7 @@ class StubSimulator:
 
     def _start_controller(self, robot: Robot) -> None:
         node = self._make_node(self._arguments[robot].name)
-        controller = Controller(self, self._stepping, self._tree, robot, node)
+        controller = Controller(self, self._stepping, self._handles, robot, node)
         self.controllers[node.name] = controller
         controller.start()
 

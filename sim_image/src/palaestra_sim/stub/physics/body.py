@@ -1,17 +1,13 @@
-"""The Robotino on the floor: from three wheel motors to a pose, basic step by basic step.
+"""A robot on the floor: from wheel motors to a pose, basic step by basic step.
 
-Kinematics and geometry are the Robotino 3's. Wheel 0 is at the rear, 1 front right, and 2 front left.
-    w0 = (vy - L omega) / R,  w1 = (-k vx - vy / 2 - L omega) / R,  w2 = (k vx - vy / 2 - L omega) / R,
+The law of its wheels is in `drive`. In Webots torque and friction limit the acceleration of a robot. Here
+three limits replace them: 10 m/s2 along x, 6 m/s2 along y, 20 rad/s2 about z. They are those of the Robotino
+3's own controller (Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c). All three axes are
+slowed by the same factor, as in its `base_accelerate`. A motor's own `acceleration` is an additional limit.
 
-with k = sqrt(3/4). Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c.
-
-Acceleration: the motors' `acceleration` is -1 in the Robotino 3, so in Webots only torque and friction
-limit the wheels. Here the limits of base.c replace them: 10 m/s2, 6 m/s2 and 20 rad/s2 along x, y and about
-z. All three axes are slowed by the same factor, as in its `base_accelerate`. (10 N m at two of three wheels
-and 23 kg would give 12 m/s2.) A motor's own `acceleration` is an additional limit.
-
-A robot is a cylinder. An obstacle pushes it out along the normal, so that it slides while its wheels turn.
-There is no mass, no bounce and no other friction. Everything is a function of the commands.
+A robot is one or several upright cylinders. An obstacle pushes it out along the normal, so that it slides
+while its wheels turn. There is no mass, no bounce and no other friction. Everything is a function of the
+commands.
 """
 
 from __future__ import annotations
@@ -20,54 +16,47 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
+from palaestra_sim.stub.physics.drive import Drive
 from palaestra_sim.stub.physics.motors import Motor
-from palaestra_sim.stub.physics.obstacles import Disc, Neighborhood
+from palaestra_sim.stub.physics.obstacles import Contact, Disc, Neighborhood, Obstacle, Ray
 
-WHEEL_RADIUS_M: Final = 0.063
-WHEEL_DISTANCE_M: Final = 0.1826
 ACCELERATIONS: Final = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2
-WHEELS: Final = ("wheel0_joint", "wheel1_joint", "wheel2_joint")
 
-_K: Final = math.sqrt(0.75)
 _PASSES: Final = 4  # a corner has two walls and perhaps a robot; more passes change nothing
 _RESTING_M: Final = 1e-9  # a robot that was pushed out rests at the surface, give or take rounding
-_STRIDE: Final = 0.3  # of the radius: how far a robot may move before it looks for contacts
+_STRIDE: Final = 0.3  # of the smallest radius: how far a robot may move before it looks for contacts
 
+_MOST_GAPS: Final = 15  # between the cylinders of one box; a thin bar has holes that nothing fits through
 
-def twist(w0: float, w1: float, w2: float) -> tuple[float, float, float]:
-    """Return vx, vy in m/s and omega in rad/s from the wheels' speeds in rad/s."""
-    return (
-        WHEEL_RADIUS_M * (w2 - w1) / (2.0 * _K),
-        WHEEL_RADIUS_M * (2.0 * w0 - w1 - w2) / 3.0,
-        -WHEEL_RADIUS_M * (w0 + w1 + w2) / (3.0 * WHEEL_DISTANCE_M),
-    )
-
-
-def wheel_speeds(vx: float, vy: float, omega: float) -> tuple[float, float, float]:
-    """Return the wheels' speeds in rad/s for a twist in m/s, m/s, rad/s."""
-    turning = WHEEL_DISTANCE_M * omega
-    return (
-        (vy - turning) / WHEEL_RADIUS_M,
-        (-_K * vx - 0.5 * vy - turning) / WHEEL_RADIUS_M,
-        (_K * vx - 0.5 * vy - turning) / WHEEL_RADIUS_M,
-    )
+Part = tuple[float, float, float]  # x, y of a cylinder's axis in the robot's frame, and its radius; meters
 
 
 class Body(Disc):
-    """A round robot: a pose, a velocity, and wheels where it has any.
+    """A robot of upright cylinders: a pose, a velocity, and wheels where it has any.
+
+    Its own disc is the one around all of them.
+
+    Args:
+        parts: the cylinders; none: nothing can run into it.
+        wheels: the motors of the wheels.
+        drive: the law of these wheels; None: they do not move it.
 
     Attributes:
         heading_rad: in (-pi, pi].
         c, s: cosine and sine of the heading.
         velocity: vx, vy in m/s and omega in rad/s, in world axes, over the last basic step.
-        touched: whether anything was touched since the bumper was last read; its reader clears it.
+        touched: the parts that were touched since the bumpers were last read, a bit each (part 0 is 1); their
+            reader clears it.
     """
 
     __slots__ = (
+        "_drive_law",
         "_omega",
         "_others",
+        "_parts",
         "_solids",
         "_step_s",
+        "_stride_m",
         "_vx",
         "_vy",
         "_wheels",
@@ -78,9 +67,14 @@ class Body(Disc):
         "velocity",
     )
 
-    def __init__(self, radius_m: float, wheels: Sequence[Motor]) -> None:
-        super().__init__(0.0, 0.0, radius_m)
-        self._wheels = tuple(wheels)
+    def __init__(
+        self, parts: Sequence[Part], wheels: Sequence[Motor] = (), drive: Drive | None = None
+    ) -> None:
+        super().__init__(0.0, 0.0, max((math.hypot(x, y) + radius for x, y, radius in parts), default=0.0))
+        self._parts = tuple(parts)
+        self._stride_m = _STRIDE * min((radius for _, _, radius in parts), default=0.0)
+        self._wheels = tuple(wheels) if drive is not None else ()
+        self._drive_law = drive
         self._solids = Neighborhood((), 0.0)
         self._others: tuple[Body, ...] = ()
         self._step_s = 0.0
@@ -101,6 +95,20 @@ class Body(Disc):
         self._solids = solids
         self._others = tuple(others)
 
+    def contact(self, x: float, y: float, radius: float) -> Contact | None:
+        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        deepest: Contact | None = None
+        for disc in self._discs():
+            contact = disc.contact(x, y, radius)
+            if contact is not None and (deepest is None or contact[2] > deepest[2]):
+                deepest = contact
+        return deepest
+
+    def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
+        """Shorten `reach` to where the rays of a robot at `frame` meet a part of this one."""
+        for disc in self._discs():
+            disc.scan(frame, rays, reach)
+
     def place(self, x: float, y: float, heading_rad: float) -> None:
         """Place the robot somewhere; its motion continues."""
         self.x = x
@@ -113,7 +121,7 @@ class Body(Disc):
         """Stop all motion; the motors begin again from rest."""
         self._vx = self._vy = self._omega = 0.0
         self.velocity = (0.0, 0.0, 0.0)
-        self.touched = False
+        self.touched = 0
         for wheel in self._wheels:
             wheel.speed_rad_s = 0.0
             wheel.changed = True
@@ -124,48 +132,39 @@ class Body(Disc):
         self._vy = vy * self.c - vx * self.s
         self._omega = omega
         self.velocity = (vx, vy, omega)
-        speeds = wheel_speeds(self._vx, self._vy, omega)
-        for wheel, speed in zip(self._wheels, speeds, strict=False):
-            wheel.speed_rad_s = speed
-            wheel.changed = True
+        if self._drive_law is not None:
+            speeds = self._drive_law.wheel_speeds(self._vx, self._vy, omega)
+            for wheel, speed in zip(self._wheels, speeds, strict=True):
+                wheel.speed_rad_s = speed
+                wheel.changed = True
 
     def advance(self, step_s: float) -> None:
         """Move on by one basic step."""
-        if self._wheels:
-            w0, w1, w2 = self._wheels
-            if w0.changed or w1.changed or w2.changed or step_s != self._step_s:
-                self._drive(step_s)
-            w0.angle_rad += w0.speed_rad_s * step_s
-            w1.angle_rad += w1.speed_rad_s * step_s
-            w2.angle_rad += w2.speed_rad_s * step_s
+        if self._drive_law is not None:
+            changed = step_s != self._step_s
+            for wheel in self._wheels:
+                changed = changed or wheel.changed
+            if changed:
+                self._drive(step_s, self._drive_law)
+            for wheel in self._wheels:
+                wheel.angle_rad += wheel.speed_rad_s * step_s
             if self._vx or self._vy or self._omega:
                 self._move(step_s)
                 return
         self.velocity = (0.0, 0.0, 0.0)
         self._push_out()
 
-    def _drive(self, step_s: float) -> None:
+    def _drive(self, step_s: float, law: Drive) -> None:
         """Change the speeds of the wheels toward those that their motors demand."""
-        w0, w1, w2 = self._wheels
-        d0 = w0.demand(step_s) - w0.speed_rad_s
-        d1 = w1.demand(step_s) - w1.speed_rad_s
-        d2 = w2.demand(step_s) - w2.speed_rad_s
-        vx, vy, omega = twist(d0, d1, d2)
-        steps = max(
-            abs(vx) / (ACCELERATIONS[0] * step_s),
-            abs(vy) / (ACCELERATIONS[1] * step_s),
-            abs(omega) / (ACCELERATIONS[2] * step_s),
-        )
-        if steps > 1.0:
-            d0, d1, d2 = d0 / steps, d1 / steps, d2 / steps
-            w0.speed_rad_s += d0
-            w1.speed_rad_s += d1
-            w2.speed_rad_s += d2
-        else:
-            w0.speed_rad_s, w1.speed_rad_s, w2.speed_rad_s = (w.demand(step_s) for w in self._wheels)
-        for wheel in self._wheels:
+        wheels = self._wheels
+        demands = [wheel.demand(step_s) for wheel in wheels]
+        changes = [demand - wheel.speed_rad_s for demand, wheel in zip(demands, wheels, strict=True)]
+        twist = law.twist(changes)
+        steps = max(abs(part) / (limit * step_s) for part, limit in zip(twist, ACCELERATIONS, strict=True))
+        for wheel, demand, change in zip(wheels, demands, changes, strict=True):
+            wheel.speed_rad_s = demand if steps <= 1.0 else wheel.speed_rad_s + change / steps
             wheel.changed = not wheel.steady
-        self._vx, self._vy, self._omega = twist(w0.speed_rad_s, w1.speed_rad_s, w2.speed_rad_s)
+        self._vx, self._vy, self._omega = law.twist([wheel.speed_rad_s for wheel in wheels])
         self._step_s = step_s
 
     def _move(self, step_s: float) -> None:
@@ -182,7 +181,7 @@ class Body(Disc):
         dy = (self._vx * s + self._vy * c) * step_s
         x = self.x
         y = self.y
-        strides = 1 + int((abs(dx) + abs(dy)) / (_STRIDE * self.radius)) if self.radius else 1
+        strides = 1 + int((abs(dx) + abs(dy)) / self._stride_m) if self._stride_m else 1
         for _ in range(strides):
             self.x += dx / strides
             self.y += dy / strides
@@ -203,21 +202,53 @@ class Body(Disc):
         for _ in range(_PASSES):
             clear = True
             for solid in self._solids.near(self.x, self.y):
-                contact = solid.contact(self.x, self.y, self.radius)
-                if contact is not None:
-                    self._leave(contact)
-                    clear = False
+                clear = self._leave(solid) and clear
             for other in self._others:
-                contact = other.contact(self.x, self.y, self.radius)
-                if contact is not None:
-                    self._leave(contact)
-                    other.touched = other.touched or contact[2] > _RESTING_M
-                    clear = False
+                clear = self._leave(other) and clear
             if clear:
                 return
 
-    def _leave(self, contact: tuple[float, float, float]) -> None:
-        self.x += contact[0] * contact[2]
-        self.y += contact[1] * contact[2]
-        if contact[2] > _RESTING_M:
-            self.touched = True
+    def _leave(self, obstacle: Obstacle) -> bool:
+        """Push the robot out of one obstacle; return whether it was clear of it."""
+        clear = True
+        bit = 1
+        for along, aside, radius in self._parts:
+            x = self.x + along * self.c - aside * self.s
+            y = self.y + along * self.s + aside * self.c
+            contact = obstacle.contact(x, y, radius)
+            if contact is not None:
+                clear = False
+                self.x += contact[0] * contact[2]
+                self.y += contact[1] * contact[2]
+                if contact[2] > _RESTING_M:
+                    self.touched |= bit
+                    if isinstance(obstacle, Body):
+                        obstacle.feel(x, y, radius)
+            bit <<= 1
+        return clear
+
+    def feel(self, x: float, y: float, radius: float) -> None:
+        """Note which parts a round robot at x, y touches."""
+        for index, disc in enumerate(self._discs()):
+            contact = disc.contact(x, y, radius)
+            if contact is not None and contact[2] > _RESTING_M:
+                self.touched |= 1 << index
+
+    def _discs(self) -> list[Disc]:
+        """Return the parts where they are now."""
+        return [
+            Disc(self.x + along * self.c - aside * self.s, self.y + along * self.s + aside * self.c, radius)
+            for along, aside, radius in self._parts
+        ]
+
+
+def box_parts(x: float, y: float, heading_rad: float, length: float, width: float) -> list[Part]:
+    """Return cylinders that cover a box from end to end; only its corners are rounded."""
+    if width > length:
+        length, width, heading_rad = width, length, heading_rad + math.pi / 2.0
+    radius = width / 2.0
+    row = length - width  # from the first axis to the last
+    gaps = math.ceil(min(row / radius, _MOST_GAPS)) if radius else 0
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    offsets = [row * (index / gaps - 0.5) for index in range(gaps + 1)] if gaps else [0.0]
+    return [(x + offset * c, y + offset * s, radius) for offset in offsets]

@@ -92,6 +92,15 @@ def from_axis_angle(rotation: AxisAngle) -> Matrix:
     )
 
 
+def to_axis_angle(m: Matrix) -> AxisAngle:
+    """Return axis and angle in [0, pi] of a rotation; of no rotation, the z axis."""
+    x, y, z, w = to_quaternion(m)
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return 0.0, 0.0, 1.0, 0.0
+    return x / length, y / length, z / length, 2.0 * math.atan2(length, w)
+
+
 def to_quaternion(m: Matrix) -> Quaternion:
     """Return the unit quaternion of a rotation, with w >= 0."""
     trace = m[0] + m[4] + m[8]

@@ -1,4 +1,4 @@
-"""Motors, and the angles of their shafts.
+"""Motors, and the positions of their shafts: angles of rotational ones, lengths of linear ones.
 
 A motor has the commands of Webots: a target position and a velocity. With a target of infinity it turns at
 that velocity; with a finite one it turns to the target, at most at that velocity. An invalid command is
@@ -8,7 +8,7 @@ ignored without an error, because the ROS interface always answers success.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 # The P of controlPID, whose default is 10 0 0. Source: Webots reference, Motor.
@@ -19,7 +19,9 @@ POSITION_GAIN: Final = 10.0
 class MotorSpec:
     """A motor as the world describes it. Angles in rad, velocities in rad/s, torque in N m.
 
-    `acceleration_rad_s2` of -1 is unlimited; equal `min_rad` and `max_rad` mean no limits.
+    Of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited; equal `min_rad` and `max_rad` mean
+    no limits of commands, equal `stops` no stops of the joint, which the shaft never passes. `start_rad` is
+    the position in the world file.
     """
 
     name: str
@@ -29,11 +31,15 @@ class MotorSpec:
     max_rad: float = 0.0
     max_torque_nm: float = 10.0
     multiplier: float = 1.0
+    start_rad: float = 0.0
+    stops: tuple[float, float] = (0.0, 0.0)
     model: str = ""
 
 
 class Motor:
     """One motor: its commands, and the speed of its shaft.
+
+    The names are those of a rotational motor; the angles of a linear one are lengths in meters.
 
     Attributes:
         speed_rad_s: of the shaft.
@@ -69,14 +75,19 @@ class Motor:
         """The node's `model`."""
         return self.spec.model
 
+    def join(self, start_rad: float, stops: tuple[float, float]) -> None:
+        """Put the motor on a joint: its position in the world file, and the stops that it never passes."""
+        self.spec = replace(self.spec, start_rad=start_rad, stops=stops)
+        self.reset()
+
     def reset(self) -> None:
-        """Return to the state of a new world: position control, at zero, as fast as allowed."""
-        self.target_rad = 0.0
+        """Return to the state of a new world: position control, at the start, as fast as allowed."""
+        self.target_rad = self.spec.start_rad
         self.velocity_rad_s = self.spec.max_velocity_rad_s
         self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
         self.available_torque_nm = self.spec.max_torque_nm
         self.speed_rad_s = 0.0
-        self.angle_rad = 0.0
+        self.angle_rad = self.spec.start_rad
         self.changed = True
 
     def set_position(self, target_rad: float) -> None:
@@ -125,6 +136,15 @@ class Motor:
             return wanted
         change = self.acceleration_rad_s2 * step_s
         return max(self.speed_rad_s - change, min(self.speed_rad_s + change, wanted))
+
+    def advance(self, step_s: float) -> None:
+        """Turn the shaft for `step_s` seconds, as far as the stops of its joint."""
+        self.speed_rad_s = self.demand(step_s)
+        self.angle_rad += self.speed_rad_s * step_s
+        low, high = self.spec.stops
+        if low != high and not low <= self.angle_rad <= high:
+            self.angle_rad = max(low, min(high, self.angle_rad))
+            self.speed_rad_s = 0.0
 
     @property
     def steady(self) -> bool:

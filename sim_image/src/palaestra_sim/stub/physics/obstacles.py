@@ -88,11 +88,12 @@ class Disc:
 class Block:
     """A box with any heading: a wall, a crate."""
 
-    __slots__ = ("c", "half_x", "half_y", "s", "x", "y")
+    __slots__ = ("c", "half_x", "half_y", "heading_rad", "s", "x", "y")
 
     def __init__(self, x: float, y: float, heading_rad: float, size: tuple[float, float]) -> None:
         self.x = x
         self.y = y
+        self.heading_rad = heading_rad
         self.c = math.cos(heading_rad)
         self.s = math.sin(heading_rad)
         self.half_x = size[0] / 2.0

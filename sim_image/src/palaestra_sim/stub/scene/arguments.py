@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.reading import Reading
-from palaestra_sim.world import Node
 
 # They let the controller step by itself or hand the motors to others, which the stub does not do.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
@@ -27,7 +27,7 @@ class Arguments:
     auto_publish: bool = False
 
 
-def read_arguments(reading: Reading, node: Node) -> Arguments:
+def read_arguments(reading: Reading, node: SceneNode) -> Arguments:
     """Return the arguments of a robot whose controller is "ros".
 
     Refused: without `--name` two robots collide, without `--synchronize` no client controls the steps.
@@ -41,6 +41,6 @@ def read_arguments(reading: Reading, node: Node) -> Arguments:
         reading.refuse(node, fact, "add it")
     for text in texts:
         if text in _REFUSED:
-            reading.refuse(node, f"the stub knows no {text}")
+            reading.lacks(node, f"the stub knows no {text}")
     name = names[-1] if names else ""
     return Arguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)

@@ -6,14 +6,17 @@ other node that would act in Webots, such as a PROTO or a loose crate, is refuse
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
-from palaestra_sim.stub.scene.reading import Reading
+from palaestra_sim.stub.scene.reading import ELSEWHERE, LeaveOut, Reading
 from palaestra_sim.stub.scene.robot_reader import RobotParts, read_robot
 from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
-from palaestra_sim.world import Node, World
+from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 
 # Visible to people and cameras only, or read elsewhere (WorldInfo).
 DRAWN_ONLY: Final = frozenset(
@@ -44,33 +47,34 @@ class Scene:
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
         robots: in the order of the world file.
-        places: the frame of every node that has one, by the first byte of the node.
+        left_out: what the stub lacks and the user left out, each with its place.
     """
 
     basic_step_ms: int = 32
     random_seed: int = 0
     solids: list[Shape] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
-    places: dict[int, Place] = field(default_factory=dict)
+    left_out: tuple[WorldError, ...] = ()
 
 
-def read_scene(world: World, name: str = "world") -> Scene:
-    """Return the contents of a world.
+def read_scene(tree: SceneTree, leave_out: LeaveOut | None = None) -> Scene:
+    """Return the contents of a world, and give its nodes their places.
 
     Raises:
         WorldError: it has things that the stub cannot simulate; the error has all of them.
     """
-    reading = Reading(world, name)
+    reading = Reading(tree.refused, leave_out)
     scene = Scene()
-    for node in reading.resolved(world.nodes):
+    for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
             _read_world_info(reading, node, scene)
         _read(reading, node, None, scene)
     reading.conclude()
+    scene.left_out = tuple(reading.left_out)
     return scene
 
 
-def _read_world_info(reading: Reading, node: Node, scene: Scene) -> None:
+def _read_world_info(reading: Reading, node: SceneNode, scene: Scene) -> None:
     step_ms = reading.number(node, "basicTimeStep", 32.0)
     if step_ms < 1.0 or step_ms != int(step_ms):
         fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
@@ -79,34 +83,44 @@ def _read_world_info(reading: Reading, node: Node, scene: Scene) -> None:
     scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
 
 
-def _read(reading: Reading, node: Node, parent: Place | None, scene: Scene) -> None:
+def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
     kind = node.type_name
     if kind in DRAWN_ONLY:
         return
-    if kind == "Group":
+    if kind in {"Group", "Slot"}:
         _read_children(reading, node, parent, scene)
     elif kind == "Robot":
-        scene.robots.append(read_robot(reading, node, parent, scene.places))
+        robot = read_robot(reading, node, parent)
+        scene.robots.append(robot)
+        _stand(reading, robot.standing, scene)
     elif kind in _FRAMES:
         place = Place(parent, reading.translation(node), reading.rotation(node))
-        scene.places[node.span[0]] = place
+        node.place = place
         if kind == "Solid":
             _read_solid(reading, node, place, scene)
         _read_children(reading, node, place, scene)
     else:
-        reading.refuse(node, f"the stub simulates no {kind}")
+        reading.lacks(node, f"the stub simulates no {node.proto_name or kind}")
 
 
-def _read_children(reading: Reading, node: Node, parent: Place | None, scene: Scene) -> None:
-    for child in reading.children(node):
+def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+    for child in node.nodes():
         _read(reading, child, parent, scene)
 
 
-def _read_solid(reading: Reading, node: Node, place: Place, scene: Scene) -> None:
+def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -> None:
     if node.nodes("physics"):
         fact = "a Solid with physics moves when it is pushed, which the stub does not simulate"
-        reading.refuse(node, fact, "remove physics, or run this world with driver webots")
-    for shape in bounding_shapes(reading, node, place):
+        reading.lacks(node, fact, f"remove physics, {ELSEWHERE}")
+    shapes = list(bounding_shapes(reading, node, place))
+    if not node.left_out:
+        _stand(reading, shapes, scene)
+
+
+def _stand(reading: Reading, shapes: Iterable[Shape], scene: Scene) -> None:
+    """Make obstacles of shapes that stand or lie."""
+    for shape in shapes:
         if not shape.upright:
-            reading.refuse(shape.node, f"a {shape.node.type_name} that does not stand upright")
-        scene.solids.append(shape)
+            reading.lacks(shape.node, f"a {shape.node.type_name} that neither stands nor lies")
+        if not shape.node.left_out:
+            scene.solids.append(shape)

@@ -1,39 +1,71 @@
-"""Reading a scene: `USE` resolved, numbers checked, and errors with their place.
+"""Reading a scene: numbers checked, and what cannot be simulated, with its place.
 
-The stub refuses what it cannot simulate, by line and column, rather than simulate something else. A refusal
-is noted, and the reading goes on: `conclude` raises one error for all of them.
+Two things can be wrong. A *mistake* of the author, such as a number that is a string, is always refused.
+What the stub *lacks*, Webots would simulate: it is refused too, by line and column, unless the user leaves
+out nodes of that type. Either way the reading goes on: `conclude` raises one error for everything that was
+refused.
 """
 
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final
 
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.stub.physics.geometry import AxisAngle, Pose, Vector, from_axis_angle
-from palaestra_sim.world import Node, World
-from palaestra_sim.world.source import Source
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 
-ELSEWHERE: Final = "remove it, or run this world with driver webots"
+ELSEWHERE: Final = "leave it out (--leave-out), or run this world with driver webots"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeaveOut:
+    """Which nodes the user leaves out, if they cannot be simulated.
+
+    Attributes:
+        types: of the nodes, as written in the world.
+        everything: whether the type does not matter.
+    """
+
+    types: frozenset[str] = frozenset()
+    everything: bool = False
+
+    def covers(self, node: SceneNode) -> bool:
+        """Return whether a node that cannot be simulated is left out."""
+        return self.everything or node.type_name in self.types or node.proto_name in self.types
 
 
 class Reading:
-    """A world that is being read: it finds `DEF`s, reads numbers, and collects errors."""
+    """The nodes of a world while they are read: their numbers, and the errors in them.
 
-    def __init__(self, world: World, name: str) -> None:
-        self.world = world
-        self._source = Source(data=world.source, name=name)
-        self._refused: list[WorldError] = []
-        self._defs: dict[str, list[Node]] = {}
-        for node in world.walk():
-            if node.def_name is not None:
-                self._defs.setdefault(node.def_name, []).append(node)
+    Args:
+        refused: mistakes that are known already.
+        leave_out: what the user leaves out.
 
-    def refuse(self, node: Node, fact: str, remedy: str = ELSEWHERE) -> None:
-        """Record that `node` cannot be simulated."""
-        self._refused.append(self._source.error(node.span[0], fact, remedy))
+    Attributes:
+        left_out: the nodes that were left out, each with its place and the reason.
+    """
+
+    def __init__(self, refused: Iterable[WorldError] = (), leave_out: LeaveOut | None = None) -> None:
+        self._refused: list[WorldError] = list(refused)
+        self._leave_out = leave_out or LeaveOut()
+        self.left_out: list[WorldError] = []
+
+    def refuse(self, node: SceneNode, fact: str, remedy: str) -> None:
+        """Record a mistake in `node`."""
+        if node.origin is not None:
+            self._refused.append(node.origin.error(fact, remedy))
+
+    def lacks(self, node: SceneNode, fact: str, remedy: str = ELSEWHERE) -> None:
+        """Record that `node` cannot be simulated; if the user leaves out its type, it is marked so."""
+        if not self._leave_out.covers(node):
+            self.refuse(node, fact, remedy)
+            return
+        node.left_out = True
+        if node.origin is not None:
+            self.left_out.append(node.origin.error(fact, "left out"))
 
     def conclude(self) -> None:
         """Return if nothing was refused.
@@ -44,35 +76,7 @@ class Reading:
         if error := refusal(self._refused):
             raise error
 
-    def resolve(self, node: Node) -> Node:
-        """Return the node itself, or the one that it `USE`s: the last of that name before it.
-
-        Raises:
-            WorldError: no node of that name stands before it.
-        """
-        if node.uses is None:
-            return node
-        named = self._defs.get(node.uses, [])
-        before = bisect_right([it.span[0] for it in named], node.span[0])
-        if before == 0:
-            raise self._source.error(node.span[0], f"USE {node.uses} has no DEF before it", "define it first")
-        return named[before - 1]
-
-    def children(self, node: Node, field: str = "children") -> tuple[Node, ...]:
-        """Return the nodes of a field, each `USE` resolved as in `resolved`."""
-        return self.resolved(node.nodes(field))
-
-    def resolved(self, nodes: Iterable[Node]) -> tuple[Node, ...]:
-        """Return `nodes` with each `USE` resolved; one whose `DEF` is missing is refused and left out."""
-        found = []
-        for node in nodes:
-            try:
-                found.append(self.resolve(node))
-            except WorldError as error:
-                self._refused.append(error)
-        return tuple(found)
-
-    def vector(self, node: Node, field: str, default: tuple[float, ...]) -> tuple[float, ...]:
+    def vector(self, node: SceneNode, field: str, default: tuple[float, ...]) -> tuple[float, ...]:
         """Return as many finite numbers as `default` has; `default` if the field is refused."""
         if field not in node.fields:
             return default
@@ -83,20 +87,20 @@ class Reading:
             return default
         return numbers
 
-    def number(self, node: Node, field: str, default: float) -> float:
+    def number(self, node: SceneNode, field: str, default: float) -> float:
         """Return the number of a field; `default` if the field is refused."""
         return self.vector(node, field, (default,))[0]
 
-    def translation(self, node: Node) -> Vector:
+    def translation(self, node: SceneNode) -> Vector:
         """Return `translation` in meters."""
         x, y, z = self.vector(node, "translation", (0.0, 0.0, 0.0))
         return x, y, z
 
-    def rotation(self, node: Node) -> AxisAngle:
+    def rotation(self, node: SceneNode) -> AxisAngle:
         """Return `rotation`, axis and angle."""
         x, y, z, angle_rad = self.vector(node, "rotation", (0.0, 0.0, 1.0, 0.0))
         return x, y, z, angle_rad
 
-    def pose(self, node: Node) -> Pose:
+    def pose(self, node: SceneNode) -> Pose:
         """Return the frame of a node in the frame around it."""
         return Pose(self.translation(node), from_axis_angle(self.rotation(node)))

@@ -19,6 +19,7 @@ from palaestra_sim.stub.physics.obstacles import Neighborhood, Ray
 from palaestra_sim.stub.physics.rays import Fan
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.devices.kind import Sample, Source
+from palaestra_sim.stub.scene.nodes.scene_node import FieldContent
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.robot_reader import RobotParts
 from palaestra_sim.stub.scene.shapes import Shape
@@ -35,7 +36,6 @@ class Robot:
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
         body: None for a robot that only watches.
-        custom_data: the customData field, as it stands now.
     """
 
     def __init__(self, parts: RobotParts, random_seed: int) -> None:
@@ -45,7 +45,6 @@ class Robot:
         self.sensors: Mapping[str, Source] = parts.devices.sensors
         self.place: Place = parts.place
         self.body: Body | None = parts.body
-        self.custom_data = parts.node.text("customData") or ""
         self.seed = random_seed
         self._random = random.Random()  # noqa: S311 - noise, not secrets
         self.gauss = self._random.gauss
@@ -59,6 +58,15 @@ class Robot:
             it for it in self.motors.values() if self.body is None or not self.body.driven_by(it)
         )
         self.sow()
+
+    @property
+    def custom_data(self) -> str:
+        """The customData field, as it is now."""
+        return self.parts.node.text("customData") or ""
+
+    @custom_data.setter
+    def custom_data(self, text: str) -> None:
+        self.parts.node.fields["customData"] = FieldContent([text])
 
     def face(self, solids: Sequence[Shape], others: Sequence[Robot]) -> None:
         """Set the obstacles of this robot and its rays."""
@@ -79,13 +87,16 @@ class Robot:
         cast, frame = fan.cast, self._frame
         return lambda: cast(frame())
 
+    def touching(self, outline: Sequence[Shape]) -> int:
+        """Return the parts of the body that these shapes are, as bits of `Body.touched`."""
+        return sum(1 << index for index, shape in enumerate(self.parts.rim) if shape in outline)
+
     def advance(self, step_s: float) -> None:
         """Move on by one basic step."""
         if self.body is not None:
             self.body.advance(step_s)
         for motor in self._stray_motors:
-            motor.speed_rad_s = motor.demand(step_s)
-            motor.angle_rad += motor.speed_rad_s * step_s
+            motor.advance(step_s)
 
     def reset(self) -> None:
         """Return to the start of the world file: pose, rest, motors, noise. customData stays."""

@@ -1,38 +1,43 @@
-"""Read a Robot node: its body and its devices.
+"""Read a Robot node: its outline, its joints, its wheels, and its devices.
 
-A robot with a boundingObject is round and has three omnidirectional wheels, whose motors have the names of
-the Robotino 3; a robot without one is a supervisor that only watches. Its outline for collisions is the
-widest cylinder, body or bumper. In Webots too, a bumper without physics of its own is part of the robot.
-
-Joints turn their motors' shafts but move nothing. So only a wheel, which touches only the floor, or a part
-that is only drawn may be on a joint; a sensor or an outline that would have to move is refused.
+A wheel is found by its geometry: a driven hinge with a level axle, whose round end has its center on the
+axle and reaches the floor. The wheels together are the drive (`physics.drive`). Everything else on a joint
+moves with it, but touches nothing. A robot without an outline and without wheels only watches.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final
 
-from palaestra_sim.stub.physics.body import WHEELS, Body
+from palaestra_sim.stub.physics.body import Body, box_parts
+from palaestra_sim.stub.physics.body import Part as BodyPart
+from palaestra_sim.stub.physics.drive import Wheel, find_drive
+from palaestra_sim.stub.physics.geometry import Vector, turn
 from palaestra_sim.stub.physics.motors import Motor
+from palaestra_sim.stub.physics.obstacles import Disc
 from palaestra_sim.stub.scene.arguments import Arguments, read_arguments
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.devices.kind import Devices, Kind, Part
+from palaestra_sim.stub.scene.joints import Joint, JointPlace, unit
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place, RobotPlace
 from palaestra_sim.stub.scene.reading import Reading
 from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
-from palaestra_sim.world import Node
 
-_CENTRED_M: Final = 1e-3
-_INERT: Final = frozenset(("Shape", "DirectionalLight", "PointLight", "SpotLight"))
+_INERT: Final = frozenset(("Shape", "CadShape", "DirectionalLight", "PointLight", "SpotLight", "Slot"))
 _MOUNTED: Final = {name: kind for name, kind in DEVICES.items() if not kind.on_joint}
 _ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joint}
+_MOTORS: Final = frozenset(("RotationalMotor", "LinearMotor"))
 _FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid"}
-_FIXED_REMEDY: Final = "fix it to the robot, or run this world with driver webots"
+_JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
+_LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 
-Joint = Literal["wheel", "other"]  # the kind of joint of a part
+_LEVEL: Final = 1e-3  # sine of the largest angle of a level axle to the floor
+_OFF_CENTER: Final = 0.2  # of a wheel's radius: how far its center may be off the axle, its rim off the floor
+_STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -41,76 +46,126 @@ class RobotParts:
 
     Attributes:
         body: None if nothing can collide with it.
+        rim: for each part of the body, the shape that it is of.
         heights: z of the lower and upper end of the body, in the robot's frame.
+        standing: the outline of a robot that cannot move and does not stand upright on the floor.
         arguments: its controllerArgs; None when its controller is not "ros".
     """
 
-    node: Node
+    node: SceneNode
     name: str
     place: Place
     devices: Devices
     body: Body | None
+    rim: tuple[Shape, ...] = ()
     heights: tuple[float, float] = (0.0, 0.0)
+    standing: tuple[Shape, ...] = ()
     arguments: Arguments | None = None
 
 
-def read_robot(reading: Reading, node: Node, parent: Place | None, places: dict[int, Place]) -> RobotParts:
-    """Return the robot at `node`, and add the frames of its parts to `places`."""
-    return _RobotReader(reading, node, parent, places).read()
+def read_robot(reading: Reading, node: SceneNode, parent: Place | None) -> RobotParts:
+    """Return the robot at `node`, and give it and its parts their places."""
+    return _RobotReader(reading, node, parent).read()
+
+
+@dataclass(slots=True, kw_only=True)
+class _Driven:
+    """A hinge with a motor, which may be a wheel: the round end, in the robot's frame."""
+
+    motor: Motor
+    axle: Vector
+    anchor: Vector
+    shape: Shape
+    roller: Vector | None
+
+    @property
+    def bottom(self) -> float:
+        return self.shape.pose.position[2] - self.radius
+
+    @property
+    def radius(self) -> float:
+        return self.shape.size[0] / 2.0
+
+    def turns_about_its_center(self) -> bool:
+        center = self.shape.pose.position
+        offset = (center[0] - self.anchor[0], center[1] - self.anchor[1], center[2] - self.anchor[2])
+        along = sum(a * b for a, b in zip(offset, self.axle, strict=True))
+        square = sum(part * part for part in offset) - along * along
+        return math.sqrt(max(0.0, square)) <= _OFF_CENTER * self.radius
+
+    def wheel(self) -> Wheel:
+        x, y, _ = self.shape.pose.position
+        return Wheel(
+            x_m=x,
+            y_m=y,
+            axle=_level(self.axle),
+            radius_m=self.radius,
+            roller=None if self.roller is None else _level(self.roller),
+        )
 
 
 class _RobotReader:
-    def __init__(self, reading: Reading, node: Node, parent: Place | None, places: dict[int, Place]) -> None:
+    def __init__(self, reading: Reading, node: SceneNode, parent: Place | None) -> None:
         self._reading = reading
         self._node = node
         self._parent = parent
-        self._places = places
+        self._by_ros = node.text("controller") == "ros"
         self._devices = Devices()
         # Where the robot stands does not matter to its parts: they are read in its own frame.
         self._frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
-        self._outline: list[Shape] = []
-        self._parts: list[tuple[Node, Place]] = []
+        self._outline: list[Shape] = []  # of what is fixed to the robot
+        self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
+        self._driven: list[_Driven] = []
+        self._parts: list[tuple[SceneNode, Place]] = []
 
     def read(self) -> RobotParts:
         """Return the robot."""
         reading, node = self._reading, self._node
-        if "battery" in node.fields and node.fields["battery"].items:
-            reading.refuse(node, "a Robot with a battery, which would never run down", "remove battery")
-        shapes = self._outline
-        shapes += bounding_shapes(reading, node, self._frame)
+        if node.numbers("battery"):
+            self._lacks(node, "a Robot with a battery, which would never run down")
+        self._outline += bounding_shapes(reading, node, self._frame)
         self._read_children(node, self._frame)
-        body = self._body(shapes)
+        wheels = self._wheels()
+        drive = find_drive([found.wheel() for found in wheels])
+        shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
+        moves = drive is not None or self._stands_free(shapes)
+        parts = _covering(shapes) if moves else []
+        body = Body([part for part, _ in parts], [it.motor for it in wheels], drive) if moves else None
         place = self._place(body)
-        self._places[node.span[0]] = place
-        for part, part_place in self._parts:
-            if part_place.parent is self._frame:
-                part_place.parent = place
-            self._places[part.span[0]] = part_place
+        self._settle(place)
         return RobotParts(
             node=node,
             name=node.text("name") or "robot",
             place=place,
             devices=self._devices,
             body=body,
-            heights=_span([z for shape in shapes for z in shape.heights()]),
-            arguments=read_arguments(reading, node) if node.text("controller") == "ros" else None,
+            rim=tuple(shape for _, shape in parts),
+            heights=self._heights(wheels),
+            standing=() if moves else tuple(shapes),
+            arguments=read_arguments(reading, node) if self._by_ros else None,
         )
 
-    def _body(self, shapes: list[Shape]) -> Body | None:
-        for shape in shapes:
-            x, y, _ = shape.pose.position
-            if shape.kind != "cylinder" or not shape.upright or math.hypot(x, y) > _CENTRED_M:
-                fact = "the stub's robots are upright cylinders, centered on the robot's origin"
-                self._reading.refuse(shape.node, fact)
-        motors = self._devices.motors
-        wheels = [motors[name] for name in WHEELS if name in motors]
-        if not shapes and not wheels:
-            return None
-        if motors and len(wheels) < len(WHEELS):
-            fact = f"the motors {_listed(motors)} drive nothing: the stub's robots drive by {_listed(WHEELS)}"
-            self._reading.refuse(self._node, fact, "name its wheels so, or run this world with driver webots")
-        radius_m = max((shape.size[0] / 2.0 for shape in shapes), default=0.0)
-        return Body(radius_m, wheels if len(wheels) == len(WHEELS) else ())
+    def _stands_free(self, shapes: Sequence[Shape]) -> bool:
+        """Return whether a robot without a drive has a body: upright, at the top of the world."""
+        upright = self._reading.pose(self._node).upright
+        return bool(shapes) and self._parent is None and upright
+
+    def _wheels(self) -> list[_Driven]:
+        """Return the driven hinges that are wheels: round about a level axle, and down to the floor."""
+        round_ones = [
+            found
+            for found in self._driven
+            if abs(found.axle[2]) < _LEVEL and found.radius > 0.0 and found.turns_about_its_center()
+        ]
+        floor = min((found.bottom for found in round_ones), default=0.0)
+        return [found for found in round_ones if found.bottom <= floor + _OFF_CENTER * found.radius]
+
+    def _heights(self, wheels: Sequence[_Driven]) -> tuple[float, float]:
+        ends = [z for shape in self._outline for z in shape.heights()]
+        if not ends:
+            return 0.0, max((found.bottom + 2.0 * found.radius for found in wheels), default=0.0)
+        floor = min((found.bottom for found in wheels), default=min(ends) - _STEP_M)
+        return max(min(ends), floor + _STEP_M), max(ends)
 
     def _place(self, body: Body | None) -> Place:
         reading, node = self._reading, self._node
@@ -118,87 +173,202 @@ class _RobotReader:
         if body is None:
             return Place(self._parent, translation, rotation)
         if self._parent is not None:
-            reading.refuse(node, "a robot inside another node", "put it at the top level")
+            self._lacks(node, "a robot that drives inside another node")
         if not reading.pose(node).upright:
-            reading.refuse(node, "a robot that does not stand upright", "turn it about z only")
+            self._lacks(node, "a robot that drives, but does not stand upright")
         return RobotPlace(translation, rotation, body)
 
-    def _read_children(self, node: Node, place: Place, joint: Joint | None = None) -> None:
-        for child in self._reading.children(node):
-            self._read_part(child, place, joint)
+    def _settle(self, place: Place) -> None:
+        """Put the parts, read in a frame of their own, on the robot."""
+        self._node.place = place
+        for part, part_place in self._parts:
+            if part_place.parent is self._frame:
+                part_place.parent = place
+            part.place = part_place
 
-    def _read_part(self, node: Node, place: Place, joint: Joint | None) -> None:
+    def _lacks(self, node: SceneNode, fact: str) -> None:
+        """Note what cannot be simulated; on a robot that no client can reach, it does not matter."""
+        if self._by_ros:
+            self._reading.lacks(node, fact)
+        else:
+            node.left_out = True
+
+    def _read_children(self, node: SceneNode, place: Place) -> None:
+        for child in (*node.nodes(), *node.nodes("endPoint")):
+            self._read_part(child, place)
+
+    def _read_part(self, node: SceneNode, place: Place) -> None:
         kind = node.type_name
-        if kind == "HingeJoint":
-            self._read_joint(node, place, joint)
-        elif kind == "Group":
-            self._read_children(node, place, joint)
-        elif joint is not None and kind in _MOUNTED:
-            self._reading.refuse(node, f"a {kind} on a joint, with which it would move", _FIXED_REMEDY)
+        if kind in _JOINTS:
+            self._read_joint(node, place)
+        elif kind in _LOOSE_JOINTS:
+            self._read_loose_joint(node, place)
+        elif kind in {"Group", "Slot"}:
+            self._read_children(node, place)
         elif kind in _FRAMES:
-            self._read_frame(node, place, joint)
+            self._read_frame(
+                node, Place(place, self._reading.translation(node), self._reading.rotation(node))
+            )
         elif kind not in _INERT:
-            self._reading.refuse(node, f"the stub simulates no {kind} on a robot")
+            self._lacks(node, f"the stub simulates no {node.proto_name or kind} on a robot")
 
-    def _read_frame(self, node: Node, place: Place, joint: Joint | None) -> None:
-        kind = node.type_name
-        if joint == "other" and node.nodes("boundingObject"):
-            fact = f"a {kind} with a boundingObject on a joint, with which it would move"
-            self._reading.refuse(node, fact, _FIXED_REMEDY)
-        inner = Place(place, self._reading.translation(node), self._reading.rotation(node))
-        self._parts.append((node, inner))
-        if kind in _MOUNTED:
-            self._read_device(_MOUNTED[kind], node, inner)
-        self._read_children(node, inner, joint)
+    def _read_frame(self, node: SceneNode, place: Place) -> None:
+        self._parts.append((node, place))
+        if node.type_name in _MOUNTED:
+            self._read_device(_MOUNTED[node.type_name], node, place)
+        elif node.type_name == "Solid" and not _moves(place):
+            self._outline += bounding_shapes(self._reading, node, place)
+        self._read_children(node, place)
 
-    def _read_joint(self, node: Node, place: Place, joint: Joint | None) -> None:
-        """Take the motor and the sensor of a joint; its shaft turns, and what hangs on it stays."""
-        if joint is not None and node.nodes("device"):
-            self._reading.refuse(node, "a HingeJoint with devices on another joint", _FIXED_REMEDY)
-        self._refuse_stops(node)
-        devices = self._reading.children(node, "device")
+    def _read_joint(self, node: SceneNode, place: Place) -> None:
+        """Take the motor and the sensor of a joint, and what is on it."""
+        reading = self._reading
+        slides = node.type_name == "SliderJoint"
+        parameters = next(iter(node.nodes("jointParameters")), node)
+        axis = unit(
+            _triple(reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0)))
+        )
+        if axis is None:
+            reading.refuse(parameters, "a joint with an axis of length 0", "write its direction")
+            return
+        joint = Joint(
+            axis=axis,
+            anchor=_triple(reading.vector(parameters, "anchor", (0.0, 0.0, 0.0))),
+            slides=slides,
+            start=reading.number(parameters, "position", 0.0),
+        )
+        joint.motor = self._read_devices_of(node, parameters, place, joint)
+        for end in node.nodes("endPoint"):
+            if end.type_name == "Slot":
+                self._read_children(end, place)
+            elif end.type_name in _FRAMES:
+                self._read_end(end, place, joint)
+
+    def _read_end(self, end: SceneNode, place: Place, joint: Joint) -> None:
+        reading = self._reading
+        inner = JointPlace(place, reading.translation(end), reading.rotation(end), joint)
+        if end.type_name == "Solid":
+            shapes = list(bounding_shapes(reading, end, inner))
+            found = self._as_driven(joint, place, shapes, end)
+            if found is not None:
+                self._driven.append(found)
+            if found is not None or joint.motor is None:
+                self._on_joints += shapes
+        self._read_frame(end, inner)
+
+    def _as_driven(
+        self, joint: Joint, place: Place, shapes: Sequence[Shape], end: SceneNode
+    ) -> _Driven | None:
+        round_ones = [shape for shape in shapes if shape.kind != "box"]
+        if joint.motor is None or joint.slides or not round_ones or _moves(place):
+            return None
+        frame = place.world_pose
+        return _Driven(
+            motor=joint.motor,
+            axle=turn(frame.rotation, joint.axis),
+            anchor=frame.carry(joint.anchor),
+            shape=max(round_ones, key=lambda shape: shape.size[0]),
+            roller=self._lowest_roller(end, JointPlace(place, *_where(self._reading, end), joint)),
+        )
+
+    def _lowest_roller(self, wheel: SceneNode, place: Place) -> Vector | None:
+        """Return the axis of the roller of a wheel that is on the floor; None if it has none."""
+        lowest: tuple[float, Vector] | None = None
+        for node in wheel.nodes():
+            parameters = next(iter(node.nodes("jointParameters")), None)
+            if node.type_name != "HingeJoint" or parameters is None or node.nodes("device"):
+                continue
+            axis = unit(_triple(self._reading.vector(parameters, "axis", (1.0, 0.0, 0.0))))
+            anchor = _triple(self._reading.vector(parameters, "anchor", (0.0, 0.0, 0.0)))
+            height = place.world_pose.carry(anchor)[2]
+            if axis is not None and (lowest is None or height < lowest[0]):
+                lowest = height, turn(place.world_pose.rotation, axis)
+        return None if lowest is None else lowest[1]
+
+    def _read_loose_joint(self, node: SceneNode, place: Place) -> None:
+        """Take a joint without motors, such as a caster, as fixed."""
+        if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
+            self._lacks(node, f"the stub simulates no {node.type_name} with devices")
+        for end in node.nodes("endPoint"):
+            if end.type_name in _FRAMES:
+                inner = Place(place, *_where(self._reading, end))
+                self._on_joints += bounding_shapes(self._reading, end, inner)
+                self._parts.append((end, inner))
+
+    def _read_devices_of(
+        self, node: SceneNode, parameters: SceneNode, place: Place, joint: Joint
+    ) -> Motor | None:
+        stops = [self._reading.number(parameters, name, 0.0) for name in ("minStop", "maxStop")]
         motor: Motor | None = None
         # Motors first: a sensor belongs to the motor of its joint, wherever that is in the list.
-        for device in sorted(devices, key=lambda it: it.type_name != "RotationalMotor"):
+        for device in sorted(node.nodes("device"), key=lambda device: device.type_name not in _MOTORS):
             kind = _ON_JOINTS.get(device.type_name)
             if kind is None:
-                self._reading.refuse(device, f"the stub simulates no {device.type_name}")
+                self._lacks(device, f"the stub simulates no {device.type_name}")
                 continue
             found = self._read_device(kind, device, place, motor)
-            motor = found if isinstance(found, Motor) else motor
-        wheel = joint == "wheel" or (motor is not None and motor.spec.name in WHEELS)
-        for end in self._reading.children(node, "endPoint"):
-            self._read_part(end, place, "wheel" if wheel else "other")
+            if isinstance(found, Motor) and motor is None:
+                motor = found
+                motor.join(joint.start, (stops[0], stops[1]))
+        return motor
 
-    def _refuse_stops(self, node: Node) -> None:
-        for parameters in self._reading.children(node, "jointParameters"):
-            stops = [self._reading.number(parameters, field, 0.0) for field in ("minStop", "maxStop")]
-            if stops[0] != stops[1]:
-                remedy = "remove minStop and maxStop, or run this world with driver webots"
-                self._reading.refuse(parameters, "a joint with stops, which the stub would turn past", remedy)
-
-    def _read_device(self, kind: Kind[Any], node: Node, place: Place, motor: Motor | None = None) -> object:
+    def _read_device(
+        self, kind: Kind[Any], node: SceneNode, place: Place, motor: Motor | None = None
+    ) -> object:
         """Return the device at `node`, now one of the robot's."""
         name = node.text("name") or kind.name
-        device: object = kind.read(
-            Part(
-                reading=self._reading,
-                node=node,
-                name=name,
-                place=place,
-                motor=motor,
-                outline=self._outline,
-            )
+        part = Part(
+            reading=self._reading, node=node, name=name, place=place, motor=motor, outline=self._outline
         )
-        if name in self._devices.rows:
+        device: object = kind.read(part)
+        if node.left_out:
+            return None
+        if name in self._devices.rows and self._by_ros:
             self._reading.refuse(node, f"a second device {name!r}", "give it its own name")
         self._devices.rows[name] = kind, device
+        self._devices.nodes[name] = node
         return device
 
 
-def _listed(names: Iterable[str]) -> str:
-    return ", ".join(names)
+def _covering(shapes: Iterable[Shape]) -> list[tuple[BodyPart, Shape]]:
+    """Return the cylinders of an outline with their shapes, without those inside another one."""
+    parts = [(part, shape) for shape in shapes for part in _cylinders(shape)]
+    return [
+        (part, shape)
+        for index, (part, shape) in enumerate(parts)
+        if not any(
+            _inside(part, other) and (other != part or later > index)
+            for later, (other, _) in enumerate(parts)
+            if later != index
+        )
+    ]
 
 
-def _span(values: list[float]) -> tuple[float, float]:
-    return (min(values), max(values)) if values else (0.0, 0.0)
+def _inside(inner: BodyPart, outer: BodyPart) -> bool:
+    return math.hypot(inner[0] - outer[0], inner[1] - outer[1]) + inner[2] <= outer[2]
+
+
+def _cylinders(shape: Shape) -> list[BodyPart]:
+    outline = shape.obstacle()
+    if isinstance(outline, Disc):
+        return [(outline.x, outline.y, outline.radius)]
+    return box_parts(outline.x, outline.y, outline.heading_rad, 2.0 * outline.half_x, 2.0 * outline.half_y)
+
+
+def _moves(place: Place) -> bool:
+    """Return whether a motor can move a place on its robot."""
+    return any(isinstance(it, JointPlace) and it.joint.motor is not None for it in place.chain())
+
+
+def _where(reading: Reading, node: SceneNode) -> tuple[Vector, tuple[float, float, float, float]]:
+    return reading.translation(node), reading.rotation(node)
+
+
+def _triple(numbers: tuple[float, ...]) -> Vector:
+    return numbers[0], numbers[1], numbers[2]
+
+
+def _level(vector: Vector) -> tuple[float, float]:
+    """Return the direction of a vector on the floor."""
+    length = math.hypot(vector[0], vector[1]) or 1.0
+    return vector[0] / length, vector[1] / length

@@ -1,32 +1,34 @@
 """From a boundingObject to shapes on the floor.
 
-Only what is upright has an outline that holds at every height: boxes and cylinders. A plane is floor.
+A shape has one outline, which holds from its lower to its upper end. That is exact for boxes and cylinders
+that stand or lie. Of a ball, a capsule and a mesh it is the widest outline.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from palaestra_sim.stub.physics.geometry import Pose
-from palaestra_sim.stub.physics.obstacles import Block, Disc, Obstacle
+from palaestra_sim.stub.physics.geometry import Pose, Vector
+from palaestra_sim.stub.physics.obstacles import Block, Disc
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reading import Reading
-from palaestra_sim.world import Node
 
-_UPSIDE_DOWN: Final = -1.0 + 0.5e-6
+_ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """A box or cylinder in the frame of its place. Meters: `size` is x, y, z or 2 r, 2 r, height."""
+    """A box, cylinder or ball in the frame of its place. Meters: `size` is x, y, z or 2 r, 2 r, height."""
 
-    kind: Literal["box", "cylinder"]
-    size: tuple[float, float, float]
+    kind: Literal["box", "cylinder", "ball"]
+    size: Vector
     local: Pose
     place: Place
-    node: Node
+    node: SceneNode
 
     @property
     def pose(self) -> Pose:
@@ -35,48 +37,93 @@ class Shape:
 
     @property
     def upright(self) -> bool:
-        """Whether it stands, on either end."""
-        pose = self.pose
-        return pose.upright or pose.rotation[8] < _UPSIDE_DOWN
+        """Whether one of its axes is vertical, so that it has one outline from below to above."""
+        rotation = self.pose.rotation
+        return self.kind == "ball" or any(abs(rotation[6 + axis]) > _ALONG for axis in range(3))
 
     def heights(self) -> tuple[float, float]:
         """Return z of its lower and its upper end."""
-        z = self.pose.position[2]
-        return z - self.size[2] / 2.0, z + self.size[2] / 2.0
+        pose = self.pose
+        z = pose.position[2]
+        if self.kind == "ball":
+            half = self.size[2] / 2.0
+        elif self.kind == "cylinder":
+            along = min(1.0, abs(pose.rotation[8]))
+            half = (self.size[2] * along + self.size[0] * math.sqrt(1.0 - along * along)) / 2.0
+        else:
+            half = sum(abs(pose.rotation[6 + axis]) * self.size[axis] for axis in range(3)) / 2.0
+        return z - half, z + half
 
-    def obstacle(self) -> Obstacle:
+    def obstacle(self) -> Disc | Block:
         """Return its outline, where it is now."""
         pose = self.pose
         x, y, _ = pose.position
-        if self.kind == "cylinder":
+        if self.kind == "ball" or (self.kind == "cylinder" and abs(pose.rotation[8]) > _ALONG):
             return Disc(x, y, self.size[0] / 2.0)
-        return Block(x, y, pose.heading_rad, (self.size[0], self.size[1]))
+        heading_rad, length, width = self._footprint(pose)
+        return Block(x, y, heading_rad, (length, width))
+
+    def _footprint(self, pose: Pose) -> tuple[float, float, float]:
+        """Return the heading of one of its level axes, its extent along this one, and that across."""
+        vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
+        along, across = (axis for axis in range(3) if axis != vertical)
+        heading_rad = math.atan2(pose.rotation[3 + along], pose.rotation[along])
+        return heading_rad, self.size[along], self.size[across]
 
 
-def bounding_shapes(reading: Reading, owner: Node, place: Place) -> Iterator[Shape]:
+def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
     """Yield the shapes of a node's boundingObject that the stub can simulate; the others are refused."""
-    for node in reading.children(owner, "boundingObject"):
+    for node in owner.nodes("boundingObject"):
         yield from _shapes(reading, node, place, Pose())
 
 
-def _shapes(reading: Reading, node: Node, place: Place, frame: Pose) -> Iterator[Shape]:
+def _shapes(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
     match node.type_name:
-        case "Box":
-            x, y, z = reading.vector(node, "size", (0.1, 0.1, 0.1))
-            yield Shape(kind="box", size=(x, y, z), local=frame, place=place, node=node)
-        case "Cylinder":
-            width = 2.0 * reading.number(node, "radius", 1.0)
-            size = (width, width, reading.number(node, "height", 2.0))
-            yield Shape(kind="cylinder", size=size, local=frame, place=place, node=node)
-        case "Plane":
-            if not place.world_pose.after(frame).upright:
-                reading.refuse(node, "a Plane that is no floor")
         case "Shape":
-            for inner in reading.children(node, "geometry"):
+            for inner in node.nodes("geometry"):
                 yield from _shapes(reading, inner, place, frame)
         case "Group" | "Pose" | "Transform":
             inside = frame.after(reading.pose(node))
-            for inner in reading.children(node):
+            for inner in node.nodes():
                 yield from _shapes(reading, inner, place, inside)
-        case other:
-            reading.refuse(node, f"the stub simulates no {other} as a boundingObject")
+        case "Plane":
+            if not place.world_pose.after(frame).upright:
+                reading.lacks(node, "a Plane that is no floor")
+        case "IndexedFaceSet":
+            yield from _mesh(reading, node, place, frame)
+        case _:
+            yield from _solid(reading, node, place, frame)
+
+
+def _solid(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
+    """Yield the shape of a Box, Cylinder, Capsule or Sphere."""
+    kind: Literal["box", "cylinder", "ball"] = "cylinder"
+    if node.type_name == "Box":
+        kind = "box"
+        x, y, z = reading.vector(node, "size", (0.1, 0.1, 0.1))
+    elif node.type_name == "Cylinder":
+        x = y = 2.0 * reading.number(node, "radius", 1.0)
+        z = reading.number(node, "height", 2.0)
+    elif node.type_name == "Capsule":
+        x = y = 2.0 * reading.number(node, "radius", 1.0)
+        z = reading.number(node, "height", 2.0) + x
+    elif node.type_name == "Sphere":
+        kind = "ball"
+        x = y = z = 2.0 * reading.number(node, "radius", 1.0)
+    else:
+        reading.lacks(node, f"the stub simulates no {node.type_name} as a boundingObject")
+        return
+    yield Shape(kind=kind, size=(x, y, z), local=frame, place=place, node=node)
+
+
+def _mesh(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
+    """Yield the box around the points of a mesh."""
+    points = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
+    if not points or len(points) % 3:
+        reading.refuse(node, "an IndexedFaceSet without points", "give it a Coordinate with points")
+        return
+    low = [min(points[axis::3]) for axis in range(3)]
+    high = [max(points[axis::3]) for axis in range(3)]
+    middle = ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, (low[2] + high[2]) / 2.0)
+    size = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    yield Shape(kind="box", size=size, local=frame.after(Pose(middle)), place=place, node=node)

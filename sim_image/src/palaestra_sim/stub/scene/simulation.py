@@ -16,10 +16,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 
+from palaestra_sim.stub.scene.nodes.growing import Descriptions
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reader import Scene, read_scene
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.world import World, parse
+from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
+from palaestra_sim.world import parse
 
 
 class Mode(IntEnum):
@@ -34,15 +37,15 @@ class Simulation:
     """One loaded world. A reload makes another Simulation.
 
     Attributes:
-        world: as read.
+        tree: the nodes of the world.
         robots: in the order of the world file.
         time_ms: simulated so far, back to 0 at a reset.
         mode: for the program that paces the steps; `step` itself works in all three.
         quit_status: the exit status that `quit` asked for; None before.
     """
 
-    def __init__(self, world: World, scene: Scene, mode: Mode) -> None:
-        self.world = world
+    def __init__(self, tree: SceneTree, scene: Scene, mode: Mode) -> None:
+        self.tree = tree
         self.scene = scene
         self.robots = tuple(Robot(parts, scene.random_seed) for parts in scene.robots)
         self.time_ms = 0
@@ -56,14 +59,21 @@ class Simulation:
         self._arrange()
 
     @classmethod
-    def load(cls, source: bytes, name: str = "world", mode: Mode = Mode.REAL_TIME) -> Simulation:
+    def load(
+        cls,
+        source: bytes,
+        name: str = "world",
+        mode: Mode = Mode.REAL_TIME,
+        *,
+        descriptions: Descriptions | None = None,
+    ) -> Simulation:
         """Return the simulation of a world file.
 
         Raises:
             WorldError: the file is wrong, or holds something that the stub cannot simulate.
         """
-        world = parse(source, name)
-        return cls(world, read_scene(world, name), mode)
+        tree = SceneTree(parse(source, name), name, descriptions)
+        return cls(tree, read_scene(tree), mode)
 
     @property
     def basic_step_ms(self) -> int:
@@ -120,11 +130,23 @@ class Simulation:
         """Ask for the end of the simulator."""
         self.quit_status = status
 
-    def place_of(self, first_byte: int) -> Place | None:
-        """Return the place of the node that begins at this byte of the world file; None if it has none."""
-        return self.scene.places.get(first_byte)
+    def robot_of(self, node: SceneNode) -> Robot | None:
+        """Return the robot of a Robot node; None for any other node."""
+        return next((robot for robot in self.robots if robot.parts.node is node), None)
 
-    def moved(self, place: Place) -> None:
+    def changed(self, node: SceneNode, field: str) -> None:
+        """Take the effect of a field that has a new value."""
+        if node.place is None or field not in {"translation", "rotation"}:
+            return
+        if field == "translation":
+            x, y, z = node.numbers(field) or (0.0, 0.0, 0.0)
+            node.place.translation = (x, y, z)
+        else:
+            x, y, z, angle_rad = node.numbers(field) or (0.0, 0.0, 1.0, 0.0)
+            node.place.rotation = (x, y, z, angle_rad)
+        self._moved(node.place)
+
+    def _moved(self, place: Place) -> None:
         """Update the places of the solids, if `place` is part of one of them."""
         if any(place in shape.place.chain() for shape in self.scene.solids):
             self._solids_moved = True
@@ -149,8 +171,9 @@ class Simulation:
     def _restore(self) -> None:
         self._reset_asked = False
         self.time_ms = 0
-        for place in self.scene.places.values():
-            place.return_to_start()
+        for node in self.tree.nodes:
+            if node.place is not None:
+                node.place.return_to_start()
         for robot in self.robots:
             robot.reset()
         if self._solids_moved:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from palaestra_sim.stub.scene.devices.kind import Device, Enable, Kind, Source, Topic
-from palaestra_sim.stub.scene.tree.catalogue import type_number
+from palaestra_sim.stub.scene.nodes.types import type_number
 from palaestra_sim.stub.seam import Fields, Node, Publisher, Row, Service, topic_name
 
 

@@ -12,10 +12,10 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, NamedTuple
 
+from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.physics.geometry import axis_angle_to_quaternion
 from palaestra_sim.stub.scene.tree.catalogue import FieldType
 from palaestra_sim.stub.scene.tree.fields import Field, NoValueError, quaternion_to_axis_angle
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.seam import Row, Service
 
 Fields = dict[str, Any]
@@ -59,8 +59,8 @@ _CODECS: Final = {
 class FieldServices:
     """The services of one supervisor that take a field's handle."""
 
-    def __init__(self, tree: SceneTree) -> None:
-        self._tree = tree
+    def __init__(self, handles: Handles) -> None:
+        self._handles = handles
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
@@ -86,7 +86,7 @@ class FieldServices:
         )
 
     def _field(self, request: Any) -> Field:
-        return self._tree.field(request.field)
+        return self._handles.field(request.field)
 
     def _get(self, codec: _Codec, request: Any) -> Fields:
         field = self._field(request)
@@ -122,7 +122,7 @@ class FieldServices:
             node = self._field(request).get(FieldType.NODE, request.index)
         except NoValueError:
             node = None
-        return {"node": 0 if node is None else node.handle}
+        return {"node": self._handles.of(node)}
 
     def _remove(self, request: Any) -> Fields:
         return {"success": int(self._field(request).remove(request.index))}

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.physics.geometry import Pose, to_quaternion, transposed
 from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
+from palaestra_sim.stub.scene.nodes.types import type_number
 from palaestra_sim.stub.scene.places import Place
-from palaestra_sim.stub.scene.tree.effects import require_true_value
-from palaestra_sim.stub.scene.tree.nodes import SceneNode
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
+from palaestra_sim.stub.scene.robot import Robot
+from palaestra_sim.stub.scene.tree.catalogue import kinds_of
 from palaestra_sim.stub.seam import Handler, Row, Service
 
 Fields = dict[str, Any]
@@ -23,9 +25,9 @@ Fields = dict[str, Any]
 class NodeServices:
     """The services of one supervisor that take a node's handle."""
 
-    def __init__(self, host: Host, tree: SceneTree) -> None:
+    def __init__(self, host: Host, handles: Handles) -> None:
         self._host = host
-        self._tree = tree
+        self._handles = handles
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
@@ -82,13 +84,16 @@ class NodeServices:
         )
 
     def _node(self, request: Any) -> SceneNode:
-        return self._tree.node(request.node)
+        return self._handles.node(request.node)
+
+    def _robot(self, node: SceneNode) -> Robot | None:
+        return self._handles.simulation.robot_of(node)
 
     def _get_id(self, request: Any) -> Fields:
         return {"id": self._node(request).number}
 
     def _get_type(self, request: Any) -> Fields:
-        return {"type": self._node(request).type_number}
+        return {"type": type_number(self._node(request).type_name)}
 
     def _get_type_name(self, request: Any) -> Fields:
         return {"name": self._node(request).type_name}
@@ -97,8 +102,7 @@ class NodeServices:
         return {"name": self._node(request).def_name}
 
     def _get_parent(self, request: Any) -> Fields:
-        parent = self._node(request).parent
-        return {"node": 0 if parent is None else parent.handle}
+        return {"node": self._handles.of(self._node(request).parent)}
 
     def _is_proto(self, request: Any) -> Fields:
         self._node(request)
@@ -116,7 +120,7 @@ class NodeServices:
         Webots crashes for a `from_node` of 0; here the call fails.
         """
         node = _pose(self._node(request))
-        other = _pose(self._tree.node(request.from_node))
+        other = _pose(self._handles.node(request.from_node))
         to_node = transposed(node.rotation)
         x, y, z = (b - a for a, b in zip(node.position, other.position, strict=True))
         relative = Pose((0.0, 0.0, 0.0), to_node).after(Pose((x, y, z), other.rotation))
@@ -138,53 +142,55 @@ class NodeServices:
     def _get_velocity(self, request: Any) -> Fields:
         node = self._node(request)
         _pose(node)
-        body = node.robot.body if node.robot is not None else None
+        robot = self._robot(node)
+        body = robot.body if robot is not None else None
         vx, vy, omega = body.velocity if body is not None else (0.0, 0.0, 0.0)
         return {"velocity": {"linear": _point((vx, vy, 0.0)), "angular": _point((0.0, 0.0, omega))}}
 
     def _set_velocity(self, request: Any) -> Fields:
         """Push a robot; its motors bring it back to their commands within a few basic steps."""
-        node = self._node(request)
-        if node.robot is not None and node.robot.body is not None:
+        robot = self._robot(self._node(request))
+        if robot is not None and robot.body is not None:
             wanted = request.velocity
-            node.robot.body.push(wanted.linear.x, wanted.linear.y, wanted.angular.z)
+            robot.body.push(wanted.linear.x, wanted.linear.y, wanted.angular.z)
         return {"success": 1}
 
     def _get_field(self, request: Any) -> Fields:
         node = self._node(request)
-        field = self._tree.field_of(node, request.fieldName) if not request.proto else None
-        return {"field": 0 if field is None else field.handle}
+        field = self._handles.field_of(node, request.fieldName) if not request.proto else None
+        return {"field": self._handles.of(field)}
 
     def _get_field_by_index(self, request: Any) -> Fields:
         node = self._node(request)
-        names = list(node.kinds)
+        names = list(kinds_of(node))
         if request.proto or request.index >= len(names):
             return {"field": 0}
-        field = self._tree.field_of(node, names[request.index])
-        return {"field": 0 if field is None else field.handle}
+        field = self._handles.field_of(node, names[request.index])
+        return {"field": self._handles.of(field)}
 
     def _get_number_of_fields(self, request: Any) -> Fields:
         node = self._node(request)
-        return {"value": -1 if request.proto else len(node.kinds)}
+        return {"value": -1 if request.proto else len(kinds_of(node))}
 
     def _export_string(self, request: Any) -> Fields:
         """Answer the node as the world file has it."""
-        node = self._node(request)
-        source = self._tree.simulation.world.source
-        start, end = node.source.span if node.source is not None else (0, len(source))
-        return {"value": source[start:end].decode()}
+        origin = self._node(request).origin
+        if origin is None:
+            return {"value": self._handles.tree.source.decode()}
+        start, end = origin.node.span
+        return {"value": origin.source.data[start:end].decode()}
 
     def _reset_physics(self, request: Any) -> Fields:
-        node = self._node(request)
-        if node.robot is not None:
-            node.robot.halt()
+        robot = self._robot(self._node(request))
+        if robot is not None:
+            robot.halt()
         return {"success": 1}
 
     def _restart_controller(self, request: Any) -> Fields:
-        node = self._node(request)
-        if node.robot is not None:
-            self._host.restart(node.robot)
-        return {"success": int(node.robot is not None)}
+        robot = self._robot(self._node(request))
+        if robot is not None:
+            self._host.restart(robot)
+        return {"success": int(robot is not None)}
 
     def _accept(self, request: Any) -> Fields:
         """Accept a hint that affects only the speed of Webots' answers, or its drawing."""
@@ -199,7 +205,6 @@ def _pose(node: SceneNode) -> Pose:
 
 def _place(node: SceneNode) -> Place:
     """Return the place of a node; in Webots a node without one crashes the controller."""
-    require_true_value(node, "translation")
     if node.place is None:
         raise ServiceFailed(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
     return node.place

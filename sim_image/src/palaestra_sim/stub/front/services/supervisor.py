@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Mode
-from palaestra_sim.stub.scene.tree.nodes import SceneNode
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.stub.seam import Service
 
 Fields = dict[str, Any]
@@ -22,10 +21,11 @@ Fields = dict[str, Any]
 class SupervisorServices:
     """The services of one supervisor that act on the whole simulation."""
 
-    def __init__(self, host: Host, tree: SceneTree, robot: Robot) -> None:
+    def __init__(self, host: Host, handles: Handles, robot: Robot) -> None:
         self._host = host
-        self._simulation = tree.simulation
-        self._tree = tree
+        self._simulation = handles.simulation
+        self._tree = handles.tree
+        self._handles = handles
         self._robot = robot
         self._movie_asked = False
 
@@ -96,27 +96,23 @@ class SupervisorServices:
         return {"status": int(self._movie_asked)}
 
     def _get_root(self, _request: Any) -> Fields:
-        return {"value": self._tree.root.handle}
+        return {"value": self._handles.of(self._tree.root)}
 
     def _get_self(self, _request: Any) -> Fields:
-        return {"value": self._tree.of_robot(self._robot).handle}
+        return {"value": self._handles.of(self._robot.parts.node)}
 
     def _get_from_def(self, request: Any) -> Fields:
         """Look for a DEF anywhere; there are no PROTOs here, so inside one (`proto`) there is none."""
-        return _handle(self._tree.of_def(request.name) if request.proto == 0 else None)
+        return {"node": self._handles.of(self._tree.of_def(request.name) if request.proto == 0 else None)}
 
     def _get_from_id(self, request: Any) -> Fields:
-        return _handle(self._tree.of_number(request.id))
+        return {"node": self._handles.of(self._tree.of_number(request.id))}
 
     def _get_from_device(self, request: Any) -> Fields:
-        node = self._tree.of_device(self._robot, request.value)
+        node = self._robot.parts.devices.nodes.get(request.value)
         if node is None:
             raise ServiceFailed(f"no device {request.value!r}; get_device_list lists the names")
-        return _handle(node)
-
-
-def _handle(node: SceneNode | None) -> Fields:
-    return {"node": 0 if node is None else node.handle}
+        return {"node": self._handles.of(node)}
 
 
 def _accept(_request: Any) -> Fields:

@@ -12,11 +12,11 @@ from typing import Any, Generic, Protocol, TypeVar
 from palaestra_sim.stub.physics.body import Body
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.obstacles import Ray
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reading import ELSEWHERE, Reading
 from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.stub.seam import Fields, Row
-from palaestra_sim.world import Node
 
 
 class Device(Protocol):
@@ -50,7 +50,7 @@ class Part:
     """
 
     reading: Reading
-    node: Node
+    node: SceneNode
     name: str
     place: Place
     motor: Motor | None
@@ -98,6 +98,10 @@ class Carrier(Protocol):
             reach_m: of each ray: the longest distance that matters.
             heights_m: of each ray, in the robot's frame.
         """
+        ...
+
+    def touching(self, outline: Sequence[Shape]) -> int:
+        """Return the parts of the body that these shapes are, as bits of `Body.touched`."""
         ...
 
 
@@ -167,9 +171,15 @@ class Kind(Generic[DeviceT]):
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Devices:
-    """All devices of a robot by name, in the order of the world file, each with its row of the table."""
+    """All devices of a robot by name, in the order of the world file.
+
+    Attributes:
+        rows: each with its row of the table.
+        nodes: their nodes.
+    """
 
     rows: dict[str, tuple[Kind[Any], Any]] = field(default_factory=dict)
+    nodes: dict[str, SceneNode] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:

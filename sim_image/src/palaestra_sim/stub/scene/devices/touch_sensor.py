@@ -32,16 +32,19 @@ def _read(part: Part) -> TouchSensor:
 
 
 def _sampler(sensors: Sequence[TouchSensor], robot: Carrier) -> Sample:
-    """Sample the bumpers that reach the robot's rim; one inside the body is never touched."""
+    """Sample the bumpers that reach the robot's rim; one inside the body is never touched.
+
+    All of them are read before the contacts are forgotten, so that each hears of its own.
+    """
     body = robot.body
     if body is None:
         return lambda: None
-    outer = [it for it in sensors if any(shape.size[0] >= 2.0 * body.radius for shape in it.outline)]
+    outer = [(sensor, bits) for sensor in sensors if (bits := robot.touching(sensor.outline))]
 
     def sample() -> None:
-        for sensor in outer:
-            sensor.value = body.touched
-            body.touched = False
+        for sensor, bits in outer:
+            sensor.value = bool(body.touched & bits)
+        body.touched = 0
 
     return sample
 

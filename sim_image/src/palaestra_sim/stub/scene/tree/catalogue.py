@@ -1,6 +1,6 @@
-"""Node types as a supervisor sees them: their numbers, their fields, the type of each field.
+"""Node types as a supervisor sees them: their fields, and the type of each field.
 
-Numbers are those of webots/nodes.h, fields and defaults those of resources/nodes/*.wrl, R2023b.
+Fields and defaults are those of resources/nodes/*.wrl, R2023b.
 Only the types of the stub's worlds are listed, those of devices in `devices`. A field that is not listed is
 known where a world sets it, with the type that its value shows.
 """
@@ -8,10 +8,11 @@ known where a world sets it, with the type that its value shows.
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import cache
 from typing import Final, NamedTuple
 
 from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.world import Node, Value
+from palaestra_sim.stub.scene.nodes.scene_node import FieldContent, SceneNode
 
 
 class FieldType(IntEnum):
@@ -66,23 +67,6 @@ class FieldKind(NamedTuple):
         """The name that `supervisor/field/get_type_name` answers, e.g. "SFVec3f"."""
         return ("MF" if self.multiple else "SF") + _NAMES[self.type]
 
-
-# Source: include/controller/c/webots/nodes.h, WbNodeType, counted from WB_NODE_NO_NODE = 0.
-_NUMBERED: Final = """
-- Appearance Background Billboard Box CadShape Capsule Color Cone Coordinate Cylinder
-DirectionalLight ElevationGrid Fog Group ImageTexture IndexedFaceSet IndexedLineSet Material Mesh
-Muscle Normal PBRAppearance Plane PointLight PointSet Pose Shape Sphere SpotLight
-TextureCoordinate TextureTransform Transform Viewpoint
-Robot
-Accelerometer Altimeter Brake Camera Compass Connector Display DistanceSensor Emitter GPS Gyro
-InertialUnit LED Lidar LightSensor LinearMotor Pen PositionSensor Propeller Radar RangeFinder
-Receiver RotationalMotor Skin Speaker TouchSensor VacuumGripper
-BallJoint BallJointParameters Charger ContactProperties Damping Fluid Focus HingeJoint
-HingeJointParameters Hinge2Joint ImmersionProperties JointParameters Lens LensFlare Physics
-Recognition SliderJoint Slot Solid SolidReference Track TrackWheel WorldInfo Zoom
-Microphone Radio
-"""
-_NUMBERS: Final = {name: number for number, name in enumerate(_NUMBERED.split())}
 
 _POSE = """
 translation SFVec3f 0 0 0; rotation SFRotation 0 0 1 0; children MFNode;
@@ -152,11 +136,6 @@ _FIELDS: Final = {
 }
 
 
-def type_number(type_name: str) -> int:
-    """Return the number that `supervisor/node/get_type` answers; 0 for an unknown type."""
-    return _NUMBERS.get(type_name, 0)
-
-
 def field_kinds(type_name: str) -> dict[str, FieldKind]:
     """Return the fields of a node type in the order that indices count; {} for an unknown type."""
     kinds: dict[str, FieldKind] = {}
@@ -176,16 +155,27 @@ def _declared(type_name: str) -> str:
     return own if kind.on_joint else f"{_SOLID}; {own}"
 
 
-def guessed_kind(value: Value) -> FieldKind:
+def kinds_of(node: SceneNode) -> dict[str, FieldKind]:
+    """Return the fields of a node in the order of their indices; those not in the catalogue come last."""
+    known = _kinds(node.type_name)
+    return known | {name: _guessed(content) for name, content in node.fields.items() if name not in known}
+
+
+@cache
+def _kinds(type_name: str) -> dict[str, FieldKind]:
+    return field_kinds(type_name)
+
+
+def _guessed(content: FieldContent) -> FieldKind:
     """Return the kind of a field that is not in the catalogue, from its value in the world file."""
-    items = value.items
-    if not items or items[0] is None or isinstance(items[0], Node):
-        return FieldKind(FieldType.NODE, value.bracketed)
+    items, bracketed = content.items, content.bracketed
+    if not items or items[0] is None or isinstance(items[0], SceneNode):
+        return FieldKind(FieldType.NODE, bracketed)
     if isinstance(items[0], bool):
-        return FieldKind(FieldType.BOOL, value.bracketed)
+        return FieldKind(FieldType.BOOL, bracketed)
     if isinstance(items[0], str):
-        return FieldKind(FieldType.STRING, value.bracketed)
-    if value.bracketed:
+        return FieldKind(FieldType.STRING, bracketed)
+    if bracketed:
         return FieldKind(FieldType.FLOAT, True)
     by_width = {2: FieldType.VEC2F, 3: FieldType.VEC3F, 4: FieldType.ROTATION}
     # A rotation is the widest value, so more numbers are several values.

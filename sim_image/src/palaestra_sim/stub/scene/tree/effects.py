@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import Final
 
 from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.stub.scene.tree.nodes import SceneNode
+from palaestra_sim.stub.scene.joints import JointPlace
+from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.seam import UnsimulatedError
 
 # Nodes that act on the physics. All others are drawn only, unless they are part of a boundingObject.
@@ -47,35 +48,22 @@ def require_effect(node: SceneNode, field: str) -> None:
         )
 
 
-def require_true_value(node: SceneNode, field: str) -> None:
-    """Check that Webots would not change a field when a joint moves.
-
-    Raises:
-        UnsimulatedError: it would change it.
-    """
-    if node.jointed and field in _PLACING:
-        raise UnsimulatedError(
-            f"a {node.type_name} on a joint stands still in the stub; read the joint's PositionSensor"
-        )
-
-
 def _is_drawn_only(node: SceneNode, field: str) -> bool:
     return node.type_name not in _ACTING or field in _FOR_PEOPLE
 
 
 def _reaches_robot(node: SceneNode, field: str) -> bool:
-    return node.robot is not None and field == "customData"
+    return node.type_name == "Robot" and field == "customData"
 
 
 def _moves(node: SceneNode, field: str) -> bool:
     """Return whether a write of a node's place moves it; rays and outlines of a robot do not move."""
-    if field not in _PLACING or node.place is None or node.jointed:
+    if field not in _PLACING or node.place is None or isinstance(node.place, JointPlace):
         return False
-    if node.robot is not None or not _on_robot(node):
+    if node.type_name == "Robot" or not _on_robot(node):
         return True
     return not any(it.type_name in _MOUNTED for it in (node, *node.descendants()))
 
 
 def _on_robot(node: SceneNode) -> bool:
-    parent = node.parent
-    return parent is not None and (parent.robot is not None or _on_robot(parent))
+    return any(around.type_name == "Robot" for around in node.ancestors())

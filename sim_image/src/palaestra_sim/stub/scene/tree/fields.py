@@ -10,36 +10,46 @@ As in Webots, a value that is invalid for the field is ignored without an error.
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from palaestra_sim.errors import SimError
 from palaestra_sim.stub.physics.geometry import AxisAngle
-from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.stub.scene.nodes.scene_node import FieldContent, SceneNode
 from palaestra_sim.stub.scene.tree.catalogue import WIDTH, FieldKind, FieldType
-from palaestra_sim.stub.scene.tree.effects import require_effect, require_true_value
-from palaestra_sim.stub.scene.tree.nodes import SceneNode
+from palaestra_sim.stub.scene.tree.effects import require_effect
 
 
 class NoValueError(SimError, LookupError):
     """A field has no value of that type at that index; Webots would read a null pointer."""
 
 
+class Changes(Protocol):
+    """The simulation, to which the writes of fields come."""
+
+    def before_next_step(self, change: Callable[[], None], /) -> None:
+        """Call `change` at the beginning of the next basic step."""
+        ...
+
+    def changed(self, node: SceneNode, field: str, /) -> None:
+        """Take the effect of a field that has a new value."""
+        ...
+
+
 class Field:
     """One field of one node.
 
     Attributes:
-        handle: for clients; the tree sets it.
         node: its node.
         name: as in the world file.
         kind: its declaration.
     """
 
-    def __init__(self, node: SceneNode, name: str, kind: FieldKind, simulation: Simulation) -> None:
-        self.handle = 0
+    def __init__(self, node: SceneNode, name: str, kind: FieldKind, changes: Changes) -> None:
         self.node = node
         self.name = name
         self.kind = kind
-        self._simulation = simulation
+        self._changes = changes
         self._values = _initial(node, name, kind)
         self._writes = 0  # written, not yet seen by the simulation
 
@@ -55,9 +65,7 @@ class Field:
 
         Raises:
             NoValueError: the field has another type, or no value at that index.
-            UnsimulatedError: Webots would change the value as a joint moves.
         """
-        require_true_value(self.node, self.name)
         values = self._current()
         at = index if self.kind.multiple else 0
         if type_ is not self.kind.type or not -len(values) <= at < len(values):
@@ -80,7 +88,7 @@ class Field:
         values[at] = value
         self._values = values
         self._writes += 1
-        self._simulation.before_next_step(self._take_effect)
+        self._changes.before_next_step(self._take_effect)
 
     def insert(self, type_: FieldType, index: int, value: Any) -> bool:
         """Insert a value before `index`, -1 for the end; return False if that is impossible.
@@ -115,32 +123,23 @@ class Field:
 
     def _current(self) -> list[Any]:
         """Return the values: those written last, else those of the simulation."""
-        node = self.node
         if self._writes == 0:
-            if node.place is not None and self.name == "translation":
-                return [node.place.translation]
-            if node.place is not None and self.name == "rotation":
-                return [node.place.rotation]
-            if node.robot is not None and self.name == "customData":
-                return [node.robot.custom_data]
+            place = self.node.place
+            if place is not None and self.name == "translation":
+                return [place.translation]
+            if place is not None and self.name == "rotation":
+                return [place.rotation]
+            if self.name == "customData":
+                return [self.node.text("customData") or ""]
         return self._values
 
     def _take_effect(self) -> None:
-        """Apply the written values to the simulation; of several writes the last one counts."""
+        """Hand the written values to the simulation; of several writes the last one counts."""
         self._writes -= 1
-        node = self.node
-        if self._writes:
-            return
-        if node.place is not None and self.name == "translation":
-            node.place.translation = self._values[0]
-        elif node.place is not None and self.name == "rotation":
-            node.place.rotation = self._values[0]
-        elif node.robot is not None and self.name == "customData":
-            node.robot.custom_data = self._values[0]
-            return
-        else:
-            return
-        self._simulation.moved(node.place)
+        if self._writes == 0:
+            for twin in self.node.twins:
+                twin.fields[self.name] = FieldContent(_flat(self._values), bracketed=self.kind.multiple)
+                self._changes.changed(twin, self.name)
 
 
 def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
@@ -169,10 +168,10 @@ def _acceptable(type_: FieldType, value: Any) -> bool:
 
 def _initial(node: SceneNode, name: str, kind: FieldKind) -> list[Any]:
     """Return the values that the world file gives, or the default."""
+    written = node.fields.get(name)
     if kind.type is FieldType.NODE:
-        inside: list[Any] = list(node.inside.get(name, ()))
+        inside: list[Any] = [] if written is None else list(written.items)
         return inside if kind.multiple or inside else [None]
-    written = node.source.fields.get(name) if node.source is not None else None
     items = list(written.items) if written is not None else _default(kind)
     width = WIDTH.get(kind.type, 1)
     if width > 1:
@@ -186,6 +185,14 @@ def _default(kind: FieldKind) -> list[Any]:
     if kind.type is FieldType.BOOL:
         return [kind.default == "TRUE"]
     return [float(word) for word in kind.default.split()]
+
+
+def _flat(values: list[Any]) -> list[Any]:
+    """Return the values as a world file has them: a vector as its numbers, every number a float."""
+    items: list[Any] = []
+    for value in values:
+        items += value if isinstance(value, tuple) else [value]
+    return [float(item) if type(item) is int else item for item in items]
 
 
 def _scalar(type_: FieldType, item: Any) -> Any:

@@ -1,0 +1,80 @@
+"""The file in which a node is written: its `DEF`s, and the fields of the PROTO that it defines.
+
+`USE name` means the last `DEF` of that name before it, in the same file. In a PROTO, `IS name` means a value
+that the instance gives, and that was written in another file. So a value is looked up with its scope.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.world import Is, Node, Value
+from palaestra_sim.world.source import Source
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scope:
+    """One file, or one instance of a PROTO.
+
+    Attributes:
+        source: the bytes of the file.
+        defs: its nodes with a DEF name, by that name, in the order of the file.
+        bindings: of a PROTO: the value of each field, with the scope in which it is written.
+        depth: how many instances of PROTOs it is inside of.
+    """
+
+    source: Source
+    defs: Mapping[str, list[Node]]
+    bindings: Mapping[str, tuple[Value, Scope]] = field(default_factory=dict)
+    depth: int = 0
+
+    @classmethod
+    def of(cls, source: Source, nodes: Iterable[Node]) -> Scope:
+        """Return the scope of a file with these nodes at its top."""
+        return cls(source=source, defs=definitions(nodes))
+
+    def error(self, node: Node, fact: str, remedy: str) -> WorldError:
+        """Return an error at the place of a node, for the caller to raise."""
+        return self.source.error(node.span[0], fact, remedy)
+
+    def resolve(self, node: Node) -> Node:
+        """Return the node itself, or the one that it `USE`s.
+
+        Raises:
+            WorldError: no node of that name stands before it.
+        """
+        if node.uses is None:
+            return node
+        named = self.defs.get(node.uses, [])
+        before = bisect_right([found.span[0] for found in named], node.span[0])
+        if before == 0:
+            raise self.error(node, f"USE {node.uses} has no DEF before it", "define it first")
+        return named[before - 1]
+
+    def value(self, value: Value) -> tuple[Value, Scope] | None:
+        """Return a value with the scope in which it is written; None for an `IS` without such a field."""
+        if len(value.items) == 1 and isinstance(bound := value.items[0], Is):
+            found = self.bindings.get(bound.name)
+            return None if found is None else found[1].value(found[0])
+        return value, self
+
+
+def definitions(nodes: Iterable[Node]) -> dict[str, list[Node]]:
+    """Return the nodes with a DEF name by that name, those inside others too."""
+    found: dict[str, list[Node]] = {}
+    for node in nodes:
+        for inner in _walk(node):
+            if inner.def_name is not None:
+                found.setdefault(inner.def_name, []).append(inner)
+    return found
+
+
+def _walk(node: Node) -> Iterator[Node]:
+    yield node
+    for value in node.fields.values():
+        for item in value.items:
+            if isinstance(item, Node):
+                yield from _walk(item)
