@@ -3,11 +3,12 @@
     SimError
     ├── WorldError              the .wbt file is wrong: retrying cannot help
     │   └── WorldRefusedError   it has several mistakes; the message lists them all
+    ├── StandInError            a table of stand-ins is wrong: retrying cannot help
     ├── UnknownWorldError       no shipped world has that name: retrying cannot help
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
     ├── SidecarError            the sidecar cannot run as requested: retrying cannot help
     ├── FaultError              the description of a fault is wrong (stub.faults.language)
-    ├── NoSuchHandleError       this load of the world has no such node (stub.scene.tree)
+    ├── NoSuchHandleError       this load of the world has no such node (stub.front.handles)
     ├── NoValueError            a field has no such value (stub.scene.tree)
     └── UnsimulatedError        Webots does it, the stub does not (stub.seam)
 
@@ -86,6 +87,10 @@ def _in_one_line(errors: list[WorldError]) -> str:
     lines = ", ".join(map(str, dict.fromkeys(error.line for error in errors)))
     fact = f"{first.fact} ({len(errors)} places, in lines {lines})"
     return str(WorldError(first.world, first.line, first.column, fact, first.remedy))
+
+
+class StandInError(SimError, ValueError):
+    """A table of stand-ins is wrong; the message has the entry, the fact and the remedy."""
 
 
 class UnknownWorldError(SimError, LookupError):

@@ -42,7 +42,7 @@ def test_rays_sit_on_the_rim_and_count_counter_clockwise():
     """ir1 is the front, ir2 at 40 degrees."""
     (robot,) = scene_of(builtin("arena")).robots
 
-    azimuths = [math.degrees(math.atan2(it.ray[3], it.ray[2])) for it in robot.devices.of(DISTANCE_SENSOR)]
+    azimuths = [math.degrees(math.atan2(*it.beams[0].ray[:1:-1])) for it in robot.devices.of(DISTANCE_SENSOR)]
 
     assert azimuths == pytest.approx([0, 40, 80, 120, 160, -160, -120, -80, -40], abs=0.1)
 
@@ -180,11 +180,6 @@ def test_what_cannot_be_simulated_is_refused(world, objects, fact):
 BAD_ROBOTS = {
     "a camera": (("DEF IR", "Camera { } DEF IR"), "the stub simulates no Camera on a robot"),
     "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
-    "a ray that looks down": (
-        ("DEF IR DistanceSensor {", "DistanceSensor { rotation 0 1 0 0.5"),
-        "looks up or down",
-    ),
-    "many rays": (('name "ir1"', 'name "ir1" numberOfRays 5'), "a distance sensor of several rays"),
     "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "no distance sensor is of type 'radar'"),
     "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable is not rows of three numbers"),
     "an unsorted table": (("[ 0 1 0,", "[ 2 1 0,"), "the distances of lookupTable do not grow"),
@@ -214,6 +209,47 @@ def test_a_robot_that_cannot_be_simulated_is_refused(world, simple_robot, change
 
     with pytest.raises(WorldError, match=fact):
         scene_of(source)
+
+
+@pytest.mark.parametrize(
+    ("rays", "seen"),
+    [
+        ("rotation 0 1 0 0.5", 0.05 / math.sin(0.5)),  # down to the floor
+        ("rotation 0 1 0 1.5707963", 0.05),
+        ("rotation 0 1 0 -0.5", 1.0),  # over the wall
+        ("rotation 0 1 0 -0.05", 0.65 / math.cos(0.05)),
+    ],
+)
+def test_a_ray_may_look_up_and_down(world, simple_robot, rays, seen):
+    """The floor is at height 0, the ray 5 cm above it, the wall 0.65 m ahead and 0.2 m high."""
+    wall = 'Solid { translation 0.9 0 0.1 name "wall" boundingObject Box { size 0.1 4 0.2 } }'
+    tilted = simple_robot.replace("DEF IR DistanceSensor {", f"DistanceSensor {{ {rays}")
+
+    assert distance(Simulation.load(world(wall, robot=tilted))) == pytest.approx(seen, rel=1e-6)
+
+
+@pytest.mark.parametrize("count", range(1, 31))
+def test_several_rays_are_a_cone_that_is_symmetric_about_its_axis(world, simple_robot, count):
+    """In front of a wall, a sonar measures the ray on the axis, or the nearest to it."""
+    sonar = simple_robot.replace('name "ir1"', f'name "ir1" type "sonar" numberOfRays {count} aperture 0.2')
+    wall = 'Solid { translation 0.55 0 0.3 name "wall" boundingObject Box { size 0.1 4 2 } }'
+
+    measured = distance(Simulation.load(world(wall, robot=sonar)))
+
+    assert 0.3 - 1e-9 <= measured <= 0.3 / math.cos(0.1) + 1e-9
+
+
+def test_rays_off_the_axis_count_less(world, simple_robot):
+    """Five rays at a thin post: ahead and above they meet it, below the floor, aside nothing within 1 m."""
+    cone = simple_robot.replace('name "ir1"', 'name "ir1" numberOfRays 5 aperture 0.4 gaussianWidth 0.5')
+    post = "Solid { translation 0.6 0 0.1 boundingObject Cylinder { radius 0.01 height 0.2 } }"
+    weight = math.exp(-1.0)  # 0.2 rad off the axis, and 0.4 * 0.5 is the width
+
+    measured = distance(Simulation.load(world(post, robot=cone)))
+
+    above, below, aside = 0.39 / math.cos(0.2), 0.05 / math.sin(0.2), 1.0
+    expected = (0.39 + weight * (above + below + 2 * aside)) / (1 + 4 * weight)
+    assert measured == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_robot_with_a_body_inside_a_pose_is_refused(world, simple_robot):

@@ -7,7 +7,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -18,12 +18,15 @@ from palaestra_sim.stub import faults
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
+from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode
+from palaestra_sim.world.stand_ins import StandIn, load, shipped
 
 log = logging.getLogger(__name__)
 
 _MODES = {"pause": Mode.PAUSE, "realtime": Mode.REAL_TIME, "fast": Mode.FAST}
 _CHECK_MASTER_S = 1.0
+_ALL = "all"
 _WRONG_WORLD = 2
 _NO_MASTER = 1
 
@@ -76,6 +79,8 @@ class _Process:
                 step_sleep_s=options.step_sleep_ms / 1000.0,
                 lost_wakeup=options.lost_wakeup,
                 publish_delay_s=options.publish_delay_ms / 1000.0,
+                stand_ins=_stand_ins(options.stand_ins),
+                leave_out=_leave_out(options.leave_out),
             ),
             mode=_MODES[options.mode],
         )
@@ -115,6 +120,8 @@ class _Process:
 
     def _start(self) -> None:
         self._simulator.start()
+        for left_out in self._simulator.simulation.scene.left_out:
+            log.warning("%s", left_out)
         log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 
@@ -174,5 +181,36 @@ def _parser() -> argparse.ArgumentParser:
     add("--step-sleep-ms", type=milliseconds, default=0.0, help="real time that each step takes at least")
     add("--publish-delay-ms", type=milliseconds, default=0.0, help="from the end of a step to its messages")
     add("--lost-wakeup", action="store_true", help="lose the messages of a step that comes too early")
+    add(
+        "--stand-ins",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a table of PROTOs that are simulated as simple solids, beside those that ship; repeatable",
+    )
+    add(
+        "--leave-out",
+        action="append",
+        default=[],
+        metavar="TYPE",
+        help=f"leave out nodes of this type that the stub cannot simulate, or {_ALL} of them; repeatable",
+    )
     faults.add_options(add)
     return parser
+
+
+def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
+    """Return the table that ships, with the entries of these files over it.
+
+    Raises:
+        StandInError: a file is no such table.
+    """
+    table = dict(shipped())
+    for file in files:
+        table.update(load(file.read_text("utf-8"), str(file)))
+    return table
+
+
+def _leave_out(types: Sequence[str]) -> LeaveOut:
+    return LeaveOut(types=frozenset(types), everything=_ALL in types)

@@ -12,7 +12,7 @@ Pure: bytes in, bytes out. No clock, no network, and no file except the worlds t
 """
 
 from palaestra_sim.errors import UnknownWorldError, WorldError
-from palaestra_sim.world.builtin import builtin, builtin_path
+from palaestra_sim.world.builtin import builtin, builtin_path, builtin_protos
 from palaestra_sim.world.checks import check
 from palaestra_sim.world.externs import LocalProtos, local_protos
 from palaestra_sim.world.generate import generate, rename
@@ -36,6 +36,7 @@ __all__ = [
     "WorldRobot",
     "builtin",
     "builtin_path",
+    "builtin_protos",
     "check",
     "generate",
     "local_protos",

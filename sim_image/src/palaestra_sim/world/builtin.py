@@ -1,10 +1,15 @@
-"""The worlds that ship, by name."""
+"""The worlds and the descriptions of robots that ship, by name."""
 
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 from palaestra_sim.errors import UnknownWorldError
+from palaestra_sim.world.reader import parse_proto
+from palaestra_sim.world.tree import Proto
 
 _WORLDS = Path(__file__).parent.parent / "worlds"
+_PROTOS = Path(__file__).parent / "protos"
 
 
 def builtin(name: str) -> bytes:
@@ -23,6 +28,12 @@ def builtin(name: str) -> bytes:
 def builtin_path(name: str) -> Path | None:
     """Return the file of the world that ships as `name`; None if there is none."""
     return _shipped().get(name)
+
+
+@cache
+def builtin_protos() -> Mapping[str, Proto]:
+    """Return the descriptions of robots of Webots that ship, by the names of their PROTOs."""
+    return {path.stem: parse_proto(path.read_bytes(), path.name) for path in sorted(_PROTOS.glob("*.proto"))}
 
 
 def _shipped() -> dict[str, Path]:

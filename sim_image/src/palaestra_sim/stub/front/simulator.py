@@ -15,10 +15,12 @@ from palaestra_sim.stub.front.controller import Controller
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.scene.arguments import Arguments
+from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
 from palaestra_sim.stub.seam import Node
+from palaestra_sim.world import builtin_protos, local_protos, parse
 
 MakeNode = Callable[[str], Node]
 
@@ -60,7 +62,7 @@ class StubSimulator:
         self._make_node = make_node
         self._loads = 0
         self._ended: Callable[[int], None] = _ignore
-        self._take(*_read(self.world_path, mode))
+        self._take(*_read(self.world_path, mode, self.options))
 
     def start(self) -> None:
         """Start the controllers of the robots."""
@@ -101,7 +103,7 @@ class StubSimulator:
         """
         world_path = Path(path).absolute()
         try:
-            loaded = _read(world_path, self.simulation.mode)
+            loaded = _read(world_path, self.simulation.mode, self.options)
         except (OSError, WorldError):
             return False
         self._soon(lambda: self._exchange(world_path, loaded))
@@ -152,9 +154,14 @@ class StubSimulator:
         next(iter(self.controllers.values())).node.later(0.0, callback)
 
 
-def _read(world_path: Path, mode: Mode) -> tuple[Simulation, dict[Robot, Arguments]]:
+def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Simulation, dict[Robot, Arguments]]:
     """Return a world that is ready to run, with the arguments of its robots."""
-    simulation = Simulation.load(world_path.read_bytes(), world_path.name, mode)
+    world = parse(world_path.read_bytes(), world_path.name)
+    local = local_protos(world, world_path)
+    descriptions = Descriptions(
+        protos={**builtin_protos(), **local.protos}, stand_ins=options.stand_ins, unusable=local.unusable
+    )
+    simulation = Simulation.of(world, world_path.name, mode, descriptions, options.leave_out)
     arguments = {robot: robot.parts.arguments for robot in simulation.robots}
     return simulation, {robot: given for robot, given in arguments.items() if given is not None}
 

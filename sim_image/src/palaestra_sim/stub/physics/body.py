@@ -117,6 +117,12 @@ class Body(Disc):
         self.c = math.cos(heading_rad)
         self.s = math.sin(heading_rad)
 
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters the first part and leaves the last; enter > leave: it misses."""
+        crossings = [disc.crossing(frame, ray) for disc in self._discs()]
+        met = [crossing for crossing in crossings if crossing[1] >= 0.0 and crossing[0] <= crossing[1]]
+        return min(met, default=(math.inf, -math.inf))
+
     def halt(self) -> None:
         """Stop all motion; the motors begin again from rest."""
         self._vx = self._vy = self._omega = 0.0

@@ -39,6 +39,10 @@ class Obstacle(Protocol):
         """
         ...
 
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the shape, in meters along it; enter > leave: it misses."""
+        ...
+
 
 class Disc:
     """A vertical cylinder, or another robot."""
@@ -83,6 +87,20 @@ class Disc:
             half = squared - aside * aside
             if along > 0.0 and half > 0.0:
                 reach[i] = min(reach[i], max(0.0, along - math.sqrt(half)))
+
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the disc, in meters along it; enter > leave: it misses."""
+        x, y, c, s = frame
+        dx = self.x - x
+        dy = self.y - y
+        ex = dx * c + dy * s - ray[0]
+        ey = dy * c - dx * s - ray[1]
+        along = ex * ray[2] + ey * ray[3]
+        aside = ex * ray[3] - ey * ray[2]
+        half = self.radius * self.radius - aside * aside
+        if half <= 0.0:
+            return math.inf, -math.inf
+        return along - math.sqrt(half), along + math.sqrt(half)
 
 
 class Block:
@@ -130,6 +148,16 @@ class Block:
             enter = max(0.0, enter_x, enter_y)
             if enter <= leave_x and enter <= leave_y:
                 reach[i] = min(reach[i], enter)
+
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the block, in meters along it; enter > leave: it misses."""
+        x, y = self._local(frame[0], frame[1])
+        c = frame[2] * self.c + frame[3] * self.s
+        s = frame[3] * self.c - frame[2] * self.s
+        px, py, ux, uy = ray
+        enter_x, leave_x = _slab(x + px * c - py * s, ux * c - uy * s, self.half_x)
+        enter_y, leave_y = _slab(y + px * s + py * c, ux * s + uy * c, self.half_y)
+        return max(enter_x, enter_y), min(leave_x, leave_y)
 
     def _local(self, x: float, y: float) -> tuple[float, float]:
         dx = x - self.x

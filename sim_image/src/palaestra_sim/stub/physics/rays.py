@@ -1,4 +1,4 @@
-"""Infrared rays: from the pose of the robot to the volts of its sensors.
+"""Rays: from the pose of a robot to what its sensors measure.
 
 A ray stops at the first obstacle. As in Webots, its length goes through the sensor's lookup table: linear
 between the rows, the end values beyond both ends, and Gaussian noise as a fraction of the response.
@@ -11,6 +11,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 from palaestra_sim.stub.physics.obstacles import Neighborhood, Obstacle, Ray
 
@@ -111,3 +112,79 @@ class Fan:
         for other in self._others:
             other.scan(frame, self.rays, distances)
         return distances
+
+
+class Beam(NamedTuple):
+    """A ray that may look up or down: its trace on the floor, its height, and its slope.
+
+    Attributes:
+        ray: in the robot's frame, seen from above.
+        height_m: of its origin, in the robot's frame.
+        slope: how far it climbs for each meter along the floor.
+        reach_m: the longest distance that matters.
+    """
+
+    ray: Ray
+    height_m: float
+    slope: float
+    reach_m: float
+
+    @property
+    def level(self) -> bool:
+        """Whether it stays at its height."""
+        return self.slope == 0.0
+
+
+class Upright(NamedTuple):
+    """An obstacle with its lower and its upper end, in the world."""
+
+    outline: Obstacle
+    low_m: float
+    high_m: float
+
+
+class SlopedBeams:
+    """The beams of one robot that climb or fall, cast one by one.
+
+    Besides the obstacles there is a floor, at height 0 of the world.
+    """
+
+    __slots__ = ("_beams", "_others", "_solids", "distances")
+
+    def __init__(self, beams: Sequence[Beam]) -> None:
+        self._beams = tuple(beams)
+        self._solids: tuple[Upright, ...] = ()
+        self._others: tuple[Upright, ...] = ()
+        self.distances = [beam.reach_m for beam in beams]
+
+    def face(self, solids: Sequence[Upright], others: Sequence[Upright]) -> None:
+        """Set the obstacles of the beams: standing ones and robots."""
+        self._solids = tuple(solids)
+        self._others = tuple(others)
+
+    def cast(self, frame: tuple[float, float, float, float], height_m: float) -> list[float]:
+        """Return how far each beam travels in meters; `height_m` is of the robot's frame."""
+        for index, beam in enumerate(self._beams):
+            self.distances[index] = self._first(beam, frame, height_m)
+        return self.distances
+
+    def _first(self, beam: Beam, frame: tuple[float, float, float, float], height_m: float) -> float:
+        start = beam.height_m + height_m
+        stretch = math.hypot(1.0, beam.slope)  # of the beam, for each meter along the floor
+        nearest = beam.reach_m / stretch
+        if beam.slope < 0.0:
+            nearest = min(nearest, max(0.0, start / -beam.slope))
+        for outline, low, high in (*self._solids, *self._others):
+            enter, leave = outline.crossing(frame, beam.ray)
+            below, above = _between(low - start, high - start, beam.slope)
+            enter = max(enter, below, 0.0)
+            if enter <= min(leave, above):
+                nearest = min(nearest, enter)
+        return nearest * stretch
+
+
+def _between(low_m: float, high_m: float, slope: float) -> tuple[float, float]:
+    """Return from where to where, along the floor, a beam is between two heights above its origin."""
+    if slope == 0.0:
+        return (-math.inf, math.inf) if low_m < 0.0 < high_m else (math.inf, -math.inf)
+    return min(low_m / slope, high_m / slope), max(low_m / slope, high_m / slope)

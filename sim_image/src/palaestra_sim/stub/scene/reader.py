@@ -100,7 +100,7 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
             _read_solid(reading, node, place, scene)
         _read_children(reading, node, place, scene)
     else:
-        reading.lacks(node, f"the stub simulates no {node.proto_name or kind}")
+        reading.lacks(node, node.unusable or f"the stub simulates no {kind}")
 
 
 def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:

@@ -15,8 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from palaestra_sim.stub.physics.body import Body
 from palaestra_sim.stub.physics.motors import Motor
-from palaestra_sim.stub.physics.obstacles import Neighborhood, Ray
-from palaestra_sim.stub.physics.rays import Fan
+from palaestra_sim.stub.physics.obstacles import Neighborhood
+from palaestra_sim.stub.physics.rays import Beam, Fan, SlopedBeams, Upright
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.devices.kind import Sample, Source
 from palaestra_sim.stub.scene.nodes.scene_node import FieldContent
@@ -49,6 +49,7 @@ class Robot:
         self._random = random.Random()  # noqa: S311 - noise, not secrets
         self.gauss = self._random.gauss
         self._fans: list[tuple[Fan, tuple[float, float]]] = []
+        self._sloped: list[SlopedBeams] = []
         self.samplers: tuple[Sample, ...] = tuple(
             kind.sampler(devices, self)
             for kind in DEVICES.values()
@@ -77,14 +78,32 @@ class Robot:
             self.body.face(_neighborhood(in_the_way, self.body.radius), bodies)
         for fan, heights in self._fans:
             fan.face(_neighborhood(_between(solids, heights, height), fan.reach_m), bodies)
+        for sloped in self._sloped:
+            sloped.face(
+                [_upright(shape) for shape in solids], [it for robot in others for it in robot.outline]
+            )
 
-    def look(
-        self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
-    ) -> Callable[[], Sequence[float]]:
-        """Return a function that returns how far each ray travels now, in meters; see `Carrier`."""
-        fan = Fan(rays, reach_m)
-        self._fans.append((fan, (min(heights_m), max(heights_m))))
-        cast, frame = fan.cast, self._frame
+    @property
+    def outline(self) -> tuple[Upright, ...]:
+        """Its body, as others see it; none if nothing can run into it."""
+        if self.body is None or self.body.radius == 0.0:
+            return ()
+        low, high = self.parts.heights
+        height = self.place.world_pose.position[2]
+        return (Upright(self.body, low + height, high + height),)
+
+    def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each beam travels now, in meters; see `Carrier`."""
+        frame = self._frame
+        if any(not beam.level for beam in beams):
+            sloped = SlopedBeams(beams)
+            self._sloped.append(sloped)
+            place = self.place
+            return lambda: sloped.cast(frame(), place.translation[2])
+        fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
+        heights = [beam.height_m for beam in beams]
+        self._fans.append((fan, (min(heights), max(heights))))
+        cast = fan.cast
         return lambda: cast(frame())
 
     def touching(self, outline: Sequence[Shape]) -> int:
@@ -143,6 +162,10 @@ def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float
         if bottom < high and top > low:
             found.append(shape)
     return found
+
+
+def _upright(shape: Shape) -> Upright:
+    return Upright(shape.obstacle(), *shape.heights())
 
 
 def _neighborhood(shapes: Sequence[Shape], reach_m: float) -> Neighborhood:

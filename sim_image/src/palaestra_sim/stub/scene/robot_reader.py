@@ -210,7 +210,7 @@ class _RobotReader:
                 node, Place(place, self._reading.translation(node), self._reading.rotation(node))
             )
         elif kind not in _INERT:
-            self._lacks(node, f"the stub simulates no {node.proto_name or kind} on a robot")
+            self._lacks(node, node.unusable or f"the stub simulates no {kind} on a robot")
 
     def _read_frame(self, node: SceneNode, place: Place) -> None:
         self._parts.append((node, place))
@@ -318,7 +318,13 @@ class _RobotReader:
         """Return the device at `node`, now one of the robot's."""
         name = node.text("name") or kind.name
         part = Part(
-            reading=self._reading, node=node, name=name, place=place, motor=motor, outline=self._outline
+            reading=self._reading,
+            lacks=self._lacks,
+            node=node,
+            name=name,
+            place=place,
+            motor=motor,
+            outline=self._outline,
         )
         device: object = kind.read(part)
         if node.left_out:

@@ -20,9 +20,10 @@ from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reader import Scene, read_scene
+from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
-from palaestra_sim.world import parse
+from palaestra_sim.world import World, parse
 
 
 class Mode(IntEnum):
@@ -59,21 +60,37 @@ class Simulation:
         self._arrange()
 
     @classmethod
-    def load(
-        cls,
-        source: bytes,
-        name: str = "world",
-        mode: Mode = Mode.REAL_TIME,
-        *,
-        descriptions: Descriptions | None = None,
-    ) -> Simulation:
-        """Return the simulation of a world file.
+    def load(cls, source: bytes, name: str = "world", mode: Mode = Mode.REAL_TIME) -> Simulation:
+        """Return the simulation of a world file that needs no other file.
 
         Raises:
             WorldError: the file is wrong, or holds something that the stub cannot simulate.
         """
-        tree = SceneTree(parse(source, name), name, descriptions)
-        return cls(tree, read_scene(tree), mode)
+        return cls.of(parse(source, name), name, mode)
+
+    @classmethod
+    def of(
+        cls,
+        world: World,
+        name: str = "world",
+        mode: Mode = Mode.REAL_TIME,
+        descriptions: Descriptions | None = None,
+        leave_out: LeaveOut | None = None,
+    ) -> Simulation:
+        """Return the simulation of a world.
+
+        Args:
+            world: as read.
+            name: of its file, in errors.
+            mode: how it runs at first.
+            descriptions: of the types that are no base types.
+            leave_out: what may be left out, if it cannot be simulated.
+
+        Raises:
+            WorldError: the world holds something that the stub cannot simulate.
+        """
+        tree = SceneTree(world, name, descriptions)
+        return cls(tree, read_scene(tree, leave_out), mode)
 
     @property
     def basic_step_ms(self) -> int:

@@ -1,4 +1,10 @@
-"""DistanceSensor: one level ray, and the lookup table that its length goes through."""
+"""DistanceSensor: its rays, and the lookup table that their length goes through.
+
+Several rays are a cone around the first axis. A sonar measures the nearest one. The others measure the
+average, in which a ray counts less the more it is off the axis. Neither the color of an obstacle
+(infra-red) nor the angle at which a ray meets it (sonar) matters here. Source: WbDistanceSensor.cpp of
+Webots.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +12,31 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Final
 
-from palaestra_sim.stub.physics.geometry import Pose, turn
-from palaestra_sim.stub.physics.obstacles import Ray
-from palaestra_sim.stub.physics.rays import LookupTable, lookup_table
+from palaestra_sim.stub.physics.geometry import Pose, Vector, turn
+from palaestra_sim.stub.physics.rays import Beam, LookupTable, lookup_table
 from palaestra_sim.stub.physics.rays import Row as TableRow
 from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.stub.seam import Row
 
-_LEVEL: Final = 1e-3
+_LEVEL: Final = 1e-3  # a smaller slope counts as none
+_STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
+# For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
+# aperture.
+_RINGS: Final = (
+    ((1, 0.0, 0.0),),
+    ((2, 0.5, 1.0),),
+    ((3, 0.0, 1.0),),
+    ((1, 0.0, 0.0), (3, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (4, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (5, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (6, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (7, 0.0, 1.0)),
+    ((3, 0.0, 0.3), (6, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (3, 0.0, 0.5), (6, 0.0, 1.0)),
+)
 
 
 class DistanceSensorType(IntEnum):
@@ -38,12 +58,12 @@ _TYPES: Final = {
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class DistanceSensor:
-    """One ray and its lookup table; `value` is in the table's unit, volts for a Robotino."""
+    """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino."""
 
     name: str
     model: str
-    ray: Ray
-    height_m: float
+    beams: tuple[Beam, ...]
+    weights: tuple[float, ...]
     table: LookupTable
     type: DistanceSensorType
     aperture_rad: float
@@ -53,29 +73,74 @@ class DistanceSensor:
 def _read(part: Part) -> DistanceSensor:
     type_name = part.text("type", "generic")
     if type_name not in _TYPES:
-        part.refuse(f"no distance sensor is of type {type_name!r}")
-    if part.number("numberOfRays", 1.0) != 1.0:
-        part.refuse("a distance sensor of several rays")
+        part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
     if part.number("resolution", -1.0) != -1.0:
-        part.refuse("a distance sensor with a resolution")
-    pose = part.place.world_pose
+        part.lack("a distance sensor with a resolution")
+    table = lookup_table(*_rows(part))
+    aperture_rad = part.number("aperture", 1.5708)
+    cone = _cone(int(part.number("numberOfRays", 1.0)), aperture_rad)
     return DistanceSensor(
         name=part.name,
         model=part.text("model"),
-        ray=_ray(part, pose),
-        height_m=pose.position[2],
-        table=lookup_table(*_rows(part)),
+        beams=tuple(_beam(part.place.world_pose, direction, table.reach_m) for direction in cone),
+        weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
+        table=table,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
-        aperture_rad=part.number("aperture", 1.5708),
+        aperture_rad=aperture_rad,
     )
 
 
-def _ray(part: Part, pose: Pose) -> Ray:
-    dx, dy, dz = turn(pose.rotation, (1.0, 0.0, 0.0))
-    if abs(dz) > _LEVEL:
-        part.refuse("a distance sensor that looks up or down")
-    length = math.hypot(dx, dy) or 1.0
-    return pose.position[0], pose.position[1], dx / length, dy / length
+def _beam(pose: Pose, direction: Vector, reach_m: float) -> Beam:
+    """Return the beam that leaves a frame in a direction of this frame."""
+    dx, dy, dz = turn(pose.rotation, direction)
+    along = max(math.hypot(dx, dy), _STEEPEST)
+    slope = dz / along
+    ray = pose.position[0], pose.position[1], dx / along, dy / along
+    return Beam(ray, pose.position[2], slope if abs(slope) > _LEVEL else 0.0, reach_m)
+
+
+def _cone(count: int, aperture_rad: float) -> list[Vector]:
+    """Return the directions of the rays, unit vectors in the frame of the sensor."""
+    if count <= 1 or aperture_rad == 0.0:
+        return [(1.0, 0.0, 0.0)]
+    if count <= len(_RINGS):
+        polar = [
+            (2.0 * math.pi * (index + offset) / size, share)
+            for size, offset, share in _RINGS[count - 1]
+            for index in range(size)
+        ]
+    else:
+        polar = _many(count)
+    return [_direction(alpha, share * aperture_rad / 2.0) for alpha, share in polar]
+
+
+def _many(count: int) -> list[tuple[float, float]]:
+    """Return angle around the axis and share of the aperture for rays on rings of 1, 4, 7 and more."""
+    rings: list[int] = []
+    left = count
+    while left > 0:
+        rings.append(min(left, 3 * len(rings) + 1))
+        left -= rings[-1]
+    polar: list[tuple[float, float]] = []
+    for ring, size in enumerate(rings):
+        first = len(polar)  # Webots counts on through the rings
+        share = ring / (len(rings) - 1)
+        polar += [(2.0 * math.pi * (first + index) / size, share) for index in range(size)]
+    return polar
+
+
+def _direction(alpha: float, theta: float) -> Vector:
+    """Return the direction at `theta` from the axis; `alpha` turns about it, 0 is up."""
+    alpha += math.pi / 2.0
+    return math.cos(theta), math.sin(theta) * math.sin(alpha), -math.sin(theta) * math.cos(alpha)
+
+
+def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
+    """Return the share of each ray in the average: a normal distribution over its angle to the axis."""
+    if len(cone) == 1:
+        return (1.0,)
+    weights = [math.exp(-((math.acos(min(1.0, x)) / width_rad) ** 2)) for x, _, _ in cone]
+    return tuple(weight / sum(weights) for weight in weights)
 
 
 def _rows(part: Part) -> list[TableRow]:
@@ -95,16 +160,30 @@ def _rows(part: Part) -> list[TableRow]:
 
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
-    cast = robot.look(
-        [it.ray for it in sensors], [it.table.reach_m for it in sensors], [it.height_m for it in sensors]
-    )
+    cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
     gauss = robot.gauss
 
+    if all(len(sensor.beams) == 1 for sensor in sensors):
+
+        def sample_single() -> None:
+            for sensor, distance_m in zip(sensors, cast(), strict=True):
+                sensor.value = sensor.table.response(distance_m, gauss)
+
+        return sample_single
+
     def sample() -> None:
-        for sensor, distance_m in zip(sensors, cast(), strict=True):
-            sensor.value = sensor.table.response(distance_m, gauss)
+        distances = iter(cast())
+        for sensor in sensors:
+            own = list(islice(distances, len(sensor.beams)))
+            sensor.value = sensor.table.response(_measured(sensor, own), gauss)
 
     return sample
+
+
+def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
+    if sensor.type is DistanceSensorType.SONAR:
+        return min(distances_m)
+    return sum(distance * weight for distance, weight in zip(distances_m, sensor.weights, strict=True))
 
 
 def _services(sensor: DistanceSensor) -> tuple[Row, ...]:

@@ -11,10 +11,10 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from palaestra_sim.stub.physics.body import Body
 from palaestra_sim.stub.physics.motors import Motor
-from palaestra_sim.stub.physics.obstacles import Ray
+from palaestra_sim.stub.physics.rays import Beam
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
-from palaestra_sim.stub.scene.reading import ELSEWHERE, Reading
+from palaestra_sim.stub.scene.reading import Reading
 from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.stub.seam import Fields, Row
 
@@ -42,6 +42,7 @@ class Part:
 
     Attributes:
         reading: of the world.
+        lacks: notes that a node of the robot cannot be simulated.
         node: of the device.
         name: as the world file has it, else the default of its type.
         place: its frame in the robot's; of a device on a joint, the frame of the joint.
@@ -51,6 +52,7 @@ class Part:
 
     reading: Reading
     node: SceneNode
+    lacks: Callable[[SceneNode, str], None]
     name: str
     place: Place
     motor: Motor | None
@@ -64,9 +66,13 @@ class Part:
         """Return the text of a field, `default` if it has none."""
         return self.node.text(name) or default
 
-    def refuse(self, fact: str, remedy: str = ELSEWHERE) -> None:
-        """Note that this device cannot be simulated."""
+    def refuse(self, fact: str, remedy: str) -> None:
+        """Note a mistake in the world."""
         self.reading.refuse(self.node, fact, remedy)
+
+    def lack(self, fact: str) -> None:
+        """Note that this device cannot be simulated."""
+        self.lacks(self.node, fact)
 
     def take_outline(self) -> list[Shape]:
         """Return the shapes of its boundingObject, which become part of the robot's outline."""
@@ -88,16 +94,8 @@ class Carrier(Protocol):
         """Return the next number of the robot's own noise."""
         ...
 
-    def look(
-        self, rays: Sequence[Ray], reach_m: Sequence[float], heights_m: Sequence[float]
-    ) -> Callable[[], Sequence[float]]:
-        """Return a function that returns how far each ray travels now, in meters.
-
-        Args:
-            rays: in the robot's frame.
-            reach_m: of each ray: the longest distance that matters.
-            heights_m: of each ray, in the robot's frame.
-        """
+    def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each beam travels now, in meters."""
         ...
 
     def touching(self, outline: Sequence[Shape]) -> int:

@@ -26,7 +26,7 @@ class TouchSensor:
 
 def _read(part: Part) -> TouchSensor:
     if part.text("type", "bumper") != "bumper":
-        part.refuse("a touch sensor that measures force")
+        part.lack("a touch sensor that measures force")
     # Without physics of its own, a bumper is part of the robot in Webots too.
     return TouchSensor(name=part.name, model=part.text("model"), outline=part.take_outline())
 

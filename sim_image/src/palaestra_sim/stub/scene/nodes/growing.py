@@ -16,6 +16,7 @@ from palaestra_sim.stub.scene.nodes.scope import Scope, definitions
 from palaestra_sim.stub.scene.nodes.types import is_base_type
 from palaestra_sim.world import Is, Item, Node, Proto, Value, World
 from palaestra_sim.world.source import Source
+from palaestra_sim.world.stand_ins import Part, StandIn
 
 MAX_DEPTH: Final = 20  # of PROTOs inside PROTOs; Webots' own robots have three
 
@@ -26,9 +27,13 @@ class Descriptions:
 
     Attributes:
         protos: PROTOs without templates, by name.
+        stand_ins: simple solids in place of other PROTOs, by name; these come first.
+        unusable: why local PROTOs cannot be expanded, by name.
     """
 
     protos: Mapping[str, Proto] = field(default_factory=dict)
+    stand_ins: Mapping[str, StandIn] = field(default_factory=dict)
+    unusable: Mapping[str, WorldError] = field(default_factory=dict)
 
 
 class Grower:
@@ -63,11 +68,19 @@ class Grower:
         except WorldError as error:
             self.refused.append(error)
             return None
-        proto = self._descriptions.protos.get(source.type_name)
-        if proto is not None and not is_base_type(source.type_name):
-            return self._instance(proto, source, scope, parent)
+        if not is_base_type(source.type_name):
+            stand_in = self._descriptions.stand_ins.get(source.type_name)
+            if stand_in is not None and source.text("controller") != "ros":
+                return self._solid(stand_in, source, scope, parent)
+            proto = self._descriptions.protos.get(source.type_name)
+            if proto is not None:
+                return self._instance(proto, source, scope, parent)
         node = self._new(source.type_name, Origin(source, scope.source), parent)
         node.def_name = source.def_name or ""
+        if (error := self._descriptions.unusable.get(source.type_name)) is not None:
+            node.unusable = (
+                f"{source.type_name} cannot be expanded ({error.world}:{error.line}: {error.fact})"
+            )
         node.twins = self._twins.setdefault((scope, source.span[0]), [])
         node.twins.append(node)
         self._fill(node, source, scope)
@@ -110,6 +123,37 @@ class Grower:
             node.def_name = source.def_name or ""
             node.origin = Origin(source, scope.source)
         return node
+
+    def _solid(self, stand_in: StandIn, source: Node, scope: Scope, parent: SceneNode) -> SceneNode:
+        """Return a Solid of the size of an instance; it keeps the fields that the instance gives."""
+        origin = Origin(source, scope.source)
+        node = self._new("Solid", origin, parent)
+        node.proto_name = stand_in.name
+        node.def_name = source.def_name or ""
+        node.fields["translation"] = FieldContent(list(stand_in.translation))
+        self._fill(node, source, scope)
+        given = {name: numbers for name in stand_in.fields if (numbers := node.numbers(name))}
+        outline = self._new("Group", origin, node)
+        outline.fields["children"] = FieldContent([], bracketed=True)
+        for part in stand_in.parts(given):
+            outline.fields["children"].items.append(self._part(part, origin, outline))
+        node.fields["boundingObject"] = FieldContent([outline])
+        for name in ("physics", "children"):
+            node.fields.pop(name, None)
+        return node
+
+    def _part(self, part: Part, origin: Origin, parent: SceneNode) -> SceneNode:
+        pose = self._new("Pose", origin, parent)
+        pose.fields["translation"] = FieldContent(list(part.at))
+        pose.fields["rotation"] = FieldContent([0.0, 0.0, 1.0, part.heading_rad])
+        shape = self._new(part.kind, origin, pose)
+        if part.kind == "Box":
+            shape.fields["size"] = FieldContent(list(part.size))
+        else:
+            names = ("radius", "height") if part.kind == "Cylinder" else ("radius",)
+            shape.fields.update(zip(names, (FieldContent([it]) for it in part.size), strict=True))
+        pose.fields["children"] = FieldContent([shape], bracketed=True)
+        return pose
 
     def _new(self, type_name: str, origin: Origin | None, parent: SceneNode | None) -> SceneNode:
         node = SceneNode(len(self.nodes), type_name, origin, parent)
