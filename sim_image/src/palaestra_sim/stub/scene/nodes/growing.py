@@ -77,10 +77,9 @@ class Grower:
                 return self._instance(proto, source, scope, parent)
         node = self._new(source.type_name, Origin(source, scope.source), parent)
         node.def_name = source.def_name or ""
-        if (error := self._descriptions.unusable.get(source.type_name)) is not None:
-            node.unusable = (
-                f"{source.type_name} cannot be expanded ({error.world}:{error.line}: {error.fact})"
-            )
+        why = self._descriptions.unusable.get(source.type_name)
+        if why is not None:
+            node.unusable = f"{source.type_name} is not expanded ({why.world}:{why.line}: {why.fact})"
         node.twins = self._twins.setdefault((scope, source.span[0]), [])
         node.twins.append(node)
         self._fill(node, source, scope)
