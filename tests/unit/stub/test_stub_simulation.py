@@ -12,7 +12,7 @@ from palaestra_sim.stub.scene.robot import seed_of
 from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.stub.scene.tree.catalogue import FieldType
 from palaestra_sim.world import builtin
-from tests.unit.stub.robotino import WHEELS, wheel_speeds
+from tests.robotino import WHEELS, wheel_speeds
 
 
 @pytest.fixture

@@ -19,16 +19,13 @@ from typing import Final
 from palaestra_sim.stub.physics.drive import Drive
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.obstacles import Contact, Disc, Neighborhood, Obstacle, Ray
+from palaestra_sim.stub.physics.outline import RoundPart
 
 ACCELERATIONS: Final = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2
 
 _PASSES: Final = 4  # a corner has two walls and perhaps a robot; more passes change nothing
 _RESTING_M: Final = 1e-9  # a robot that was pushed out rests at the surface, give or take rounding
 _STRIDE: Final = 0.3  # of the smallest radius: how far a robot may move before it looks for contacts
-
-_MOST_GAPS: Final = 15  # between the cylinders of one box; a thin bar has holes that nothing fits through
-
-Part = tuple[float, float, float]  # x, y of a cylinder's axis in the robot's frame, and its radius; meters
 
 
 class Body(Disc):
@@ -37,7 +34,7 @@ class Body(Disc):
     Its own disc is the one around all of them.
 
     Args:
-        parts: the cylinders; none: nothing can run into it.
+        outline: the cylinders; none: nothing can run into it.
         wheels: the motors of the wheels.
         drive: the law of these wheels; None: they do not move it.
 
@@ -50,6 +47,7 @@ class Body(Disc):
     """
 
     __slots__ = (
+        "_arm_m",
         "_drive_law",
         "_omega",
         "_others",
@@ -68,11 +66,15 @@ class Body(Disc):
     )
 
     def __init__(
-        self, parts: Sequence[Part], wheels: Sequence[Motor] = (), drive: Drive | None = None
+        self, outline: Sequence[RoundPart], wheels: Sequence[Motor] = (), drive: Drive | None = None
     ) -> None:
-        super().__init__(0.0, 0.0, max((math.hypot(x, y) + radius for x, y, radius in parts), default=0.0))
-        self._parts = tuple(parts)
-        self._stride_m = _STRIDE * min((radius for _, _, radius in parts), default=0.0)
+        super().__init__(0.0, 0.0, max((math.hypot(x, y) + radius for x, y, radius in outline), default=0.0))
+        if drive is not None and len(wheels) != len(drive.to_speeds):
+            raise ValueError(f"{len(wheels)} motors do not fit a drive of {len(drive.to_speeds)} wheels")
+        self._parts = tuple(outline)
+        self._stride_m = _STRIDE * min((radius for _, _, radius in outline), default=0.0)
+        # Of the farthest axis; a turn moves nothing of a cylinder that stands in the middle.
+        self._arm_m = max((math.hypot(x, y) for x, y, _ in outline), default=0.0)
         self._wheels = tuple(wheels) if drive is not None else ()
         self._drive_law = drive
         self._solids = Neighborhood((), 0.0)
@@ -86,6 +88,14 @@ class Body(Disc):
         """X, y, cosine and sine of the heading."""
         return self.x, self.y, self.c, self.s
 
+    @property
+    def discs(self) -> list[Disc]:
+        """The cylinders where they are now, seen from above."""
+        return [
+            Disc(self.x + along * self.c - aside * self.s, self.y + along * self.s + aside * self.c, radius)
+            for along, aside, radius in self._parts
+        ]
+
     def driven_by(self, motor: Motor) -> bool:
         """Return whether a motor turns one of the wheels."""
         return motor in self._wheels
@@ -98,7 +108,7 @@ class Body(Disc):
     def contact(self, x: float, y: float, radius: float) -> Contact | None:
         """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
         deepest: Contact | None = None
-        for disc in self._discs():
+        for disc in self.discs:
             contact = disc.contact(x, y, radius)
             if contact is not None and (deepest is None or contact[2] > deepest[2]):
                 deepest = contact
@@ -106,7 +116,7 @@ class Body(Disc):
 
     def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
         """Shorten `reach` to where the rays of a robot at `frame` meet a part of this one."""
-        for disc in self._discs():
+        for disc in self.discs:
             disc.scan(frame, rays, reach)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
@@ -119,7 +129,7 @@ class Body(Disc):
 
     def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
         """Return where a ray enters the first part and leaves the last; enter > leave: it misses."""
-        crossings = [disc.crossing(frame, ray) for disc in self._discs()]
+        crossings = [disc.crossing(frame, ray) for disc in self.discs]
         met = [crossing for crossing in crossings if crossing[1] >= 0.0 and crossing[0] <= crossing[1]]
         return min(met, default=(math.inf, -math.inf))
 
@@ -177,18 +187,20 @@ class Body(Disc):
         """Drive along an arc, in strides short enough that nothing is passed through."""
         c = self.c
         s = self.s
-        if self._omega:
-            turned = self._omega * step_s
+        turned = self._omega * step_s
+        if turned:
             middle = self.heading_rad + 0.5 * turned
             c = math.cos(middle)
             s = math.sin(middle)
-            self._turn(turned)
         dx = (self._vx * c - self._vy * s) * step_s
         dy = (self._vx * s + self._vy * c) * step_s
         x = self.x
         y = self.y
-        strides = 1 + int((abs(dx) + abs(dy)) / self._stride_m) if self._stride_m else 1
+        way = abs(dx) + abs(dy) + abs(turned) * self._arm_m
+        strides = 1 + int(way / self._stride_m) if self._stride_m else 1
         for _ in range(strides):
+            if turned:
+                self._turn(turned / strides)
             self.x += dx / strides
             self.y += dy / strides
             if self._others or self._solids.near(self.x, self.y):
@@ -235,26 +247,7 @@ class Body(Disc):
 
     def feel(self, x: float, y: float, radius: float) -> None:
         """Note which parts a round robot at x, y touches."""
-        for index, disc in enumerate(self._discs()):
+        for index, disc in enumerate(self.discs):
             contact = disc.contact(x, y, radius)
             if contact is not None and contact[2] > _RESTING_M:
                 self.touched |= 1 << index
-
-    def _discs(self) -> list[Disc]:
-        """Return the parts where they are now."""
-        return [
-            Disc(self.x + along * self.c - aside * self.s, self.y + along * self.s + aside * self.c, radius)
-            for along, aside, radius in self._parts
-        ]
-
-
-def box_parts(x: float, y: float, heading_rad: float, length: float, width: float) -> list[Part]:
-    """Return cylinders that cover a box from end to end; only its corners are rounded."""
-    if width > length:
-        length, width, heading_rad = width, length, heading_rad + math.pi / 2.0
-    radius = width / 2.0
-    row = length - width  # from the first axis to the last
-    gaps = math.ceil(min(row / radius, _MOST_GAPS)) if radius else 0
-    c, s = math.cos(heading_rad), math.sin(heading_rad)
-    offsets = [row * (index / gaps - 0.5) for index in range(gaps + 1)] if gaps else [0.0]
-    return [(x + offset * c, y + offset * s, radius) for offset in offsets]

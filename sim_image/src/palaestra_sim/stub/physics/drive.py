@@ -1,134 +1,252 @@
-"""The law by which wheels move a robot, found from where they stand and how they roll.
+"""Which wheels drive a robot, and how: from the places of its wheels to its motion, and back.
 
-A wheel at p that turns at w about its axle a moves its hub by w r along d = a x z. Rollers let it slip. It
-then holds the floor only along the axis e of the roller that touches it: for an omnidirectional wheel e is d,
-for a Mecanum wheel it is between d and a. So each wheel gives one equation for the velocity (vx, vy, omega):
+A wheel holds the floor along one direction, its grip. A plain tire grips along the way that it rolls, a
+wheel with rollers along the axis of the roller that stands on the floor. Each grip is one linear equation
+between the robot's motion and the speed of the wheel; `find_drive` solves all of them, exactly or by least
+squares. So no wheel needs a name, and a pair, a row or a ring of wheels needs no case of its own.
 
-    e . (v + omega x p) = (e . d) r w
+- Grips in different directions leave no freedom: the robot moves in any direction (omni, mecanum).
+- Parallel grips leave it free across them, where only plain tires resist. They would slide least if the robot
+  turned about their middle, so there it has no speed across (differential, skid-steer).
 
-Three independent equations are an omnidirectional drive. If all plain wheels roll the same way, their tires
-add one: the middle of the wheels does not move sideways. That is a differential drive, or with four wheels
-and more a skid-steer, which slips as it turns. More wheels than needed are averaged by least squares.
+Two plain tires with different axles would block each other. Worlds write them nevertheless, for
+omnidirectional wheels whose rollers are a friction that is low along the axle; so they slide here too.
+
+A skid-steer robot turns as its geometry says. On a real floor its tires slip, and it turns more slowly.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from operator import mul
-from typing import Final
+from typing import Final, NamedTuple
 
-Twist = tuple[float, float, float]  # vx, vy in m/s and omega in rad/s
-Row = tuple[float, float, float]
+Direction = tuple[float, float]  # x and y of a unit vector in the robot's frame
+Twist = tuple[float, float, float]  # vx, vy in m/s and omega in rad/s; or the coefficients of these three
+Rows = tuple[Twist, Twist, Twist]
 
-_INDEPENDENT: Final = 1e-6  # of the determinant of normalized equations
-_PARALLEL: Final = 1e-3  # the sine of the angle between two axles that count as parallel
+_PARALLEL: Final = 0.05  # sine of the largest angle, 3 degrees, between grips that count as parallel
+_LEAST_GAIN: Final = 0.05  # of a wheel's rim speed that its rollers must leave along their axis
+_LEAST_VOLUME: Final = 1e-3  # of 1: three ideal equations have 1, dependent ones 0
+_LEAST_ARM_M: Final = 1e-3  # of at least one wheel; shorter arms do not turn a robot
+_THREE: Final = 3
+_FARTHEST_M: Final = 1e6  # larger numbers are mistakes, and would overflow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wheel:
-    """A driven wheel, in the frame of its robot.
+    """A driven wheel on the floor, in the robot's frame.
 
     Attributes:
         x_m, y_m: of its hub.
-        axle: unit vector, level, about which a positive speed turns the wheel.
-        radius_m: of the wheel.
-        roller: unit vector of the axis of the roller on the floor; None for a tire.
+        axle: the axis about which a positive speed turns the wheel.
+        radius_m: from the hub to the floor.
+        roller: the axis of the roller that stands on the floor; None for a plain tire.
     """
 
     x_m: float
     y_m: float
-    axle: tuple[float, float]
+    axle: Direction
     radius_m: float
-    roller: tuple[float, float] | None = None
+    roller: Direction | None = None
 
     @property
-    def forward(self) -> tuple[float, float]:
-        """The direction in which the hub moves at a positive speed."""
+    def forward(self) -> Direction:
+        """The direction in which a positive speed rolls the hub."""
         return self.axle[1], -self.axle[0]
 
-    def row(self, direction: tuple[float, float]) -> Row:
-        """Return the speed of the hub along a direction, as coefficients of vx, vy and omega."""
-        ex, ey = direction
-        return ex, ey, ey * self.x_m - ex * self.y_m
+    @property
+    def grip(self) -> Direction:
+        """The direction in which the floor holds the wheel."""
+        return self.forward if self.roller is None else self.roller
+
+    @property
+    def plausible(self) -> bool:
+        """Whether every number is finite and of a size that occurs."""
+        numbers = (self.x_m, self.y_m, *self.axle, *self.grip)
+        small = all(abs(number) <= _FARTHEST_M for number in numbers)
+        return small and 1.0 / _FARTHEST_M <= self.radius_m <= _FARTHEST_M
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """The law of one robot, linear in both directions.
+    """The motion of a robot as a linear function of its wheels' speeds, and the reverse.
 
     Attributes:
-        forward: three rows, one coefficient a wheel: from the wheels' speeds to vx, vy, omega.
-        backward: a row a wheel: from vx, vy, omega to its speed.
+        to_twist: a wheel a row: what 1 rad/s of this wheel adds to vx, vy and omega of the robot's origin.
+        to_speeds: a wheel a row: what vx, vy and omega, each 1, add to its speed in rad/s.
     """
 
-    forward: tuple[tuple[float, ...], ...]
-    backward: tuple[Row, ...]
+    to_twist: tuple[Twist, ...]
+    to_speeds: tuple[Twist, ...]
 
     def twist(self, speeds: Sequence[float]) -> Twist:
-        """Return vx, vy in m/s and omega in rad/s from the wheels' speeds in rad/s."""
-        vx, vy, omega = (_dot(row, speeds) for row in self.forward)
+        """Return vx, vy in m/s and omega in rad/s of the robot's origin, from speeds in rad/s."""
+        if len(speeds) == _THREE:  # the loop below takes twice as long
+            (x0, y0, t0), (x1, y1, t1), (x2, y2, t2) = self.to_twist
+            s0, s1, s2 = speeds
+            return x0 * s0 + x1 * s1 + x2 * s2, y0 * s0 + y1 * s1 + y2 * s2, t0 * s0 + t1 * s1 + t2 * s2
+        vx = vy = omega = 0.0
+        for (x, y, turning), speed in zip(self.to_twist, speeds, strict=True):
+            vx += x * speed
+            vy += y * speed
+            omega += turning * speed
         return vx, vy, omega
 
-    def wheel_speeds(self, vx: float, vy: float, omega: float) -> list[float]:
-        """Return the wheels' speeds in rad/s for a twist that the robot can have."""
-        return [row[0] * vx + row[1] * vy + row[2] * omega for row in self.backward]
+    def wheel_speeds(self, vx: float, vy: float, omega: float) -> tuple[float, ...]:
+        """Return the speeds in rad/s with which the wheels roll along; what they cannot follow is ignored."""
+        return tuple(x * vx + y * vy + turning * omega for x, y, turning in self.to_speeds)
+
+
+STANDING: Final = Drive((), ())  # of a robot without wheels
 
 
 def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
-    """Return the law of these wheels; None if they do not determine how the robot moves."""
-    rolling = [(wheel, wheel.roller or wheel.forward) for wheel in wheels]
-    gains = [wheel.radius_m * _dot(held, wheel.forward) for wheel, held in rolling]
-    if not wheels or min(map(abs, gains)) == 0.0:
+    """Return how these wheels drive a robot; None if they cannot steer it."""
+    if not wheels or not all(wheel.plausible for wheel in wheels):
         return None
-    rows = [wheel.row(held) for wheel, held in rolling]
-    sideways = _sideways(wheels)
-    inverse = _inverse([*rows, *sideways])
-    if inverse is None:
+    common = _common([wheel.grip for wheel in wheels])
+    holds = [_hold(wheel, common or wheel.grip) for wheel in wheels]
+    if any(
+        abs(hold.gain_m) < _LEAST_GAIN * wheel.radius_m for hold, wheel in zip(holds, wheels, strict=True)
+    ):
         return None
-    forward = tuple(
-        tuple(_dot(line, row) * gain for row, gain in zip(rows, gains, strict=True)) for line in inverse
+    center = _middle(wheels)
+    arms = [hold.arm(center) for hold in holds]
+    if max(map(abs, arms)) < _LEAST_ARM_M:
+        return None
+    if common is None:
+        rows = _any_direction(holds, arms)
+    else:
+        rows = _two_directions(common, arms)
+        center = _pivot(wheels, common, center)
+    if not rows:
+        return None
+    return Drive(
+        tuple(_at_origin(row, center, hold.gain_m) for row, hold in zip(rows, holds, strict=True)),
+        tuple(hold.to_speed for hold in holds),
     )
-    backward = tuple(
-        (row[0] / gain, row[1] / gain, row[2] / gain) for row, gain in zip(rows, gains, strict=True)
-    )
-    return Drive(forward, backward)
 
 
-def _sideways(wheels: Sequence[Wheel]) -> list[Row]:
-    """Return the equation of tires that all roll the same way: their middle does not move sideways."""
-    first = wheels[0].axle
-    if any(it.roller or abs(first[0] * it.axle[1] - first[1] * it.axle[0]) > _PARALLEL for it in wheels):
+class _Hold(NamedTuple):
+    """Where and in which direction the floor holds a wheel, and the meters there that are 1 rad of it."""
+
+    x: float
+    y: float
+    direction: Direction
+    gain_m: float
+
+    def arm(self, center: Direction) -> float:
+        """Return the lever of the hold about a point, in meters, positive to the left."""
+        return _cross((self.x - center[0], self.y - center[1]), self.direction)
+
+    @property
+    def to_speed(self) -> Twist:
+        """The wheel's row of `Drive.to_speeds`."""
+        x, y = self.direction
+        return x / self.gain_m, y / self.gain_m, self.arm((0.0, 0.0)) / self.gain_m
+
+
+def _hold(wheel: Wheel, direction: Direction) -> _Hold:
+    return _Hold(wheel.x_m, wheel.y_m, direction, wheel.radius_m * _dot(direction, wheel.forward))
+
+
+def _common(grips: Sequence[Direction]) -> Direction | None:
+    """Return the direction of parallel grips, which may be opposite; None if they differ."""
+    first = grips[0]
+    if any(abs(_cross(first, grip)) > _PARALLEL for grip in grips):
+        return None
+    signs = [math.copysign(1.0, _dot(first, grip)) for grip in grips]
+    x = math.fsum(sign * grip[0] for sign, grip in zip(signs, grips, strict=True))
+    y = math.fsum(sign * grip[1] for sign, grip in zip(signs, grips, strict=True))
+    length = math.hypot(x, y)
+    return (x / length, y / length) if length else None
+
+
+def _two_directions(forward: Direction, arms: Sequence[float]) -> list[Twist]:
+    """Return what 1 m/s of each hold adds to the motion of wheels that roll forward and turn."""
+    count = len(arms)
+    squares = math.fsum(arm * arm for arm in arms)
+    return [(forward[0] / count, forward[1] / count, arm / squares) for arm in arms]
+
+
+def _any_direction(holds: Sequence[_Hold], arms: Sequence[float]) -> list[Twist]:
+    """Return what 1 m/s of each hold adds to the motion; nothing if the holds leave a freedom.
+
+    The turning is scaled by the longest arm, so that all three unknowns are speeds of the same size.
+    """
+    longest = max(map(abs, arms))
+    rows = [(*hold.direction, arm / longest) for hold, arm in zip(holds, arms, strict=True)]
+    columns = list(zip(*rows, strict=True))
+    squares = _rows((_product(a, b) for b in columns) for a in columns)
+    size = (squares[0][0] + squares[1][1] + squares[2][2]) / 3.0
+    if _determinant(squares) < _LEAST_VOLUME * size**3:
         return []
-    x = sum(wheel.x_m for wheel in wheels) / len(wheels)
-    y = sum(wheel.y_m for wheel in wheels) / len(wheels)
-    return [(first[0], first[1], first[1] * x - first[0] * y)]
+    if len(rows) == len(columns):  # keeps the symmetry of mirrored wheels to the last bit
+        solved = list(zip(*_inverse(_rows(rows)), strict=True))
+    else:
+        inverse = _inverse(squares)
+        solved = [_row(_product(line, row) for line in inverse) for row in rows]
+    return [(vx, vy, turning / longest) for vx, vy, turning in solved]
 
 
-def _inverse(rows: Sequence[Row]) -> list[Row] | None:
-    """Return (A'A)^-1 for the equations A, so that (A'A)^-1 A' solves them; None if they are dependent."""
-    reach = max(abs(row[2]) for row in rows)
-    if reach == 0.0:
-        return None
-    scaled = [(row[0], row[1], row[2] / reach) for row in rows]
-    n = [[sum(row[i] * row[j] for row in scaled) / len(rows) for j in range(3)] for i in range(3)]
-    cofactors = [
-        [
-            n[(j + 1) % 3][(i + 1) % 3] * n[(j + 2) % 3][(i + 2) % 3]
-            - n[(j + 1) % 3][(i + 2) % 3] * n[(j + 2) % 3][(i + 1) % 3]
-            for j in range(3)
-        ]
-        for i in range(3)
-    ]
-    determinant = sum(n[0][j] * cofactors[j][0] for j in range(3))
-    if determinant < _INDEPENDENT:
-        return None
-    scale = (1.0, 1.0, 1.0 / reach)
-    lines = [
-        [cofactors[i][j] / determinant / len(rows) * scale[i] * scale[j] for j in range(3)] for i in range(3)
-    ]
-    return [(line[0], line[1], line[2]) for line in lines]
+def _middle(wheels: Sequence[Wheel]) -> Direction:
+    """Return x and y in meters of the wheels' centroid."""
+    count = len(wheels)
+    return math.fsum(wheel.x_m for wheel in wheels) / count, math.fsum(wheel.y_m for wheel in wheels) / count
 
 
-def _dot(a: Sequence[float], b: Sequence[float]) -> float:
-    return float(sum(map(mul, a, b)))
+def _pivot(wheels: Sequence[Wheel], forward: Direction, middle: Direction) -> Direction:
+    """Return the point without speed across: beside the middle of all wheels, amid those that resist."""
+    plain = [wheel for wheel in wheels if wheel.roller is None]
+    if not plain:
+        return middle
+    x, y = _middle(plain)
+    ahead = _dot(forward, (x - middle[0], y - middle[1]))
+    return middle[0] + ahead * forward[0], middle[1] + ahead * forward[1]
+
+
+def _at_origin(row: Twist, center: Direction, gain_m: float) -> Twist:
+    """Return what 1 rad/s of a wheel adds to the motion of the origin, from 1 m/s of its hold at `center`."""
+    vx, vy, omega = row
+    return (vx + omega * center[1]) * gain_m, (vy - omega * center[0]) * gain_m, omega * gain_m
+
+
+def _dot(a: Direction, b: Direction) -> float:
+    return a[0] * b[0] + a[1] * b[1]
+
+
+def _cross(a: Direction, b: Direction) -> float:
+    return a[0] * b[1] - a[1] * b[0]
+
+
+def _product(a: Iterable[float], b: Iterable[float]) -> float:
+    """Return the sum of the products, rounded once, so that mirrored wheels cancel exactly."""
+    return math.fsum(x * y for x, y in zip(a, b, strict=True))
+
+
+def _normal(a: Twist, b: Twist) -> Twist:
+    """Return the cross product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _determinant(rows: Rows) -> float:
+    return _product(rows[0], _normal(rows[1], rows[2]))
+
+
+def _inverse(rows: Rows) -> Rows:
+    a, b, c = rows
+    volume = _determinant(rows)
+    columns = (_normal(b, c), _normal(c, a), _normal(a, b))
+    return _rows((x / volume, y / volume, z / volume) for x, y, z in zip(*columns, strict=True))
+
+
+def _row(numbers: Iterable[float]) -> Twist:
+    a, b, c = numbers
+    return a, b, c
+
+
+def _rows(lines: Iterable[Iterable[float]]) -> Rows:
+    a, b, c = map(_row, lines)
+    return a, b, c

@@ -12,12 +12,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.stub.physics.body import Body, box_parts
-from palaestra_sim.stub.physics.body import Part as BodyPart
+from palaestra_sim.stub.physics.body import Body
 from palaestra_sim.stub.physics.drive import Wheel, find_drive
 from palaestra_sim.stub.physics.geometry import Vector, turn
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.obstacles import Disc
+from palaestra_sim.stub.physics.outline import RoundPart, discs_of_box
 from palaestra_sim.stub.scene.arguments import Arguments, read_arguments
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.devices.kind import Devices, Kind, Part
@@ -336,7 +336,7 @@ class _RobotReader:
         return device
 
 
-def _covering(shapes: Iterable[Shape]) -> list[tuple[BodyPart, Shape]]:
+def _covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
     """Return the cylinders of an outline with their shapes, without those inside another one."""
     parts = [(part, shape) for shape in shapes for part in _cylinders(shape)]
     return [
@@ -350,15 +350,16 @@ def _covering(shapes: Iterable[Shape]) -> list[tuple[BodyPart, Shape]]:
     ]
 
 
-def _inside(inner: BodyPart, outer: BodyPart) -> bool:
+def _inside(inner: RoundPart, outer: RoundPart) -> bool:
     return math.hypot(inner[0] - outer[0], inner[1] - outer[1]) + inner[2] <= outer[2]
 
 
-def _cylinders(shape: Shape) -> list[BodyPart]:
+def _cylinders(shape: Shape) -> list[RoundPart]:
     outline = shape.obstacle()
     if isinstance(outline, Disc):
-        return [(outline.x, outline.y, outline.radius)]
-    return box_parts(outline.x, outline.y, outline.heading_rad, 2.0 * outline.half_x, 2.0 * outline.half_y)
+        return [RoundPart(outline.x, outline.y, outline.radius)]
+    length, width = 2.0 * outline.half_x, 2.0 * outline.half_y
+    return list(discs_of_box(outline.x, outline.y, outline.heading_rad, length, width))
 
 
 def _moves(place: Place) -> bool:
