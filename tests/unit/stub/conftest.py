@@ -117,7 +117,7 @@ class FakeNode:
 
     def get(self, path, **fields):
         """Call a service and return the one field of its response."""
-        (value,) = _fields(self.call(path, **fields))
+        (value,) = self.call(path, **fields)
         return value
 
     def inbox(self, path):
@@ -191,11 +191,6 @@ class FakeRos:
 
 def _travelled(codec, fields):
     return codec.decode(codec.encode(fields))
-
-
-def _fields(message):
-    names = getattr(message, "_fields", None) or message.__slots__
-    return [getattr(message, name) for name in names]
 
 
 @pytest.fixture

@@ -1,7 +1,12 @@
-"""ROS 1 for trainer and simulator; all modules except `sockets` are pure.
+"""ROS 1 for trainer and simulator, without ROS; all modules except `sockets` are pure.
 
 - `tcpros`: connection headers and frames, as bytes
-- `definitions`: the types of the interface, as text
-- `rostypes`: their md5 sums, and values to and from bytes
+- `syntax`: the text of a message, read: its fields and constants
+- `definitions`: the types of the interface, as text and read
+- `digests`: the md5 sums and the full texts that peers exchange
+- `fixed`: messages of fixed size, as numbers for one struct
+- `variable`: messages with strings and lists, section by section
+- `codec`: the values of any message, to and from bytes
+- `rostypes`: the types of the interface, each with its digest and its codecs
 - `sockets`: the socket options of both ends
 """

@@ -8,12 +8,18 @@ later one, has a package of that name: an installed webots_ros is imported inste
 The manifest is a `manifest.xml` and names no dependencies. Only for such a package does roslib add `src` to
 the path of ROS's tools, and only if each dependency has a manifest. Debian has the manifests of std_msgs,
 geometry_msgs and sensor_msgs in their C++ packages.
+
+Only this module needs genpy and genmsg: its Python modules are for rospy, which has them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from typing import Any
 
+import genmsg
+import genmsg.msg_loader
 import genpy.generator
 
 from palaestra_protocol.ros import definitions
@@ -50,14 +56,26 @@ def _of_one_kind(kind: str, types: Iterable[str], module: Callable[[str], str]) 
 
 
 def _message_module(name: str) -> str:
-    spec = definitions.message_spec(name)
-    return _text(genpy.generator.msg_generator(definitions.context_for(spec), spec, {}))
+    context = _context()
+    return _text(genpy.generator.msg_generator(context, context.get_registered(name), {}))
 
 
 def _service_module(name: str) -> str:
-    spec = definitions.service_spec(name)
-    context = definitions.context_for(spec.request, spec.response)
+    context = _context()
+    spec = genmsg.msg_loader.load_srv_from_string(context, definitions.text(name), name)
+    genmsg.msg_loader.load_depends(context, spec, {})
     return _text(genpy.generator.srv_generator(context, spec, {}))
+
+
+@cache
+def _context() -> Any:
+    """Return genmsg's `MsgContext` with every message of the interface."""
+    context = genmsg.MsgContext.create_default()
+    names, _ = definitions.type_names()
+    specs = [genmsg.msg_loader.load_msg_from_string(context, definitions.text(name), name) for name in names]
+    for spec in specs:
+        genmsg.msg_loader.load_depends(context, spec, {})
+    return context
 
 
 def _text(lines: Iterable[str]) -> str:

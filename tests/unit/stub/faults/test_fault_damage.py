@@ -1,7 +1,6 @@
 """Wrong messages and answers, as bytes."""
 
 import math
-import struct
 
 import pytest
 
@@ -70,7 +69,7 @@ def test_a_message_cut_short_is_a_whole_frame_that_cannot_be_read():
     short = payload(damaged_message("sensor_msgs/Range", sound, WRONG_SHAPE))
 
     assert len(short) == (len(sound) - LENGTH.size) // 2
-    with pytest.raises((ValueError, struct.error)):
+    with pytest.raises(ValueError, match="bytes"):
         message_type("sensor_msgs/Range").codec.decode(short)
 
 
@@ -99,10 +98,7 @@ def test_each_float_of_an_answer_is_replaced(service, fields, numbers):
 def test_floats_of_messages_in_a_list_are_replaced_too():
     """The points where a robot touches something."""
     codec = service_type("webots_ros/node_get_contact_points").response
-    answer = codec.decode(codec.encode({}))
-    point_type = message_type("webots_ros/ContactPoint").codec
-    answer.contact_points = [point_type.decode(point_type.encode({"node_id": 7}))]
-    sound = codec.encode({"contact_points": answer.contact_points})
+    sound = codec.encode({"contact_points": [{"node_id": 7}]})
 
     (point,) = codec.decode(
         payload(damaged_answer(codec, b"\1" + frame(sound), WRONG_VALUE)[1:])

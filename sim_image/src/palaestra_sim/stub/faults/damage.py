@@ -47,27 +47,18 @@ def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> b
         return data
     for damage in damages:
         if isinstance(damage, WrongValue):
-            payload = response.encode(_fields(response.decode(payload), damage.value))
+            payload = response.encode(_with_floats(response.decode(payload), damage.value)._asdict())
         else:
             payload = payload[: len(payload) // 2]
     return succeeded + frame(payload)
 
 
-def _fields(message: Any, value: float) -> dict[str, Any]:
-    """Return the fields of a decoded message, with `value` in place of each float."""
-    names = getattr(message, "_fields", None) or message.__slots__
-    return {name: _with_floats(getattr(message, name), value) for name in names}
-
-
 def _with_floats(part: Any, value: float) -> Any:
-    """Return an encodable part of a decoded message, with `value` in place of each float."""
+    """Return a decoded message, or a part of one, with `value` in place of each float."""
     if isinstance(part, float):
         return value
-    if hasattr(part, "_fields"):
-        return _fields(part, value)
     if isinstance(part, list | tuple):
-        return [_with_floats(it, value) for it in part]
-    if hasattr(part, "__slots__"):
-        for name, field in _fields(part, value).items():
-            setattr(part, name, field)
+        changed = [_with_floats(it, value) for it in part]
+        make = getattr(part, "_make", None)  # of a message inside, a named tuple
+        return changed if make is None else make(changed)
     return part

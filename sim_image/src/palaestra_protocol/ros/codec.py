@@ -1,0 +1,120 @@
+"""The values of a ROS message, to and from bytes.
+
+A message of fixed size is one precompiled struct; any other is written and read section by section.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from palaestra_protocol.ros.fixed import UNFIT, Find, Record, has_fixed_size, record
+from palaestra_protocol.ros.syntax import Message
+from palaestra_protocol.ros.tcpros import frame
+from palaestra_protocol.ros.variable import Sections
+
+
+class Codec(Protocol):
+    """Turns the values of one message into bytes and back."""
+
+    def encode(self, fields: Mapping[str, Any]) -> bytes:
+        """Return the bytes of a message; absent fields are zero, empty or False.
+
+        A message inside is a mapping too, or a tuple of all its fields in order, as `decode` returns.
+
+        Raises:
+            ValueError: a value does not fit its field.
+        """
+        ...
+
+    def frame(self, fields: Mapping[str, Any]) -> bytes:
+        """Return the bytes of a message after their length, as TCPROS requires.
+
+        Raises:
+            ValueError: a value does not fit its field.
+        """
+        ...
+
+    def decode(self, payload: bytes | memoryview) -> Any:
+        """Return a named tuple of the fields; a name that Python reserves has an underscore, as `from_`.
+
+        Numbers of an array are a tuple, those of `uint8` and `char` bytes; other elements are a list.
+        Characters that are not UTF-8 are replaced.
+
+        Raises:
+            ValueError: the bytes are not such a message.
+        """
+        ...
+
+
+def codec_of(message: Message, find: Find) -> Codec:
+    """Return the codec of a message.
+
+    Args:
+        message: its definition.
+        find: returns the definition of a nested message by its name.
+    """
+    if all(has_fixed_size(field, find) for field in message.fields):
+        return _FixedCodec(message.name, record(message, message.fields, find))
+    return _VariableCodec(message.name, Sections(message, find))
+
+
+class _FixedCodec:
+    """A message of fixed size: one precompiled struct."""
+
+    def __init__(self, name: str, record: Record) -> None:
+        self._name = name
+        self._record = record
+        self._struct = struct.Struct("<" + record.codes)
+        self._framed = struct.Struct("<I" + record.codes)
+
+    def encode(self, fields: Mapping[str, Any]) -> bytes:
+        try:
+            return self._struct.pack(*self._record.flatten(fields))
+        except UNFIT as error:
+            raise self._refusal(fields, error) from error
+
+    def frame(self, fields: Mapping[str, Any]) -> bytes:
+        try:
+            return self._framed.pack(self._struct.size, *self._record.flatten(fields))
+        except UNFIT as error:
+            raise self._refusal(fields, error) from error
+
+    def decode(self, payload: bytes | memoryview) -> Any:
+        try:
+            numbers = self._struct.unpack(payload)
+        except struct.error as error:
+            raise ValueError(f"{len(payload)} bytes for {self._struct.size}") from error
+        return self._record.make(numbers) if self._record.flat else self._record.build(numbers)
+
+    def _refusal(self, fields: Mapping[str, Any], error: Exception) -> ValueError:
+        return ValueError(f"{self._name}: {self._record.unfit(fields)}: {error}")
+
+
+class _VariableCodec:
+    """A message with strings or lists."""
+
+    def __init__(self, name: str, sections: Sections) -> None:
+        self._name = name
+        self._sections = sections
+
+    def encode(self, fields: Mapping[str, Any]) -> bytes:
+        pieces: list[bytes] = []
+        try:
+            self._sections.write(fields, pieces)
+        except UNFIT as error:
+            raise ValueError(f"{self._name}: {error}") from error
+        return b"".join(pieces)
+
+    def frame(self, fields: Mapping[str, Any]) -> bytes:
+        return frame(self.encode(fields))
+
+    def decode(self, payload: bytes | memoryview) -> Any:
+        try:
+            message, end = self._sections.read(bytes(payload), 0)
+        except struct.error as error:
+            raise ValueError(f"{len(payload)} bytes, which end inside a field") from error
+        if end != len(payload):
+            raise ValueError(f"{len(payload)} bytes for {end}")
+        return message

@@ -1,0 +1,55 @@
+"""The md5 sum by which peers recognize a type, and the full text that they send for tools.
+
+The sum covers constants, fields and the sums of nested messages, but no comments and no names of packages.
+Source: http://wiki.ros.org/ROS/Technical%20Overview#Message_serialization_and_msg_MD5_sums
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+
+from palaestra_protocol.ros.syntax import BUILT_IN, Field, Message
+
+_LINE = "=" * 80
+
+
+def md5(find: Callable[[str], Message], *messages: Message) -> str:
+    """Return the sum of a message, or that of a service, of its request and response.
+
+    Args:
+        find: returns the definition of a nested message by its name.
+        messages: the message, or request and response.
+    """
+    covered = "".join("\n".join(_covered(find, message)) for message in messages)
+    return hashlib.md5(covered.encode(), usedforsecurity=False).hexdigest()
+
+
+def full_text(find: Callable[[str], Message], message: Message) -> str:
+    """Return the text of a message, then that of each message inside it.
+
+    Args:
+        find: returns the definition of a nested message by its name.
+        message: of any type.
+    """
+    inside = (f"{_LINE}\nMSG: {name}\n{find(name).text}" for name in dict.fromkeys(_nested(find, message)))
+    return "\n".join((message.text, *inside))
+
+
+def _covered(find: Callable[[str], Message], message: Message) -> Iterator[str]:
+    """Yield the lines that the sum covers."""
+    yield from message.constants
+    for field in message.fields:
+        yield f"{_covered_type(find, field)} {field.name}"
+
+
+def _covered_type(find: Callable[[str], Message], field: Field) -> str:
+    return f"{field.type}{field.array}" if field.type in BUILT_IN else md5(find, find(field.type))
+
+
+def _nested(find: Callable[[str], Message], message: Message) -> Iterator[str]:
+    """Yield the name of each message inside, at any depth, as often as it occurs."""
+    for field in message.fields:
+        if field.type not in BUILT_IN:
+            yield field.type
+            yield from _nested(find, find(field.type))

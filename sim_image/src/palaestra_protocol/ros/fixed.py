@@ -1,0 +1,199 @@
+"""Messages of fixed size: their values become numbers in a row, for one struct.
+
+Every motor command and every step is one, so encoding and decoding them decides how fast a simulator steps.
+"""
+
+from __future__ import annotations
+
+import collections
+import keyword
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import accumulate
+from typing import Any, Protocol
+
+from palaestra_protocol.ros.syntax import NUMBERS, Field, Message, parse
+
+TIMES = {
+    "time": parse("time", "uint32 secs\nuint32 nsecs"),
+    "duration": parse("duration", "int32 secs\nint32 nsecs"),
+}
+
+# What Python raises for a value that does not fit its field.
+UNFIT = (AttributeError, OverflowError, TypeError, ValueError, struct.error)
+
+Find = Callable[[str], Message]
+
+
+class Part(Protocol):
+    """A field of fixed size that is more than one number."""
+
+    @property
+    def codes(self) -> str:
+        """Return the codes of its numbers, for `struct`."""
+        ...
+
+    @property
+    def empty(self) -> Any:
+        """Return the value of an absent field."""
+        ...
+
+    def flatten(self, value: Any) -> Iterable[Any]:
+        """Return the numbers of a value."""
+        ...
+
+    def build(self, numbers: Sequence[Any], at: int) -> Any:
+        """Return the value whose numbers begin `at`."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A message, or fields of one, of fixed size.
+
+    Attributes:
+        names: of the fields.
+        parts: for each field None if it is one number.
+        placed: the parts, each with the place of its first number among all.
+        empties: the value of each field if it is absent.
+        codes: of all numbers, in order.
+        make: makes the tuple with attributes.
+        flat: whether all fields are numbers.
+    """
+
+    names: tuple[str, ...]
+    parts: tuple[Part | None, ...]
+    placed: tuple[tuple[Part | None, int], ...]
+    empties: tuple[Any, ...]
+    codes: str
+    make: Callable[[Iterable[Any]], Any]
+    flat: bool
+
+    @property
+    def empty(self) -> Mapping[str, Any]:
+        """Return a message without any field."""
+        return {}
+
+    def flatten(self, value: Any) -> Iterable[Any]:
+        """Return the numbers of a message, given as a mapping, or as a tuple of all fields in order."""
+        if isinstance(value, tuple):
+            check_length(value, len(self.names))
+            values: Iterable[Any] = value
+        else:
+            values = map(value.get, self.names, self.empties)
+        if self.flat:
+            return values
+        numbers: list[Any] = []
+        for part, field in zip(self.parts, values, strict=False):
+            if part is None:
+                numbers.append(field)
+            else:
+                numbers += part.flatten(field)
+        return numbers
+
+    def build(self, numbers: Sequence[Any], at: int = 0) -> Any:
+        """Return the message whose numbers begin `at`."""
+        if self.flat:
+            return self.make(numbers[at : at + len(self.names)])
+        return self.make(
+            [part.build(numbers, at + place) if part else numbers[at + place] for part, place in self.placed]
+        )
+
+    def unfit(self, fields: Mapping[str, Any]) -> str:
+        """Return the first field whose value does not fit, found by packing each without the others."""
+        for name in filter(fields.__contains__, self.names):
+            try:
+                struct.pack(f"<{self.codes}", *self.flatten({name: fields[name]}))
+            except UNFIT:
+                return name
+        return ", ".join(self.names)
+
+
+class _Array:
+    """An array of fixed length, of numbers or of messages of fixed size."""
+
+    def __init__(self, field: Field, length: int, element: Part | None) -> None:
+        self._element = element
+        self._length = length
+        self._collect = collection(field.type)
+        self.codes = length * (NUMBERS[field.type] if element is None else element.codes)
+        self.empty = self._collect([0] * length) if element is None else [element.empty] * length
+
+    def flatten(self, value: Sequence[Any]) -> Iterable[Any]:
+        check_length(value, self._length)
+        if self._element is None:
+            return value
+        return [number for item in value for number in self._element.flatten(item)]
+
+    def build(self, numbers: Sequence[Any], at: int) -> Any:
+        if self._element is None:
+            return self._collect(numbers[at : at + self._length])
+        size = len(self._element.codes)
+        return [self._element.build(numbers, at + index * size) for index in range(self._length)]
+
+
+def collection(type_: str) -> Callable[[Iterable[Any]], Sequence[Any]]:
+    """Return what holds the numbers of an array of that type: bytes for `uint8` and `char`, else a tuple."""
+    return bytes if NUMBERS.get(type_) == "B" else tuple
+
+
+def check_length(value: Sequence[Any], length: int) -> None:
+    """Refuse an array with another number of elements.
+
+    Raises:
+        ValueError: it has.
+    """
+    if len(value) != length:
+        raise ValueError(f"{len(value)} elements for {length}")
+
+
+def attribute(field: Field) -> str:
+    """Return the attribute of a field: as in genpy, that of a field called `from` is `from_`."""
+    return field.name + "_" * keyword.iskeyword(field.name)
+
+
+def maker(message: Message, fields: Sequence[Field]) -> Callable[[Iterable[Any]], Any]:
+    """Return what makes a named tuple of the values of these fields."""
+    name = message.name.rpartition("/")[2]
+    names = tuple(map(attribute, fields))
+    made: Any = collections.namedtuple(name, names)  # type: ignore[misc]  # noqa: PYI024 - a run-time name
+    return partial(tuple.__new__, made)
+
+
+def message_of(type_: str, find: Find) -> Message:
+    """Return the definition of a type that is a message, as times are too."""
+    return TIMES.get(type_) or find(type_)
+
+
+def record(message: Message, fields: Sequence[Field], find: Find) -> Record:
+    """Return the record of some fields of a message, which all have a fixed size."""
+    parts = tuple(_part(field, find) for field in fields)
+    codes = [part.codes if part else NUMBERS[field.type] for field, part in zip(fields, parts, strict=True)]
+    return Record(
+        names=tuple(map(attribute, fields)),
+        parts=parts,
+        placed=tuple(zip(parts, accumulate(map(len, codes), initial=0), strict=False)),
+        empties=tuple(part.empty if part else 0 for part in parts),
+        codes="".join(codes),
+        make=maker(message, fields),
+        flat=not any(parts),
+    )
+
+
+def has_fixed_size(field: Field, find: Find) -> bool:
+    """Return whether all values of a field have the same number of bytes."""
+    if field.array == "[]" or field.type == "string":
+        return False
+    return field.type in NUMBERS or all(
+        has_fixed_size(it, find) for it in message_of(field.type, find).fields
+    )
+
+
+def _part(field: Field, find: Find) -> Part | None:
+    element: Part | None = None
+    if field.type not in NUMBERS:
+        inside = message_of(field.type, find)
+        element = record(inside, inside.fields, find)
+    return element if field.length is None else _Array(field, field.length, element)

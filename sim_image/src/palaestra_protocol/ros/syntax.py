@@ -1,0 +1,112 @@
+"""The text of a ROS message, read: its fields and constants.
+
+The rules are those of ROS's own parser, also where they surprise: the value of a constant of type `string` is
+the rest of its line, so that a `#` begins no comment.
+Source: http://wiki.ros.org/msg
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+# The types that are one number, with their codes of `struct`.
+NUMBERS = {
+    "bool": "?",
+    "int8": "b",
+    "byte": "b",
+    "uint8": "B",
+    "char": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
+BUILT_IN = frozenset({*NUMBERS, "string", "time", "duration"})
+
+_FIELD = re.compile(r"([A-Za-z][\w/]*)(?:\[(\d*)\])?\s+([A-Za-z]\w*)", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a message.
+
+    Attributes:
+        type: of the field, or of one element: built in, or `package/Name`.
+        array: empty, `[]` for any number of elements, or the number, as in `[9]`.
+        name: as it is written, also if Python reserves it.
+    """
+
+    type: str
+    array: str
+    name: str
+
+    @property
+    def length(self) -> int | None:
+        """The number of elements of an array of fixed length."""
+        return int(self.array[1:-1]) if len(self.array) > len("[]") else None
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """The definition of a message.
+
+    Attributes:
+        name: `package/Name`.
+        text: as it is written.
+        constants: each as its line in the text that the md5 is computed of.
+        fields: in the order of their bytes.
+    """
+
+    name: str
+    text: str
+    constants: tuple[str, ...]
+    fields: tuple[Field, ...]
+
+
+def parse(name: str, text: str) -> Message:
+    """Return the message of a definition.
+
+    Raises:
+        ValueError: a line is neither a field nor a constant.
+    """
+    constants, fields = [], []
+    for line in text.split("\n"):
+        bare = line.partition("#")[0].strip()
+        if "=" in bare:
+            constants.append(_constant(name, line, bare))
+        elif bare:
+            fields.append(_field(name, bare))
+    return Message(name, text, tuple(constants), tuple(fields))
+
+
+def _constant(message: str, line: str, bare: str) -> str:
+    type_ = bare.split(maxsplit=1)[0]
+    if type_ == "string":
+        name, _, value = line.partition(" ")[2].partition("=")
+    else:
+        name, _, value = (part.strip() for part in bare.removeprefix(type_).partition("="))
+    if type_ not in NUMBERS and type_ != "string":
+        raise ValueError(f"{message}: {bare!r} is not a constant; its type must be a number or string")
+    return f"{type_} {name}={value.strip()}"
+
+
+def _field(message: str, bare: str) -> Field:
+    found = _FIELD.fullmatch(bare)
+    if found is None:
+        raise ValueError(f"{message}: {bare!r} is not a field; write a type, a space and a name")
+    type_, length, name = found.groups()
+    return Field(_resolved(type_, message), "" if length is None else f"[{length}]", name)
+
+
+def _resolved(type_: str, message: str) -> str:
+    """Return a type with its package, which is that of the message if the text names none."""
+    if type_ == "Header":
+        return "std_msgs/Header"
+    if type_ in BUILT_IN or "/" in type_:
+        return type_
+    return f"{message.partition('/')[0]}/{type_}"

@@ -1,0 +1,186 @@
+"""Values of ROS messages to bytes and back, for types of every kind, and for bytes of strangers."""
+
+import math
+import struct
+from contextlib import suppress
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from palaestra_protocol.ros.codec import codec_of
+from palaestra_protocol.ros.syntax import parse
+from palaestra_protocol.ros.tcpros import frame
+from tests.ros_values import MESSAGES, find, values
+
+NAMES = sorted(MESSAGES)
+CODECS = {name: codec_of(MESSAGES[name], find) for name in NAMES}
+MORE = 2**32 - 1  # elements than any message holds
+
+
+def codec(text):
+    """Return the codec of a definition."""
+    return codec_of(parse("demo/Test", text), find)
+
+
+def as_mapping(value):
+    """Return a decoded value as it is given to `encode`, with lists where arrays of numbers are tuples."""
+    if hasattr(value, "_asdict"):
+        return {name: as_mapping(field) for name, field in value._asdict().items()}
+    return [as_mapping(it) for it in value] if isinstance(value, list | tuple) else value
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=30)
+@given(data=st.data())
+def test_every_value_survives_the_wire(name, data):
+    """Numbers, texts, lists and messages inside, of any size."""
+    given_values = data.draw(values(MESSAGES[name], find, whole=True))
+
+    assert as_mapping(CODECS[name].decode(CODECS[name].encode(given_values))) == given_values
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=30)
+@given(data=st.data())
+def test_absent_fields_are_zero_empty_or_false(name, data):
+    """Encoded again, a message without them has the same bytes."""
+    encoded = CODECS[name].encode(data.draw(values(MESSAGES[name], find)))
+
+    assert CODECS[name].encode(CODECS[name].decode(encoded)._asdict()) == encoded
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=30)
+@given(data=st.data())
+def test_a_frame_is_the_length_and_the_message(name, data):
+    """Both are packed in one go where that is faster."""
+    given_values = data.draw(values(MESSAGES[name], find))
+
+    assert CODECS[name].frame(given_values) == frame(CODECS[name].encode(given_values))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=30)
+@given(data=st.data())
+def test_a_message_cut_short_or_too_long_is_refused(name, data):
+    """Every byte counts: a peer of another version must not be misread."""
+    encoded = CODECS[name].encode(data.draw(values(MESSAGES[name], find)))
+
+    with pytest.raises(ValueError, match="bytes"):
+        CODECS[name].decode(encoded + b"\0")
+    if encoded:
+        with pytest.raises(ValueError, match="bytes"):
+            CODECS[name].decode(encoded[: data.draw(st.integers(0, len(encoded) - 1))])
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=30)
+@given(payload=st.binary(max_size=200))
+def test_bytes_of_strangers_are_a_message_or_a_value_error(name, payload):
+    """No other error may come out of a request."""
+    with suppress(ValueError):
+        CODECS[name].decode(memoryview(payload))
+
+
+@pytest.mark.parametrize(
+    "field", ["string", "string[]", "uint8[]", "float64[]", "demo/Point[]", "demo/Named[]", "time[]"]
+)
+def test_a_length_that_the_payload_does_not_bear_out_is_refused(field):
+    """Four bytes must not make the reader allocate gigabytes, or loop for hours."""
+    with pytest.raises(ValueError, match=f"a length of {MORE}, but only 8 bytes are left"):
+        codec(f"{field} value").decode(struct.pack("<IQ", MORE, 0))
+
+
+def test_fields_have_the_names_of_the_definition_and_python_s_own_get_an_underscore():
+    """`from` cannot be an attribute."""
+    message = codec("uint64 from\ndemo/Named[] named\nduration late")
+
+    decoded = message.decode(
+        message.encode({"from_": 3, "named": [{"point": {"y": 2.5}}], "late": {"secs": -1}})
+    )
+
+    assert (decoded.from_, decoded.named[0].point.y) == (3, 2.5)
+    assert (decoded.late.secs, decoded.late.nsecs) == (-1, 0)
+
+
+def test_bytes_numbers_and_flags_have_types_of_their_own():
+    """Lists of numbers are tuples: nothing changes them on the way."""
+    message = codec("uint8[] a\nchar[2] b\nbyte[] c\nfloat32[2] d\nbool[] e\nbool f")
+
+    decoded = message.decode(
+        message.encode({"a": [1, 2], "b": b"xy", "c": [-1], "d": (0.5, 2), "e": [1, 0], "f": 1})
+    )
+
+    assert decoded == (b"\1\2", b"xy", (-1,), (0.5, 2.0), (True, False), True)
+    assert type(decoded.e[0]) is type(decoded.f) is bool
+
+
+def test_a_message_inside_may_be_a_tuple_of_its_fields():
+    """As it was decoded, or where a mapping for each of ten thousand points takes too long."""
+    message = codec("demo/Point[] points\ndemo/Named named")
+    mapping = {"points": [{"x": 1.0, "y": 2.0}], "named": {"name": "a", "point": {"x": 3.0}}}
+
+    encoded = message.encode({"points": [(1.0, 2.0)], "named": ("a", (3.0, 0.0), b"")})
+
+    assert encoded == message.encode(mapping)
+
+
+def test_characters_that_are_not_utf_8_are_replaced():
+    """As genpy does it: a name in another encoding must not end a subscriber."""
+    message = codec("string text")
+
+    assert message.decode(frame("é".encode("latin-1") + b"x")).text == "\ufffdx"
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("uint8 value", 256),
+        ("uint8 value", -1),
+        ("int32 value", 1.0),
+        ("int32 value", "1"),
+        ("int32 value", None),
+        ("float32 value", 1e300),
+        ("float64 value", "1"),
+        ("string value", b"text"),
+        ("string value", None),
+        ("string value", "\ud800"),
+        ("string[] value", [1]),
+        ("uint8[] value", "text"),
+        ("uint8[] value", 3),
+        ("uint8[] value", [256]),
+        ("char[2] value", b"abc"),
+        ("float64[] value", 1.0),
+        ("float64[] value", ["1"]),
+        ("float64[3] value", [1.0, 2.0]),
+        ("string[2] value", ["one"]),
+        ("demo/Point value", 1.0),
+        ("demo/Point value", (1.0, 2.0, 3.0)),
+        ("demo/Point[2] value", [(1.0,), (2.0, 3.0, 4.0)]),
+        ("demo/Point[] value", [1.0]),
+        ("demo/Named value", "a"),
+        ("demo/Named value", ("a",)),
+        ("demo/Named value", {"place": {}}),
+        ("time value", 1.5),
+        ("time value", {"secs": -1}),
+    ],
+)
+def test_a_value_that_does_not_fit_its_field_is_refused(text, value):
+    """Whatever Python raises for it; the message names the type and the field."""
+    for method in (codec(text).encode, codec(text).frame):
+        with pytest.raises(ValueError, match=r"demo/Test: value: "):
+            method({"value": value})
+
+
+def test_a_field_that_the_type_does_not_have_is_refused():
+    """A slip of the pen would otherwise be sent as an empty text."""
+    with pytest.raises(ValueError, match="demo/Test: no field vale"):
+        codec("string value").encode({"vale": "text"})
+
+
+def test_not_a_number_survives_the_wire():
+    """Sensors without a reading send it."""
+    message = codec("float32 value")
+
+    assert math.isnan(message.decode(message.encode({"value": math.nan})).value)
