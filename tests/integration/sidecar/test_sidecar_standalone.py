@@ -41,7 +41,7 @@ def test_the_sidecar_runs_from_a_copied_folder(standalone, sidecar, waits, tmp_p
 
 
 def test_the_folder_has_nothing_that_speaks_ros(standalone) -> None:
-    """It would need packages of ROS."""
+    """A sidecar starts and stops a process; every image of a simulator would carry the rest."""
     packages = standalone / "lib/python3/dist-packages"
 
     assert {path.name.partition("-")[0] for path in packages.iterdir()} == {

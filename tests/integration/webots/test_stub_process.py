@@ -13,6 +13,12 @@ from palaestra_trainer.ros import Master, RosService
 
 DEADLINE_S = 60.0  # of whatever ought to take moments, on a busy machine
 STUB = Path(sys.executable).with_name("palaestra-stub")
+WITHOUT_ROS = """
+import sys
+sys.modules.update(dict.fromkeys(["genmsg", "genpy", "rosgraph", "rosmaster", "rospy"]))  # not to be found
+from palaestra_sim.stub.cli import main
+sys.exit(main())
+"""
 ARENA = Path(__file__).parents[3] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
 
@@ -23,9 +29,9 @@ def stub(master, tmp_path):
     world.write_bytes(ARENA.read_bytes().replace(b"--name=robotino", b"--name=process_test"))
     started = []
 
-    def start(*options, uri=master):
+    def start(*options, uri=master, program=(STUB,)):
         environment = {**os.environ, "ROS_MASTER_URI": uri}
-        command = [STUB, *options, world]
+        command = [*program, *options, world]
         process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
         started.append(process)
         return process
@@ -41,6 +47,15 @@ def ready(process):
     line = process.stderr.readline()
     assert "process_test" in line
     return RosService("/process_test/robot/get_time", "webots_ros/get_float")
+
+
+def test_it_runs_where_no_ros_is_installed(stub):
+    """A laptop with another system has none; only the master is elsewhere."""
+    process = stub(program=(sys.executable, "-c", WITHOUT_ROS))
+    get_time = ready(process)
+
+    assert get_time(ask=True).value == 0.0
+    get_time.close()
 
 
 def test_sigterm_ends_it_in_good_order(stub):
