@@ -126,6 +126,17 @@ def test_an_answer_cut_short_is_a_whole_frame():
     assert damaged_answer(codec, b"\1" + frame(b"\1"), WRONG_SHAPE) == b"\1" + frame(b"")
 
 
+@pytest.mark.parametrize("service", ["get_float", "get_string"])
+def test_an_answer_cut_short_has_no_value_to_replace(service):
+    """Both faults may come to one answer, in either order."""
+    codec = service_type(f"webots_ros/{service}").response
+    sound = b"\1" + frame(codec.encode({}))
+
+    short = damaged_answer(codec, sound, WRONG_SHAPE)
+
+    assert damaged_answer(codec, sound, (*WRONG_SHAPE, *WRONG_VALUE)) == short
+
+
 def test_a_failure_stays_as_it_is():
     """Its text is no data."""
     codec = service_type("webots_ros/get_float").response

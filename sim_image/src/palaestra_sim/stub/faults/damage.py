@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from palaestra_protocol.ros.rostypes import Codec, last_field
@@ -46,10 +47,11 @@ def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> b
     if succeeded != b"\1":
         return data
     for damage in damages:
-        if isinstance(damage, WrongValue):
-            payload = response.encode(_with_floats(response.decode(payload), damage.value)._asdict())
-        else:
+        if not isinstance(damage, WrongValue):
             payload = payload[: len(payload) // 2]
+            continue
+        with suppress(ValueError):  # another damage may have cut it short
+            payload = response.encode(_with_floats(response.decode(payload), damage.value)._asdict())
     return succeeded + frame(payload)
 
 
