@@ -1,6 +1,6 @@
-"""Worlds: read a `.wbt` file, and generate one for each simulator, with its own ROS names.
+"""Worlds: read `.wbt` and `.proto` files, and generate a world for each simulator, with its own ROS names.
 
-Pure: bytes in, bytes out. No clock, no network, and no file except the worlds that ship.
+Pure: bytes in, bytes out. No clock, no network, and no file except what ships and the PROTOs beside a world.
 
     parse(source)                              the tree of a world
     check(source)                              raises unless every simulator can have a world of it
@@ -9,25 +9,29 @@ Pure: bytes in, bytes out. No clock, no network, and no file except the worlds t
     robots(source)                             the robots in it that speak ROS
     ros_name(identity, "robotino")             the name that such a robot gets
     builtin("arena")                           a world that ships
+    builtin_protos()                           descriptions of robots that ship
+    parse_proto(data, "Stool.proto")           the declaration of a type of node
+    local_protos(path, world)                  the PROTOs whose files lie beside a world
 """
 
 from palaestra_sim.errors import UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path, builtin_protos
 from palaestra_sim.world.checks import check
-from palaestra_sim.world.externs import LocalProtos, local_protos
+from palaestra_sim.world.externs import Protos, local_protos
 from palaestra_sim.world.generate import generate, rename
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
-from palaestra_sim.world.reader import parse, parse_proto
+from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
+from palaestra_sim.world.reader import parse
 from palaestra_sim.world.robots import WorldRobot, robots
-from palaestra_sim.world.tree import Is, Item, Node, Proto, ProtoField, Value, World
+from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
 __all__ = [
     "Is",
     "Item",
-    "LocalProtos",
     "Node",
     "Proto",
     "ProtoField",
+    "Protos",
     "RunIdentity",
     "UnknownWorldError",
     "Value",

@@ -5,8 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from palaestra_sim.errors import UnknownWorldError
-from palaestra_sim.world.reader import parse_proto
-from palaestra_sim.world.tree import Proto
+from palaestra_sim.world.proto import Proto, parse_proto
 
 _WORLDS = Path(__file__).parent.parent / "worlds"
 _PROTOS = Path(__file__).parent / "protos"

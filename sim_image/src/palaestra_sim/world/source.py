@@ -1,4 +1,4 @@
-"""The bytes of one world file, and errors at places in it.
+"""The bytes of one world or PROTO file, and errors at places in it.
 
 This package works on byte offsets, but people read lines and columns. Only this module converts one into the
 other, so that every error of a world has its place.
@@ -15,10 +15,11 @@ _HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """The bytes of a world, and its name in errors."""
+    """The bytes of a file, and its name in errors; `kind` is "world" or "PROTO"."""
 
     data: bytes
     name: str
+    kind: str = "world"
 
     @property
     def begin(self) -> int:
@@ -36,10 +37,10 @@ class Source:
         except UnicodeDecodeError as error:
             byte = self.data[error.start]
             fact = f"byte 0x{byte:02x} is not UTF-8"
-            raise self.error(error.start, fact, "save the world as UTF-8") from None
+            raise self.error(error.start, fact, f"save the {self.kind} as UTF-8") from None
         match = _HEADER.match(self.data, self.begin)
         if match is None:
-            fact = "the first line is not the header of a Webots world"
+            fact = f"the first line is not the header of a Webots {self.kind}"
             raise self.error(0, fact, "make it #VRML_SIM R2023b utf8")
         return match.group().decode()
 

@@ -1,32 +1,33 @@
-"""A world file as nodes, fields and values.
+"""A world or PROTO file as nodes, fields and values.
 
-The reader knows the grammar of `.wbt`, but no node type: other modules know the fields of a Robot or a PROTO,
-and find the `DEF` of a `USE`. Nothing is resolved, and every node and value has the span of its bytes.
+The readers know the grammars of `.wbt` and `.proto`, but no node type: other modules know the fields of a
+Robot or a PROTO, and find the `DEF` of a `USE`. Nothing is resolved, and every node and value has the span of
+its bytes.
 """
 
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from palaestra_sim.world.source import Source
 from palaestra_sim.world.tokens import Token
 
 Item: TypeAlias = "float | bool | str | Node | Is | None"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Is:
-    """In a PROTO, `field IS name`: the value that an instance gives to the PROTO's own field `name`."""
+    """The value `IS name` of a field in the body of a PROTO: the value of the PROTO's field `name`."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """The value of a field: numbers, booleans, strings, nodes, `None` for NULL, `Is`; in source order.
+    """The value of a field: numbers, booleans, strings, nodes, `None` for NULL; in source order.
 
-    `translation 0 0 1` has three items and is not bracketed. The span is (start, end) in bytes,
+    `translation 0 0 1` has three items and is not bracketed. `translation IS place`, which only the body of a
+    PROTO has, has one. The span is (start, end) in bytes,
     brackets included.
     """
 
@@ -83,28 +84,6 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ProtoField:
-    """The declaration of a PROTO's field: its type, such as "SFVec3f", and its default."""
-
-    type_name: str
-    default: Value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Proto:
-    """A PROTO without templates: its fields by name, the node that it stands for, and its file.
-
-    `externs` are the string tokens of its EXTERNPROTO lines.
-    """
-
-    name: str
-    source: Source
-    externs: tuple[Token, ...] = field(repr=False)
-    fields: dict[str, ProtoField]
-    body: Node
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class World:
     """A world file as read: its bytes, its first line, and its nodes in source order.
 
@@ -119,14 +98,7 @@ class World:
 
     def walk(self) -> Iterator[Node]:
         """Yield every node, parents before children, in source order."""
-        waiting = list(reversed(self.nodes))
-        while waiting:
-            node = waiting.pop()
-            yield node
-            inside = [
-                item for value in node.fields.values() for item in value.items if isinstance(item, Node)
-            ]
-            waiting.extend(reversed(inside))
+        return walk(self.nodes)
 
     def inside(self, value: Value) -> tuple[Token, ...]:
         """Return the tokens of a value of this world, including its brackets."""
@@ -137,6 +109,16 @@ class World:
     def index(self, offset: int) -> int:
         """Return the index of the token at byte `offset`, or of the first one after it."""
         return bisect_left(self.tokens, offset, key=_start)
+
+
+def walk(nodes: Sequence[Node]) -> Iterator[Node]:
+    """Yield these nodes and all inside them, parents before children, in source order."""
+    waiting = list(reversed(nodes))
+    while waiting:
+        node = waiting.pop()
+        yield node
+        inside = [item for value in node.fields.values() for item in value.items if isinstance(item, Node)]
+        waiting.extend(reversed(inside))
 
 
 def _start(token: Token) -> int:

@@ -157,9 +157,9 @@ class StubSimulator:
 def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Simulation, dict[Robot, Arguments]]:
     """Return a world that is ready to run, with the arguments of its robots."""
     world = parse(world_path.read_bytes(), world_path.name)
-    local = local_protos(world, world_path)
+    found = local_protos(world_path, world, name=world_path.name, without=options.stand_ins)
     descriptions = Descriptions(
-        protos={**builtin_protos(), **local.protos}, stand_ins=options.stand_ins, unusable=local.unusable
+        protos={**builtin_protos(), **found.local}, stand_ins=options.stand_ins, unusable=found.refused
     )
     simulation = Simulation.of(world, world_path.name, mode, descriptions, options.leave_out)
     arguments = {robot: robot.parts.arguments for robot in simulation.robots}

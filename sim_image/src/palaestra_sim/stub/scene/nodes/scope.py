@@ -7,12 +7,13 @@ that the instance gives, and that was written in another file. So a value is loo
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from palaestra_sim.errors import WorldError
 from palaestra_sim.world import Is, Node, Value
 from palaestra_sim.world.source import Source
+from palaestra_sim.world.tree import walk
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -65,16 +66,7 @@ class Scope:
 def definitions(nodes: Iterable[Node]) -> dict[str, list[Node]]:
     """Return the nodes with a DEF name by that name, those inside others too."""
     found: dict[str, list[Node]] = {}
-    for node in nodes:
-        for inner in _walk(node):
-            if inner.def_name is not None:
-                found.setdefault(inner.def_name, []).append(inner)
+    for node in walk(tuple(nodes)):
+        if node.def_name is not None:
+            found.setdefault(node.def_name, []).append(node)
     return found
-
-
-def _walk(node: Node) -> Iterator[Node]:
-    yield node
-    for value in node.fields.values():
-        for item in value.items:
-            if isinstance(item, Node):
-                yield from _walk(item)

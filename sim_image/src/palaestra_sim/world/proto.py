@@ -1,0 +1,215 @@
+"""Parse a PROTO file: the declaration of a type of node by its fields and one node.
+
+    #VRML_SIM R2023b utf8
+    EXTERNPROTO "Leg.proto"
+    PROTO Stool [
+      field SFVec3f translation 0 0 0
+    ]
+    {
+      Solid { translation IS translation }
+    }
+
+Nothing is expanded here. An instance of the type is a copy of `body` in which every `IS` has the value that
+the instance gives to the field, else its default. For any bytes the result is a Proto or a WorldError. A
+template, from which Webots generates the file with Lua or JavaScript, is refused.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.world.reader import Reader, shown
+from palaestra_sim.world.source import Source
+from palaestra_sim.world.tokens import Token, tokenize
+from palaestra_sim.world.tree import Is, Item, Node, Value, walk
+
+_ACCESSES = (b"field", b"hiddenField", b"vrmlField", b"unconnectedField", b"deprecatedField")
+_NUMBERS = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
+_OTHERS: dict[str, tuple[type, ...]] = {"Bool": (bool,), "String": (str,), "Node": (Node, type(None))}
+_TYPES = frozenset(f"{many}F{kind}" for many in "SM" for kind in (*_NUMBERS, *_OTHERS))
+_NOT_CODE = re.compile(rb'\#(?P<comment>[^\n]*) | " (?: [^"\\\n] | \\[^\n] )* " | %[<{]', re.VERBOSE)
+_LANGUAGE = re.compile(rb"\s*template\s+language\b")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProtoField:
+    """A field that a PROTO declares.
+
+    `type` is a type such as "SFVec3f"; `access` is the word before it, such as "hiddenField". `allowed` has
+    the values to which the declaration restricts the field; it is empty without a restriction.
+    """
+
+    type: str
+    default: Value
+    access: str = "field"
+    allowed: tuple[Item, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proto:
+    """A PROTO file as read: its type, the fields in source order, and the node that it stands for.
+
+    `externs` are the string tokens of its EXTERNPROTO lines. Every span is one of `source`.
+    """
+
+    name: str
+    externs: tuple[Token, ...] = field(repr=False)
+    fields: dict[str, ProtoField]
+    body: Node
+    source: Source = field(repr=False)
+
+
+def parse_proto(data: bytes, name: str) -> Proto:
+    """Return the PROTO that `data` declares; `name` is the name of its file in errors.
+
+    Raises:
+        WorldError: the bytes are no PROTO file, or one with a template; the message has the place, the fact
+            and the remedy.
+    """
+    source = Source(data=data, name=name, kind="PROTO")
+    source.header()
+    for place in _templates(data):
+        remedy = "templates are not expanded; add it to a file of stand-ins or leave it out"
+        raise source.error(place, "this PROTO has a template", remedy)
+    proto = _ProtoReader(source, tokenize(source)).proto()
+    if error := refusal(_undeclared(proto)):
+        raise error
+    return proto
+
+
+def _templates(data: bytes) -> Iterator[int]:
+    """Yield the place of each opening of a template, and of each comment that names its language.
+
+    Only the first one is certain: the code of a template is no PROTO, and has other comments and strings.
+    """
+    for match in _NOT_CODE.finditer(data):
+        comment = match.group("comment")
+        opening = re.search(rb"%[<{]", match.group()) if comment is None else _LANGUAGE.match(comment)
+        if opening is not None:
+            yield match.start()
+
+
+def _undeclared(proto: Proto) -> Iterator[WorldError]:
+    """Yield an error for each IS in the body that names no field of the PROTO."""
+    for node in walk([proto.body]):
+        for name, value in node.fields.items():
+            for item in value.items:
+                if isinstance(item, Is) and item.name not in proto.fields:
+                    fact = f"{proto.name} has no field {item.name}"
+                    remedy = f"declare it, or write the value of {name}"
+                    yield proto.source.error(value.span[0], fact, remedy)
+
+
+class _ProtoReader(Reader):
+    """The rules of a PROTO file, beside those for its nodes."""
+
+    def proto(self) -> Proto:
+        """Read `file := extern* "PROTO" name "[" declaration* "]" "{" node "}"`."""
+        self._is_refused = "IS outside the body of the PROTO"
+        externs = []
+        while self._peek().text in (b"IMPORTABLE", b"EXTERNPROTO"):
+            externs.append(self._extern())
+        self._expect(b"PROTO", "a PROTO file has one PROTO after its EXTERNPROTO lines")
+        name = self._name("the type of the PROTO")
+        fields = self._declarations(name)
+        self._expect(b"{", "the body of a PROTO is written { Type { … } }")
+        self._is_refused = None
+        body = self._body(name)
+        self._expect(b"}", "a PROTO has one node")
+        self._end()
+        return Proto(name=name, externs=tuple(externs), fields=fields, body=body, source=self._source)
+
+    def _declarations(self, proto: str) -> dict[str, ProtoField]:
+        """Read `"[" declaration* "]"`."""
+        opening = self._peek()
+        self._expect(b"[", "the fields of a PROTO are declared in [ … ]")
+        fields: dict[str, ProtoField] = {}
+        while not self._skip(b"]"):
+            token = self._peek()
+            if token.kind == "end":
+                raise self._error(opening, f'the "[" of {proto} is never closed', 'add the missing "]"')
+            name, declared = self._declaration(proto)
+            if name in fields:
+                raise self._error(token, f"{proto} declares the field {name} twice", "keep one of them")
+            fields[name] = declared
+        return fields
+
+    def _declaration(self, proto: str) -> tuple[str, ProtoField]:
+        """Read `declaration := access type ["{" item* "}"] name value`."""
+        access = self._take()
+        if access.text not in _ACCESSES:
+            fact = f"{shown(access)} where a field of {proto} should be declared"
+            raise self._error(access, fact, "write field, a type, a name and a default")
+        kind = self._take()
+        type_name = kind.text.decode()
+        if type_name not in _TYPES:
+            fact = f"{shown(kind)} where the type of a field of {proto} should be"
+            raise self._error(kind, fact, "write a type such as SFVec3f or MFNode")
+        allowed = self._allowed(type_name)
+        name = self._name(f"the name of a {type_name} of {proto}")
+        default = self._default(type_name, name)
+        access_name = access.text.decode()
+        return name, ProtoField(type=type_name, default=default, access=access_name, allowed=allowed)
+
+    def _allowed(self, type_name: str) -> tuple[Item, ...]:
+        """Read the values to which a field is restricted, `["{" item* "}"]`."""
+        opening = self._peek()
+        items = []
+        if self._skip(b"{"):
+            while not self._skip(b"}"):
+                if self._peek().kind == "end":
+                    fact = f'the "{{" of {type_name} is never closed'
+                    raise self._error(opening, fact, 'add the missing "}"')
+                items.append(self._item(type_name, 1))
+        return tuple(items)
+
+    def _default(self, type_name: str, name: str) -> Value:
+        """Read the default of a field, and check that it has the type of the field."""
+        first = self._peek()
+        default = self._value(name, 1)
+        if not _fits(type_name, default):
+            fact = f"the default of {name} is no {type_name}"
+            raise self._error(first, fact, f"write {_example(type_name)}")
+        return default
+
+    def _body(self, proto: str) -> Node:
+        """Read the node that the PROTO stands for."""
+        first = self._peek()
+        body = self._node(1)
+        if body.uses is not None:
+            fact = f"a USE where the node of {proto} should be"
+            raise self._error(first, fact, "write the node out")
+        return body
+
+    def _end(self) -> None:
+        token = self._peek()
+        if token.kind != "end":
+            fact = f"{shown(token)} after the end of the PROTO"
+            raise self._error(token, fact, "remove it, or move it to a file of its own")
+
+    def _expect(self, text: bytes, remedy: str) -> None:
+        """Move past the next token, which must be this word or mark."""
+        token = self._peek()
+        if not self._skip(text):
+            fact = f"{shown(token)} where {text.decode()} should be"
+            raise self._error(token, fact, remedy)
+
+
+def _fits(type_name: str, value: Value) -> bool:
+    """Return whether a value has the type; a list may be one item without brackets."""
+    kind, single = type_name[2:], type_name.startswith("S")
+    each_item, count = ((float,), _NUMBERS[kind]) if kind in _NUMBERS else (_OTHERS[kind], 1)
+    if not all(isinstance(item, each_item) for item in value.items):
+        return False
+    if single:
+        return not value.bracketed and len(value.items) == count
+    return len(value.items) % count == 0 and (value.bracketed or len(value.items) == count)
+
+
+def _example(type_name: str) -> str:
+    """Return a value of a type, for an error."""
+    kind = type_name[2:]
+    others = {"Bool": "TRUE", "String": '"text"', "Node": "NULL"}
+    single = others.get(kind) or " ".join(["0"] * _NUMBERS[kind])
+    return single if type_name.startswith("S") else f"[ {single} ]"
