@@ -34,6 +34,10 @@ class FakePublisher:
         """Keep the template with these fields."""
         self.topic.deliver({**self.template, **fields})
 
+    def send_stamped(self, fields):
+        """Keep the template with these fields, as `send` does."""
+        self.send(fields)
+
     def send_value(self, value):
         """Keep the value alone."""
         self.topic.deliver(value)

@@ -41,6 +41,10 @@ class Publisher(Protocol):
         """
         ...
 
+    def send_stamped(self, fields: Fields) -> None:
+        """Send a message stamped with the wall clock, of these fields over the template's."""
+        ...
+
 
 class Node(Protocol):
     """A ROS node; paths are relative to its name.

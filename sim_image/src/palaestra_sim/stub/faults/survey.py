@@ -103,6 +103,9 @@ class _Silent:
     def send(self, fields: Fields) -> None:
         """Send it to nobody."""
 
+    def send_stamped(self, fields: Fields) -> None:
+        """Send it to nobody."""
+
     def send_value(self, value: float) -> None:
         """Send it to nobody."""
 

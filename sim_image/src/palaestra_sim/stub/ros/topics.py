@@ -105,6 +105,18 @@ class Publisher:
         self._pack(data, self._reading_at, value)
         self.topic.send(bytes(data))
 
+    def send_stamped(self, fields: Mapping[str, Any]) -> None:
+        """Send a message of `fields`, over the template's, with the wall clock in its header.
+
+        Without a subscriber no message is sent or counted.
+        """
+        if not self.topic.links:
+            return
+        self._sequence += 1
+        seconds, nanoseconds = divmod(time.time_ns(), 1_000_000_000)
+        stamp = {"seq": self._sequence, "stamp": {"secs": seconds, "nsecs": nanoseconds}}
+        self.send({**fields, "header": {**self._template.get("header", {}), **stamp}})
+
     def _prepare(self) -> None:
         """Make the frame of all values, and find the reading in it."""
         type_ = self.topic.type

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from palaestra_sim.stub.scene.devices.kind import Device, Enable, Kind, Source, Topic
@@ -19,6 +19,7 @@ class Feed:
     the messages of the two are mixed.
 
     Attributes:
+        reading: the field of the value; "" is the last one.
         publishers: by period in ms.
     """
 
@@ -26,6 +27,7 @@ class Feed:
     type_name: str
     template: Fields
     source: Source | None
+    reading: str = ""
     publishers: dict[int, Publisher] = field(default_factory=dict)
 
     def begin(self, node: Node, period_ms: int) -> None:
@@ -46,7 +48,10 @@ class Feed:
             return
         for period_ms, publisher in self.publishers.items():
             if elapsed_ms % period_ms == 0:
-                publisher.send_value(source.value)
+                if self.reading:
+                    publisher.send_stamped({self.reading: source.value})
+                else:
+                    publisher.send_value(source.value)
 
 
 class Outlet:
@@ -60,7 +65,8 @@ class Outlet:
         path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
         self.feeds = tuple(
-            Feed(f"{path}/{it.name}", it.type_name, {**header, **it.constants}, it.source) for it in topics
+            Feed(f"{path}/{it.name}", it.type_name, {**header, **it.constants}, it.source, it.reading)
+            for it in topics
         )
         self._node = node
         self._path = path

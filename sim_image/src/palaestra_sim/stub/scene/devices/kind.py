@@ -119,15 +119,17 @@ class Topic:
 
     Attributes:
         name: below the device's name.
-        type_name: of its messages, which begin with a header and end with a field of numbers, the reading.
+        type_name: of its messages, which begin with a header.
         source: of the reading; None if it never has one.
-        constants: the fields between the header and the reading.
+        constants: the other fields.
+        reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
     """
 
     name: str
     type_name: str
     source: Source | None
     constants: Fields = field(default_factory=dict)
+    reading: str = ""
 
 
 Sample = Callable[[], None]
