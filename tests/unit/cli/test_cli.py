@@ -88,6 +88,21 @@ def test_world_prints_the_world_of_one_simulator(tmp_path, capsys):
     assert robot.ros_name.startswith("j_r3_g_1a_robotino_")
 
 
+def test_world_puts_in_what_a_world_for_ros_lacks(tmp_path, capsys):
+    """Most worlds that were made for the ros controller have neither option; nothing else may change."""
+    path = tmp_path / "plain.wbt"
+    path.write_text('#VRML_SIM R2023b utf8\nE-puck {\n  controller "ros"\n}\n')
+
+    main(["world", str(path), "--job", "j", "--group", "g"])
+
+    printed = capsys.readouterr().out
+    [robot] = robots(printed.encode())
+    assert robot.ros_name.startswith("j_r0_g_0a_E_puck_")
+    assert printed == path.read_text().replace(
+        "\n}", f'\n  controllerArgs [\n    "--name={robot.ros_name}"\n    "--synchronize"\n  ]\n}}'
+    )
+
+
 def test_world_points_at_the_place_of_a_mistake(tmp_path, fails):
     """Line and column, as a compiler does."""
     path = tmp_path / "broken.wbt"
