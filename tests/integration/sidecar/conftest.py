@@ -137,12 +137,12 @@ def arguments(tmp_path, world):
 
 
 @pytest.fixture
-def sidecar(arguments, tmp_path):
-    """Return how to run a sidecar; at the end of the test nothing of it may be left."""
+def run_sidecar(tmp_path):
+    """Return how to run a sidecar's command line; at the end of the test nothing of it may be left."""
     running = []
 
-    def run(program, *options, before=(), executable=PROGRAM):
-        running.append(Sidecar([*before, *arguments(program, *options, executable=executable)]))
+    def run(command):
+        running.append(Sidecar(command))
         return running[-1]
 
     yield run
@@ -153,6 +153,16 @@ def sidecar(arguments, tmp_path):
         each._reader.join(DEADLINE_S)
         each.process.stdout.close()
     eventually(lambda: not processes_with(str(tmp_path)))
+
+
+@pytest.fixture
+def sidecar(arguments, run_sidecar):
+    """Return how to run a sidecar whose simulator is a program."""
+
+    def run(program, *options, before=(), executable=PROGRAM):
+        return run_sidecar([*before, *arguments(program, *options, executable=executable)])
+
+    return run
 
 
 @pytest.fixture

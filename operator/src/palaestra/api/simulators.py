@@ -70,7 +70,7 @@ class World(ApiModel):
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
     """Absolute path of a `.wbt` file in the simulator's image (`palaestra run`: on this machine). PROTOs and
-    textures are beside it."""
+    textures are beside it; the rest of its Webots project, such as `controllers/`, is beside its folder."""
 
     rules = (
         Rule(

@@ -4,6 +4,7 @@ It may have a second simulator as a standby. The two share the process and its p
 
 - `cli`: the command line: check everything, then run; `options`: its options
 - `preparation`: the world that the simulator will run, with its own ROS names
+- `project`: the Webots project around that world: a folder, and links to what is around the source
 - `drivers`: the command lines of stub, Webots and other programs
 - `lifecycle`: the events that each state allows, as a table; pure
 - `simulator`: the one owner of the state, which takes events in order and carries out the table's actions

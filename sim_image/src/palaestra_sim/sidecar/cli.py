@@ -15,7 +15,7 @@ from pathlib import Path
 
 from palaestra_protocol.control import SidecarState, SimulatorState
 from palaestra_sim.errors import SidecarError, SimError
-from palaestra_sim.sidecar import metrics, preparation, signals
+from palaestra_sim.sidecar import metrics, preparation, project, signals
 from palaestra_sim.sidecar.drivers import Driver, Launch, command
 from palaestra_sim.sidecar.options import EXIT_WRONG, parse
 from palaestra_sim.sidecar.output import LineHandler
@@ -53,6 +53,7 @@ def look_after(given: argparse.Namespace) -> int:
     """Run the simulators of these options until a signal asks for the end; return the exit code."""
     try:
         simulators = prepare(given)
+        missing = _missing_controllers(given)
         control = bound("--control", given.control, control_routes(simulators))
         health = bound("--health", given.health, health_routes(simulators, metrics.registry(simulators)))
     except SimError as error:
@@ -64,6 +65,8 @@ def look_after(given: argparse.Namespace) -> int:
     if given.until_stdin_closes:
         threading.Thread(target=end_with_stdin, daemon=True).start()
     log.info("control=%s health=%s", control.address, health.address)
+    if missing:
+        log.warning("warning: %s", missing)
     run(simulators)
     return 0
 
@@ -132,8 +135,9 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
         return Path(given.world).absolute()
     if given.work is None:
         raise SidecarError("--work: is missing; with --job, give the folder for the generated world")
+    work, as_project = given.work.absolute(), Driver(given.driver) is Driver.WEBOTS
     if given.job is None:
-        return preparation.renamed(given.world, given.work.absolute(), given.suffix)
+        return preparation.renamed(given.world, work, given.suffix, as_project=as_project)
     identity = RunIdentity(
         job=given.job,
         namespace=given.namespace,
@@ -144,7 +148,14 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
         slot=slot,
     )
     clock = given.clock and slot == preparation.SLOTS[0]
-    return preparation.named(given.world, given.work.absolute(), identity, clock=clock)
+    return preparation.named(given.world, work, identity, clock=clock, as_project=as_project)
+
+
+def _missing_controllers(given: argparse.Namespace) -> str | None:
+    """Return a warning about controllers that Webots cannot find; None for other simulators."""
+    if Driver(given.driver) is not Driver.WEBOTS:
+        return None
+    return project.missing_controllers(given.world, preparation.read(given.world), os.environ)
 
 
 if __name__ == "__main__":

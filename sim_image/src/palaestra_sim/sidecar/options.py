@@ -16,7 +16,8 @@ EPILOG = """
 This program does not start the simulator by itself; POST /start on the control port does, see
 palaestra_protocol.control. The simulator inherits the environment: ROS_MASTER_URI and ROS_HOSTNAME.
 
-reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work
+reads   the world; with --job it writes the world with its own ROS names, GROUP-INDEX.wbt, to --work;
+        for Webots as a project there, with links to the controllers, PROTOs and so on around the world
 prints  first the two addresses; then its own lines, as "palaestra-sidecar: ...", and the simulator's
 serves  control: /start /ready /stop /state; health: /healthz /state /metrics
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import SidecarError, WorldError
+from palaestra_sim.sidecar import project
 from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots
 
 SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby
@@ -37,40 +38,43 @@ def read(world: Path) -> bytes:
         raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt file") from error
 
 
-def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool) -> Path:
+def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool, as_project: bool = False) -> Path:
     """Write this simulator's world, made from `world`, into the folder `work`; return its path.
 
-    If the world refers to files beside it, links to them are created at the same relative places.
+    With `as_project`, or if the world refers to files beside it, it is written into a Webots project in
+    `work`, with links to the files around `world`.
 
     Raises:
         WorldError: the world is wrong.
         SidecarError: it cannot be read or written; no partial file is left.
     """
     make = partial(generate, read(world), identity, clock=clock, name=str(world))
-    return _written(world, work, file_name(identity), make)
+    return _written(world, work / file_name(identity), make, as_project=as_project)
 
 
-def renamed(world: Path, work: Path, suffix: str) -> Path:
+def renamed(world: Path, work: Path, suffix: str, *, as_project: bool = False) -> Path:
     """Write a copy of `world` with `suffix` appended to its ROS names into `work`; return its path.
+
+    `as_project` is as for `named`.
 
     Raises:
         WorldError, SidecarError: as `named` does.
     """
     make = partial(rename, read(world), suffix, name=str(world))
-    return _written(world, work, f"{world.stem}{suffix}.wbt", make)
+    return _written(world, work / f"{world.stem}{suffix}.wbt", make, as_project=as_project)
 
 
-def _written(world: Path, work: Path, name: str, make: Callable[..., bytes]) -> Path:
-    """Write the result of `make` for `world`, with links to the files around it if it refers to some."""
+def _written(world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool) -> Path:
+    """Write the result of `make` for `world` to `path`, or to a project in the folder of `path`."""
+    source, work = project.placed(world), path.parent
     try:
-        generated, folder = make(), None
+        generated, linked = make(), as_project and project.has_project(source)
     except WorldError:
-        generated = make(relative_addresses=True)
-        folder = work / _PROJECT / (world.absolute().parent.name or "worlds")
+        generated, linked = make(relative_addresses=True), True
     try:
-        if folder is not None:
-            _link_neighbors(world.absolute(), folder)
-        return _write_whole((folder or work) / name, generated)
+        if as_project or linked:
+            path = project.lay_out(source, work / _PROJECT, linked=linked) / path.name
+        return _write_whole(path, generated)
     except OSError as error:
         raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
 
@@ -92,25 +96,6 @@ def described(source: bytes, name: str) -> tuple[RobotName, ...]:
         for robot in robots(source, name)
         if robot.ros_name
     )
-
-
-def _link_neighbors(world: Path, folder: Path) -> None:
-    """Link everything beside `world`, and beside its folder, to the same relative places around `folder`.
-
-    Addresses of a Webots project reach no further: `textures/a.png`, `../protos/Robot.proto`.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    for neighbor in world.parent.parent.iterdir():
-        if neighbor != world.parent:
-            _link(folder.parent / neighbor.name, neighbor)
-    for neighbor in world.parent.iterdir():
-        _link(folder / neighbor.name, neighbor)
-
-
-def _link(link: Path, target: Path) -> None:
-    if link.is_symlink():
-        link.unlink()  # from an earlier start of this container
-    link.symlink_to(target)
 
 
 def _write_whole(path: Path, content: bytes) -> Path:

@@ -7,6 +7,7 @@ Pure: bytes in, bytes out. No clock, no network, and no file except what ships a
     generate(source, identity, clock=False)    the world of one simulator
     rename(source, "_2")                       the world of one more, beside those that run
     robots(source)                             the robots in it that speak ROS
+    own_controllers(source)                    the robots whose controllers are programs of their project
     ros_name(identity, "robotino")             the name that such a robot gets
     builtin("arena")                           a world that ships
     builtin_protos()                           descriptions of robots that ship
@@ -22,7 +23,7 @@ from palaestra_sim.world.generate import generate, rename
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
 from palaestra_sim.world.reader import parse
-from palaestra_sim.world.robots import WorldRobot, robots
+from palaestra_sim.world.robots import WorldRobot, own_controllers, robots
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
 __all__ = [
@@ -45,6 +46,7 @@ __all__ = [
     "generate",
     "local_protos",
     "name_prefix",
+    "own_controllers",
     "parse",
     "parse_proto",
     "rename",

@@ -13,6 +13,7 @@ from palaestra_sim.world.tree import Node, World
 NAME = "--name="
 SYNCHRONIZE = "--synchronize"
 CLOCK = "--clock"
+_PART_OF_WEBOTS = ("ros", "void")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +37,22 @@ def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
         WorldError: the bytes are no world file.
     """
     return tuple(described(node) for node in ros_robots(parse(source, name)))
+
+
+def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str], ...]:
+    """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
+
+    "ros" and "void" are parts of Webots, and "<none>", "<generic>" and "<extern>" are no programs.
+
+    Raises:
+        WorldError: the bytes are no world file.
+    """
+    named = ((robot_name(node), node.text("controller")) for node in parse(source, name).walk())
+    return tuple(
+        (robot, controller)
+        for robot, controller in named
+        if controller and controller not in _PART_OF_WEBOTS and not controller.startswith("<")
+    )
 
 
 def ros_robots(world: World) -> tuple[Node, ...]:

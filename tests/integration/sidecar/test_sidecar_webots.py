@@ -1,0 +1,107 @@
+"""Driver webots, with a program that looks for controllers as Webots does."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from palaestra_protocol.control import SidecarState
+from palaestra_sim.world import RunIdentity, robots, ros_name
+from tests.integration.sidecar.conftest import PROGRAM
+
+WORLD = """#VRML_SIM R2023b utf8
+Robot { name "robotino" controller "ros" supervisor TRUE }
+Robot { name "ball" controller "roll" }
+"""
+# Source: WbRobot.cpp, updateControllerDir: controllers/<name> beside the world's folder, else <generic>.
+WEBOTS = f"""#!{sys.executable} -ISu
+import pathlib, signal, sys
+world = next(pathlib.Path(option) for option in sys.argv if option.endswith(".wbt"))
+roll = world.parent.parent / "controllers" / "roll" / "roll.py"
+print("started", roll.read_text() if roll.parent.is_dir() else "<generic>", "in", world.name)
+print("up")
+signal.pause()
+"""
+
+
+@pytest.fixture
+def webots(run_sidecar, tmp_path):
+    """Return how to run a sidecar with driver webots on the world `source/worlds/arena.wbt`."""
+    program = tmp_path / "bin" / "webots"
+    program.parent.mkdir()
+    program.write_text(WEBOTS)
+    program.chmod(0o755)
+    world = tmp_path / "source" / "worlds" / "arena.wbt"
+    world.parent.mkdir(parents=True)
+    world.write_text(WORLD)
+
+    def run(*options):
+        return run_sidecar(
+            [
+                *("env", "-u", "WEBOTS_EXTRA_PROJECT_PATH", "-u", "WEBOTS_HOME", f"PATH={program.parent}"),
+                *(PROGRAM, "--driver=webots", f"--world={world}", f"--work={tmp_path}/work"),
+                *("--control=127.0.0.1:0", "--health=127.0.0.1:0", *options),
+            ]
+        )
+
+    return run
+
+
+@pytest.fixture
+def roll(tmp_path):
+    """Put the controller `roll` into the project of the world."""
+    path = tmp_path / "source" / "controllers" / "roll" / "roll.py"
+    path.parent.mkdir(parents=True)
+    path.write_text("roll.py")
+
+
+@pytest.mark.usefixtures("roll")
+def test_webots_finds_the_controllers_of_the_project(webots) -> None:
+    """After a restart of the simulator and of the container too."""
+    it = webots("--job=j")
+    it.start()
+    it.request("/stop", {"deadline_s": 0})
+    it.until(SidecarState.IDLE)
+    it.start()
+    it.end()
+    again = webots("--job=j")
+
+    again.start()
+
+    line = "started roll.py in collect-0.wbt"
+    assert (it.lines.count(line), again.lines.count(line)) == (2, 1)
+    assert not any("in no Webots project" in line for line in it.lines + again.lines)
+
+
+@pytest.mark.usefixtures("roll")
+def test_webots_finds_them_for_a_standby_as_well(webots) -> None:
+    """Both simulators have their worlds in one project."""
+    it = webots("--job=j", "--standby")
+
+    it.request("/start")
+    it.request("/standby/start")
+
+    it.until_said("a: started roll.py in collect-0.wbt")
+    it.until_said("b: started roll.py in collect-0b.wbt")
+
+
+def test_a_controller_without_a_project_is_named_once(webots) -> None:
+    """In one line behind the addresses, which programs read; Webots warns of it at every start, if at all."""
+    it = webots("--job=j", "--standby")
+    it.request("/start")
+    it.until_said("a: started <generic> in collect-0.wbt")
+
+    [warning] = [line for line in it.lines if "in no Webots project" in line]
+    assert warning.startswith("palaestra-sidecar: warning: --world: ")
+    assert '"ball" (controller "roll"); put the project into' in warning
+
+
+def test_a_world_for_ros_gets_the_name_and_the_option_that_it_lacks(webots) -> None:
+    """Most worlds that were made for the ros controller have neither."""
+    it = webots("--job=j", "--uid=u")
+
+    state = it.state
+    [robot] = robots(Path(state.world).read_bytes())
+    name = ros_name(RunIdentity(job="j", uid="u", replica=0, group="collect", index=0), "robotino")
+    assert (robot.ros_name, robot.synchronize) == (name, True)
+    assert [found.ros_name for found in state.robots] == [name]
