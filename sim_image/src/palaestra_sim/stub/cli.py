@@ -20,7 +20,7 @@ from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode
-from palaestra_sim.world.stand_ins import StandIn, load, shipped
+from palaestra_sim.world.stand_ins import StandIn, load
 
 log = logging.getLogger(__name__)
 
@@ -201,12 +201,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
-    """Return the table that ships, with the entries of these files over it.
+    """Return the entries of these files; the last of a name counts.
 
     Raises:
         StandInError: a file is no such table.
     """
-    table = dict(shipped())
+    table: dict[str, StandIn] = {}
     for file in files:
         table.update(load(file.read_text("utf-8"), str(file)))
     return table

@@ -21,6 +21,7 @@ from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
 from palaestra_sim.stub.seam import Node
 from palaestra_sim.world import builtin_protos, local_protos, parse
+from palaestra_sim.world.stand_ins import shipped
 
 MakeNode = Callable[[str], Node]
 
@@ -158,8 +159,12 @@ def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Simulatio
     """Return a world that is ready to run, with the arguments of its robots."""
     world = parse(world_path.read_bytes(), world_path.name)
     found = local_protos(world_path, world, name=world_path.name, without=options.stand_ins)
+    # A PROTO of the project is what its author means; a stand-in of the user's comes before it.
+    solids = {name: entry for name, entry in shipped().items() if name not in found.local}
     descriptions = Descriptions(
-        protos={**builtin_protos(), **found.local}, stand_ins=options.stand_ins, unusable=found.refused
+        protos={**builtin_protos(), **found.local},
+        stand_ins={**solids, **options.stand_ins},
+        unusable=found.refused,
     )
     simulation = Simulation.of(world, world_path.name, mode, descriptions, options.leave_out)
     arguments = {robot: robot.parts.arguments for robot in simulation.robots}

@@ -155,7 +155,10 @@ class _RobotReader:
         round_ones = [
             found
             for found in self._driven
-            if abs(found.axle[2]) < _LEVEL and found.radius > 0.0 and found.turns_about_its_center()
+            if abs(found.axle[2]) < _LEVEL
+            and found.radius > 0.0
+            and found.motor.spec.stops[0] == found.motor.spec.stops[1]
+            and found.turns_about_its_center()
         ]
         floor = min((found.bottom for found in round_ones), default=0.0)
         return [found for found in round_ones if found.bottom <= floor + _OFF_CENTER * found.radius]

@@ -1,0 +1,248 @@
+"""Worlds of other people: PROTOs, stand-ins, robots by geometry, and parts that are left out."""
+
+import math
+
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.front.options import StubOptions
+from palaestra_sim.stub.front.simulator import StubSimulator
+from palaestra_sim.stub.scene.nodes.growing import Descriptions
+from palaestra_sim.stub.scene.reading import LeaveOut
+from palaestra_sim.stub.scene.simulation import Mode, Simulation
+from palaestra_sim.world import builtin_protos, parse, parse_proto
+from palaestra_sim.world.stand_ins import load, shipped
+
+HEAD = "#VRML_SIM R2023b utf8\n"
+STOOL = """PROTO Stool [ field SFVec3f translation 0 0 0 field SFFloat radius 0.2 field MFNode parts [ ] ]
+{ Solid { translation IS translation name "stool" children IS parts
+  boundingObject DEF SEAT Cylinder { radius IS radius height 0.5 } } }"""
+
+
+def load_world(text, *protos, stand_ins=None, leave_out=None):
+    """The simulation of a world that may use these PROTOs, beside what ships."""
+    own = [parse_proto(f"{HEAD}{proto}".encode(), "Own.proto") for proto in protos]
+    descriptions = Descriptions(
+        protos={**builtin_protos(), **{proto.name: proto for proto in own}},
+        stand_ins=shipped() if stand_ins is None else stand_ins,
+    )
+    world = parse(f"{HEAD}WorldInfo {{ basicTimeStep 16 }} {text}".encode(), "my.wbt")
+    return Simulation.of(world, "my.wbt", Mode.FAST, descriptions, leave_out)
+
+
+def obstacles(simulation):
+    """Kind, x, y and size of each obstacle, rounded to millimeters."""
+    found = []
+    for shape in simulation.scene.solids:
+        x, y, _ = shape.pose.position
+        found.append((shape.kind, round(x, 3), round(y, 3), tuple(round(it, 3) for it in shape.size)))
+    return found
+
+
+def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
+    """`IS` looks in the instance first."""
+    simulation = load_world("Stool { translation 1 2 0 } Stool { radius 0.1 }", STOOL)
+
+    assert obstacles(simulation) == [
+        ("cylinder", 1.0, 2.0, (0.4, 0.4, 0.5)),
+        ("cylinder", 0.0, 0.0, (0.2, 0.2, 0.5)),
+    ]
+
+
+def test_a_proto_may_be_made_of_protos_and_take_nodes():
+    """Nested values are read where they were written."""
+    bench = """PROTO Bench [ field SFFloat wide 0.3 ] { Pose { translation 5 0 0 children [
+      Stool { radius IS wide parts [ DEF TOP Stool { radius 0.7 } ] } ] } }"""
+    simulation = load_world("DEF A Bench { wide 0.6 }", STOOL, bench)
+
+    assert [it[3][0] for it in obstacles(simulation)] == [1.2, 1.4]
+    assert {it[1] for it in obstacles(simulation)} == {5.0}
+    assert simulation.tree.of_def("A").proto_name == "Bench"
+    assert simulation.tree.of_def("A.TOP").proto_name == "Stool"
+
+
+def test_two_instances_are_nodes_of_their_own():
+    """Each with an identity, a place, and the place of its instance in the file."""
+    simulation = load_world("DEF A Stool { } DEF B Stool { }", STOOL)
+    a, b = (simulation.tree.of_def(name) for name in "AB")
+
+    assert a.number != b.number
+    assert a.place is not b.place
+    assert a.origin.node.span != b.origin.node.span
+
+
+def test_a_field_that_a_proto_does_not_have_is_refused_where_it_is_written():
+    """A typo would be the default."""
+    with pytest.raises(WorldError, match=r"my.wbt:2:32: the PROTO Stool has no field colour"):
+        load_world("Stool { colour 1 }", STOOL)
+
+
+def test_a_proto_inside_itself_ends():
+    """The files were refused before; a table of descriptions may still have one."""
+    with pytest.raises(WorldError, match="PROTOs are nested more than 20 deep"):
+        load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } ] } }")
+
+
+def test_a_stand_in_has_the_size_of_its_instance_and_can_be_moved():
+    """A crate that a supervisor puts elsewhere is there for rays and robots."""
+    simulation = load_world('DEF BOX WoodenBox { translation 1 2 0.3 size 1 1 0.6 name "b" }')
+    node = simulation.tree.of_def("BOX")
+
+    assert obstacles(simulation) == [("box", 1.0, 2.0, (1.0, 1.0, 0.6))]
+    assert (node.type_name, node.proto_name, node.text("name")) == ("Solid", "WoodenBox", "b")
+
+    node.place.translation = (3.0, 2.0, 0.3)
+    assert obstacles(simulation)[0][1] == 3.0
+
+
+def test_a_stand_in_stands_where_its_proto_would_without_a_translation():
+    """A crate's origin is in its middle, and the default puts it on the floor."""
+    simulation = load_world("OilBarrel { }")
+
+    assert simulation.scene.solids[0].heights() == pytest.approx((0.0, 0.88))
+
+
+def test_a_user_s_stand_in_comes_before_one_that_ships():
+    """Their crate is the one that they measured."""
+    own = {**shipped(), **load("[WoodenBox]\nsphere = 0.5", "mine.toml")}
+
+    assert obstacles(load_world("WoodenBox { }", stand_ins=own))[0][0] == "ball"
+
+
+def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
+    """A client would wait for it for ever."""
+    own = load("[Rover]\nbox = [1, 1, 1]", "mine.toml")
+
+    assert obstacles(load_world("Rover { }", stand_ins=own))
+    with pytest.raises(WorldError, match="the stub simulates no Rover"):
+        load_world('Rover { controller "ros" }', stand_ins=own)
+
+
+@pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Roundabout"}))])
+def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
+    """With its place: one line each for the log."""
+    simulation = load_world("Roundabout { } WoodenBox { }", leave_out=leave_out)
+
+    assert len(simulation.scene.solids) == 1
+    assert [str(it) for it in simulation.scene.left_out] == [
+        "my.wbt:2:32: the stub simulates no Roundabout; left out"
+    ]
+
+
+def test_what_could_be_simulated_is_never_left_out():
+    """`--leave-out WoodenBox` is no way to remove crates."""
+    simulation = load_world("WoodenBox { }", leave_out=LeaveOut(everything=True))
+
+    assert len(simulation.scene.solids) == 1
+    assert simulation.scene.left_out == ()
+
+
+def test_a_mistake_is_refused_even_if_everything_may_be_left_out():
+    """A translation of two numbers is wrong for every simulator."""
+    with pytest.raises(WorldError, match=r"Solid\.translation is not 3 numbers"):
+        load_world("Solid { translation 1 2 }", leave_out=LeaveOut(everything=True))
+
+
+def test_a_loose_crate_that_is_left_out_is_nowhere():
+    """It would be pushed in Webots, so it may not stand in the way here."""
+    crate = 'Solid { name "crate" physics Physics { } boundingObject Box { } }'
+
+    assert load_world(crate, leave_out=LeaveOut(types=frozenset({"Solid"}))).scene.solids == []
+
+
+def drive(simulation, seconds, **speeds):
+    """Turn the motors of the one robot at these speeds in rad/s, and return where it is then."""
+    (robot,) = simulation.robots
+    for name, motor in robot.motors.items():
+        if name.replace(" ", "_") in speeds:
+            motor.set_position(math.inf)
+            motor.set_velocity(speeds[name.replace(" ", "_")])
+    simulation.step(round(seconds * 1000 / 16) * 16)
+    return robot.body
+
+
+@pytest.mark.parametrize(
+    ("robot", "left", "right", "radius", "track"),
+    [
+        ("E-puck", ["left_wheel_motor"], ["right_wheel_motor"], 0.02, 0.052),
+        ("Pioneer3dx", ["left_wheel"], ["right_wheel"], 0.0975, 0.3314),
+        ("TurtleBot3Burger", ["left_wheel_motor"], ["right_wheel_motor"], 0.033, 0.16),
+        (
+            "Pioneer3at",
+            ["front_left_wheel", "back_left_wheel"],
+            ["front_right_wheel", "back_right_wheel"],
+            0.11,
+            0.394,
+        ),
+    ],
+)
+def test_robots_of_webots_drive_by_their_wheels(robot, left, right, radius, track):
+    """Straight on by the radius of the wheels, and about by their track."""
+    straight = drive(load_world(f"{robot} {{ }}"), 0.8, **dict.fromkeys([*left, *right], 1.0))
+    assert straight.x == pytest.approx(0.8 * radius, rel=0.02)
+    assert straight.y == pytest.approx(0.0, abs=1e-6)
+
+    speeds = {**dict.fromkeys(left, -1.0), **dict.fromkeys(right, 1.0)}
+    turned = drive(load_world(f"{robot} {{ }}"), 0.8, **speeds)
+    assert turned.heading_rad == pytest.approx(0.8 * 2.0 * radius / track, rel=0.02)
+
+
+def test_a_robotino_of_webots_drives_as_the_one_of_the_arena():
+    """0.063 m wheels at 120 degrees."""
+    body = drive(load_world("Robotino3 { }"), 0.8, wheel0_joint=0.0, wheel1_joint=-1.0, wheel2_joint=1.0)
+
+    assert body.x == pytest.approx(0.8 * 0.063 / math.sqrt(0.75), rel=0.01)
+
+
+def test_a_robot_that_no_client_reaches_needs_no_device_of_the_table():
+    """Its own controller does not run here; it stands in the way."""
+    statue = 'Robot { controller "patrol" children [ Radar { } ] boundingObject Box { size 1 1 1 } }'
+
+    assert load_world(statue).robots[0].body.radius > 0.4
+
+
+def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
+    """By the relative address, from the folder of the world."""
+    (tmp_path / "protos").mkdir()
+    (tmp_path / "worlds").mkdir()
+    (tmp_path / "protos" / "Stool.proto").write_text(HEAD + STOOL)
+    (tmp_path / "protos" / "Lamp.proto").write_text(
+        f"{HEAD}PROTO Lamp [ ] {{ %< let a = 1; >% Solid {{ }} }}"
+    )
+    world = tmp_path / "worlds" / "mine.wbt"
+    world.write_text(f'{HEAD}EXTERNPROTO "../protos/Stool.proto"\nStool {{ }}')
+
+    assert len(StubSimulator(world, ros.make_node).simulation.scene.solids) == 1
+
+    world.write_text(f'{HEAD}EXTERNPROTO "../protos/Lamp.proto"\nLamp {{ }}')
+    with pytest.raises(WorldError, match=r"mine.wbt:3:1: Lamp is not expanded \(.*Lamp.proto:2:.*template"):
+        StubSimulator(world, ros.make_node)
+
+    lamp = StubOptions(stand_ins=load("[Lamp]\ncylinder = [0.1, 2]", "mine.toml"))
+    assert len(StubSimulator(world, ros.make_node, options=lamp).simulation.scene.solids) == 1
+
+
+ARM = """Robot { name "arm" children [ HingeJoint {
+  jointParameters HingeJointParameters { axis 0 0 1 position 0.5 minStop -1 maxStop 1 }
+  device [ RotationalMotor { name "m" } PositionSensor { name "s" } ]
+  endPoint Solid { translation 1 0 0 children [
+    DistanceSensor { name "eye" lookupTable [ 0 0 0, 9 9 0 ] }
+    SliderJoint { endPoint DEF TIP Solid { translation 1 0 0 } } ] } } ] }"""
+
+
+def test_a_joint_begins_at_its_position_and_ends_at_its_stop():
+    """The place in the file holds at the position in the file."""
+    simulation = load_world(ARM)
+    (robot,) = simulation.robots
+    tip = simulation.tree.of_def("TIP")
+    assert tip.place.world_position == pytest.approx((2.0, 0.0, 0.0))
+
+    robot.motors["m"].set_position(3.0)
+    simulation.step(1600)
+
+    assert robot.sensors["s"].value == 1.0
+    assert tip.place.world_position == pytest.approx((2 * math.cos(0.5), 2 * math.sin(0.5), 0.0))
+
+    simulation.reset()
+    simulation.step(16)
+    assert tip.place.world_position == pytest.approx((2.0, 0.0, 0.0))
