@@ -4,6 +4,7 @@ import fcntl
 import importlib.util
 import os
 import pty
+import re
 import signal
 import socket
 import subprocess
@@ -15,6 +16,7 @@ import yaml
 
 from palaestra.local.preflight import ROS
 from tests.local_run import below, left_of
+from tests.strangers import DRIVE, rover
 
 PALAESTRA = Path(sys.executable).with_name("palaestra")
 PATIENCE_S = 60
@@ -357,3 +359,19 @@ def _read_to_the_end(terminal: int) -> bytes:
         except OSError:  # EIO: the other end is closed
             os.close(terminal)
             return drawn
+
+
+def test_a_differential_robot_drives_by_its_own_program(desk):
+    """No name and no --synchronize in the world, wheels of its own names, PROTOs from the network."""
+    desk.write(
+        DRIVE,
+        simulators=[rover()],
+        trainer={"command": ["python", str(desk.folder / "program.py")], "evaluation": {"everySteps": 0}},
+    )
+
+    code, out = desk.run()
+
+    assert code == 0, out
+    x, degrees = re.search(r"stopped at (\S+) -?0.00 .* turned by (\S+) degrees", out).groups()
+    assert 0.40 < float(x) < 0.52
+    assert 100 < float(degrees) < 125

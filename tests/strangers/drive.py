@@ -1,0 +1,52 @@
+"""Drive an E-puck toward a box until its front sensors see it, then turn on the spot; prints where it ends.
+
+It knows the simulator only by its sidecar, as a program of a TrainingJob does.
+"""
+
+import math
+import sys
+
+from palaestra_trainer import report
+from palaestra_trainer.configuration import load
+from palaestra_trainer.launching.sidecar import Sidecar
+from palaestra_trainer.webots import DistanceSensor, Motor, Simulation, Webots
+
+PERIOD_MS = 64
+NEAR = 100.0  # of the lookup table of ps0 and ps7
+
+(simulator,) = load().simulators
+sidecar = Sidecar(simulator.control, simulator.name)
+(robot,) = sidecar.first_state(60.0).robots
+webots = Webots(robot.ros_name, "rover", launcher=sidecar)
+simulation = Simulation([robot.ros_name], webots.supervisor, webots.observer, PERIOD_MS)
+front = [DistanceSensor(robot.ros_name, name) for name in ("ps0", "ps7")]
+wheels = [Motor(robot.ros_name, f"{side} wheel motor") for side in ("left", "right")]
+simulation.add(sensors=front, motors=wheels)
+simulation.track("ROVER")
+webots.at_start("rover", simulation.connect)
+
+
+def turn_wheels(left: float, right: float) -> None:
+    """Set the speeds of both wheels in rad/s."""
+    for motor, speed in zip(wheels, (left, right), strict=True):
+        motor.set_velocity(speed)
+
+
+with webots:
+    steps = 0
+    simulation.step()
+    turn_wheels(5.0, 5.0)
+    while max(sensor.value for sensor in front) < NEAR and steps < 400:
+        simulation.step()
+        steps += 1
+    x, y, _ = simulation.pose("ROVER")
+    turn_wheels(-2.0, 2.0)
+    for _ in range(20):
+        simulation.step()
+    heading = simulation.pose("ROVER")[2]
+report(step=steps)
+turned = math.degrees(heading)
+sys.stdout.write(f"stopped at {x:.2f} {y:.2f} after {steps} steps, turned by {turned:.0f} degrees\n")
+simulation.close()
+webots.stop()
+webots.close()
