@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.drive import STANDING, Wheel, find_drive
+from palaestra_sim.stub.physics.drive import STANDING, Ring, Wheel, find_drive
 from tests.robotino import ROBOTINO, twist, wheel_speeds
 
 H = math.sqrt(0.5)
@@ -232,3 +232,53 @@ def test_no_wheels_do_not_move():
     """The drive of a robot that stands."""
     assert STANDING.twist(()) == (0.0, 0.0, 0.0)
     assert STANDING.wheel_speeds(1.0, 1.0, 1.0) == ()
+
+
+def test_a_ring_of_wheels_that_a_file_rounds_is_exact():
+    """The arena has four digits; its Robotino drives as by the closed form of its own controller."""
+    rounded = [
+        Wheel(
+            x_m=round(it.x_m, 4),
+            y_m=round(it.y_m, 3),
+            axle=rounded_direction(it.axle, 3),
+            radius_m=it.radius_m,
+        )
+        for it in ROBOTINO
+    ]
+    assert rounded != list(ROBOTINO)
+
+    drive = find_drive(rounded)
+
+    assert drive.twist((1.0, 2.0, 3.0)) == pytest.approx(twist(1.0, 2.0, 3.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("changed", [{"radius_m": 0.07}, {"x_m": 0.1}, {"axle": (0.6, -0.8)}])
+def test_wheels_that_are_no_ring_are_taken_as_they_are(changed):
+    """A robot may have been built that way."""
+    assert isinstance(find_drive(ROBOTINO), Ring)
+    assert not isinstance(find_drive([ROBOTINO[0], replace(ROBOTINO[1], **changed), ROBOTINO[2]]), Ring)
+
+
+@given(angle=angles, velocity=velocities)
+def test_a_ring_may_be_turned(angle, velocity):
+    """The same wheels, in another frame."""
+    c, s = math.cos(angle), math.sin(angle)
+    turned = [
+        replace(
+            it,
+            x_m=c * it.x_m - s * it.y_m,
+            y_m=s * it.x_m + c * it.y_m,
+            axle=(c * it.axle[0] - s * it.axle[1], s * it.axle[0] + c * it.axle[1]),
+        )
+        for it in ROBOTINO
+    ]
+    drive = find_drive(turned)
+
+    assert isinstance(drive, Ring)
+    assert drive.twist(drive.wheel_speeds(*velocity)) == pytest.approx(velocity, abs=1e-9)
+
+
+def rounded_direction(direction, digits):
+    """Return a direction with so many digits, of length 1 again."""
+    x, y = (round(part, digits) for part in direction)
+    return x / math.hypot(x, y), y / math.hypot(x, y)

@@ -192,6 +192,8 @@ class Body(Disc):
             middle = self.heading_rad + 0.5 * turned
             c = math.cos(middle)
             s = math.sin(middle)
+            if not self._arm_m:
+                self._turn(turned)
         dx = (self._vx * c - self._vy * s) * step_s
         dy = (self._vx * s + self._vy * c) * step_s
         x = self.x
@@ -199,7 +201,7 @@ class Body(Disc):
         way = abs(dx) + abs(dy) + abs(turned) * self._arm_m
         strides = 1 + int(way / self._stride_m) if self._stride_m else 1
         for _ in range(strides):
-            if turned:
+            if turned and self._arm_m:
                 self._turn(turned / strides)
             self.x += dx / strides
             self.y += dy / strides

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 Direction = tuple[float, float]  # x and y of a unit vector in the robot's frame
@@ -31,6 +31,10 @@ _LEAST_GAIN: Final = 0.05  # of a wheel's rim speed that its rollers must leave 
 _LEAST_VOLUME: Final = 1e-3  # of 1: three ideal equations have 1, dependent ones 0
 _LEAST_ARM_M: Final = 1e-3  # of at least one wheel; shorter arms do not turn a robot
 _THREE: Final = 3
+_ROUNDED: Final = 1e-3  # in m and in rad: by so much a file may round a ring of wheels
+_K: Final = math.sqrt(0.75)
+_COSINES: Final = (1.0, -0.5, -0.5)
+_SINES: Final = (0.0, _K, -_K)
 _FARTHEST_M: Final = 1e6  # larger numbers are mistakes, and would overflow
 
 
@@ -99,13 +103,68 @@ class Drive:
         return tuple(x * vx + y * vy + turning * omega for x, y, turning in self.to_speeds)
 
 
+@dataclass(frozen=True, slots=True)
+class Ring(Drive):
+    """Three omnidirectional wheels around the middle, in closed form, which keeps zeros exact.
+
+    Source: Webots, projects/robots/festo/robotino3/controllers/robotino3/base.c. There the first wheel is at
+    the rear; the direction `c`, `s` turns its frame into the robot's.
+    """
+
+    radius_m: float
+    distance_m: float
+    c: float
+    s: float
+
+    def twist(self, speeds: Sequence[float]) -> Twist:
+        """Return vx, vy in m/s and omega in rad/s of the robot's origin, from speeds in rad/s."""
+        w0, w1, w2 = speeds
+        x = self.radius_m * (w2 - w1) / (2.0 * _K)
+        y = self.radius_m * (2.0 * w0 - w1 - w2) / 3.0
+        omega = -self.radius_m * (w0 + w1 + w2) / (3.0 * self.distance_m)
+        return x * self.c - y * self.s, x * self.s + y * self.c, omega
+
+
 STANDING: Final = Drive((), ())  # of a robot without wheels
+
+
+def _ring(wheels: Sequence[Wheel]) -> Ring | None:
+    """Return the drive of three wheels on radial axles, 120 degrees apart counter-clockwise; None: no ring.
+
+    The first one counts: the others may differ by the rounding of a file. Otherwise a robot would turn a
+    little as it drives straight on. The arena's Robotino would not repeat what it did in earlier releases.
+    """
+    if len(wheels) != _THREE or any(wheel.roller for wheel in wheels):
+        return None
+    first = wheels[0]
+    distance_m = math.hypot(first.x_m, first.y_m)
+    for wheel, c, s in zip(wheels, _COSINES, _SINES, strict=True):
+        axle = first.axle[0] * c - first.axle[1] * s, first.axle[0] * s + first.axle[1] * c
+        exact = replace(first, x_m=distance_m * axle[0], y_m=distance_m * axle[1], axle=axle)
+        if _difference(exact, wheel) > _ROUNDED:
+            return None
+    c, s = -first.axle[0], -first.axle[1]
+    to_speeds = tuple(
+        ((x * c - y * s) / first.radius_m, (x * s + y * c) / first.radius_m, -distance_m / first.radius_m)
+        for x, y in ((0.0, 1.0), (-_K, -0.5), (_K, -0.5))
+    )
+    return Ring((), to_speeds, first.radius_m, distance_m, c, s)
+
+
+def _difference(one: Wheel, other: Wheel) -> float:
+    return max(
+        math.hypot(one.x_m - other.x_m, one.y_m - other.y_m),
+        math.hypot(one.axle[0] - other.axle[0], one.axle[1] - other.axle[1]),
+        abs(one.radius_m - other.radius_m),
+    )
 
 
 def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
     """Return how these wheels drive a robot; None if they cannot steer it."""
     if not wheels or not all(wheel.plausible for wheel in wheels):
         return None
+    if ring := _ring(wheels):
+        return ring
     common = _common([wheel.grip for wheel in wheels])
     holds = [_hold(wheel, common or wheel.grip) for wheel in wheels]
     if any(
