@@ -16,10 +16,11 @@ from palaestra_protocol.numbers import milliseconds
 from palaestra_sim.errors import SimError, WorldRefusedError
 from palaestra_sim.stub import faults
 from palaestra_sim.stub.front.options import StubOptions
-from palaestra_sim.stub.front.simulator import StubSimulator
+from palaestra_sim.stub.front.simulator import StubSimulator, read_world
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode
+from palaestra_sim.stub.scene.summary import summary
 from palaestra_sim.world.stand_ins import StandIn, load
 
 log = logging.getLogger(__name__)
@@ -47,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     logging.basicConfig(level=logging.INFO, format="palaestra-stub: %(message)s", stream=sys.stderr)
     try:
-        return _Process(options).run()
+        return _check(options) if options.check else _Process(options).run()
     except WorldRefusedError as error:
         # A sidecar reports the last line alone.
         sys.stderr.write(f"{error}\npalaestra-stub: {error.summary}\n")
@@ -59,6 +60,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         sys.stderr.write(f"palaestra-stub: {error.filename or 'network'}: {error.strerror}\n")
     return _WRONG_WORLD
+
+
+def _check(options: argparse.Namespace) -> int:
+    """Print what the stub makes of the world; return 0 if it can start it as it is."""
+    everything = LeaveOut(everything=True, names=True)
+    lenient = StubOptions(stand_ins=_stand_ins(options.stand_ins), leave_out=everything)
+    simulation = read_world(options.world.absolute(), _MODES[options.mode], lenient)
+    for line in summary(simulation):
+        sys.stdout.write(f"{line}\n")
+    return _WRONG_WORLD if simulation.scene.left_out else 0
 
 
 class _Process:
@@ -177,6 +188,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--version", action="version", version=version("palaestra-sim"))
     add("world", type=Path, help="the .wbt file to load")
+    add("--check", action="store_true", help="print what becomes of the world, and start nothing")
     add("--mode", choices=_MODES, default="fast", help="how time passes at first (default: %(default)s)")
     add("--step-sleep-ms", type=milliseconds, default=0.0, help="real time that each step takes at least")
     add("--publish-delay-ms", type=milliseconds, default=0.0, help="from the end of a step to its messages")

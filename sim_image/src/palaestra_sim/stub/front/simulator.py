@@ -157,6 +157,18 @@ class StubSimulator:
 
 def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Simulation, dict[Robot, Arguments]]:
     """Return a world that is ready to run, with the arguments of its robots."""
+    simulation = read_world(world_path, mode, options)
+    arguments = {robot: robot.parts.arguments for robot in simulation.robots}
+    return simulation, {robot: given for robot, given in arguments.items() if given is not None}
+
+
+def read_world(world_path: Path, mode: Mode, options: StubOptions) -> Simulation:
+    """Return the simulation of a world and of the PROTOs in its project.
+
+    Raises:
+        WorldError: the file is wrong, or holds something that the stub cannot simulate.
+        OSError: it cannot be read.
+    """
     world = parse(world_path.read_bytes(), world_path.name)
     found = local_protos(world_path, world, name=world_path.name, without=options.stand_ins)
     # A PROTO of the project is what its author means; a stand-in of the user's comes before it.
@@ -166,9 +178,7 @@ def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Simulatio
         stand_ins={**solids, **options.stand_ins},
         unusable=found.refused,
     )
-    simulation = Simulation.of(world, world_path.name, mode, descriptions, options.leave_out)
-    arguments = {robot: robot.parts.arguments for robot in simulation.robots}
-    return simulation, {robot: given for robot, given in arguments.items() if given is not None}
+    return Simulation.of(world, world_path.name, mode, descriptions, options.leave_out)
 
 
 def _ignore(_status: int) -> None:

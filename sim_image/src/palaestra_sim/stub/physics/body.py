@@ -96,6 +96,11 @@ class Body(Disc):
             for along, aside, radius in self._parts
         ]
 
+    @property
+    def drive(self) -> Drive | None:
+        """The law of its wheels; None if nothing drives it."""
+        return self._drive_law
+
     def driven_by(self, motor: Motor) -> bool:
         """Return whether a motor turns one of the wheels."""
         return motor in self._wheels

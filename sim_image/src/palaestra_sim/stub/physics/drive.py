@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 Direction = tuple[float, float]  # x and y of a unit vector in the robot's frame
@@ -80,10 +80,12 @@ class Drive:
     Attributes:
         to_twist: a wheel a row: what 1 rad/s of this wheel adds to vx, vy and omega of the robot's origin.
         to_speeds: a wheel a row: what vx, vy and omega, each 1, add to its speed in rad/s.
+        freedoms: 3 if the robot can move in any direction, 2 if it rolls ahead and turns.
     """
 
     to_twist: tuple[Twist, ...]
     to_speeds: tuple[Twist, ...]
+    freedoms: int = field(default=3, kw_only=True)
 
     def twist(self, speeds: Sequence[float]) -> Twist:
         """Return vx, vy in m/s and omega in rad/s of the robot's origin, from speeds in rad/s."""
@@ -185,6 +187,7 @@ def find_drive(wheels: Sequence[Wheel]) -> Drive | None:
     return Drive(
         tuple(_at_origin(row, center, hold.gain_m) for row, hold in zip(rows, holds, strict=True)),
         tuple(hold.to_speed for hold in holds),
+        freedoms=3 if common is None else 2,
     )
 
 

@@ -34,9 +34,9 @@ def read_arguments(reading: Reading, node: SceneNode) -> Arguments:
     """
     texts = node.texts("controllerArgs")
     names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]
-    if not names:
+    if not names and not reading.leave_out.names:
         reading.refuse(node, "controllerArgs without --name=", "generate the world")
-    if "--synchronize" not in texts:
+    if "--synchronize" not in texts and not reading.leave_out.names:
         fact = "controllerArgs without --synchronize: the stub steps only when it is asked to"
         reading.refuse(node, fact, "add it")
     for text in texts:

@@ -27,10 +27,12 @@ class LeaveOut:
     Attributes:
         types: of the nodes, as written in the world.
         everything: whether the type does not matter.
+        names: whether a robot may lack --name and --synchronize, which a sidecar puts in.
     """
 
     types: frozenset[str] = frozenset()
     everything: bool = False
+    names: bool = False
 
     def covers(self, node: SceneNode) -> bool:
         """Return whether a node that cannot be simulated is left out."""
@@ -45,12 +47,13 @@ class Reading:
         leave_out: what the user leaves out.
 
     Attributes:
+        leave_out: what the user leaves out.
         left_out: the nodes that were left out, each with its place and the reason.
     """
 
     def __init__(self, refused: Iterable[WorldError] = (), leave_out: LeaveOut | None = None) -> None:
         self._refused: list[WorldError] = list(refused)
-        self._leave_out = leave_out or LeaveOut()
+        self.leave_out = leave_out or LeaveOut()
         self.left_out: list[WorldError] = []
 
     def refuse(self, node: SceneNode, fact: str, remedy: str) -> None:
@@ -60,7 +63,7 @@ class Reading:
 
     def lacks(self, node: SceneNode, fact: str, remedy: str = ELSEWHERE) -> None:
         """Record that `node` cannot be simulated; if the user leaves out its type, it is marked so."""
-        if not self._leave_out.covers(node):
+        if not self.leave_out.covers(node):
             self.refuse(node, fact, remedy)
             return
         node.left_out = True

@@ -128,6 +128,7 @@ class Grower:
         origin = Origin(source, scope.source)
         node = self._new("Solid", origin, parent)
         node.proto_name = stand_in.name
+        node.stand_in = True
         node.def_name = source.def_name or ""
         node.fields["translation"] = FieldContent(list(stand_in.translation))
         self._fill(node, source, scope)

@@ -1,0 +1,79 @@
+"""`palaestra-stub --check`: what becomes of a world, before anything starts."""
+
+import pytest
+
+from palaestra_sim.stub.cli import main
+from palaestra_sim.world import builtin
+
+HEAD = "#VRML_SIM R2023b utf8\n"
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """`check(world)`: exit code and lines."""
+
+    def run(world, *options):
+        path = tmp_path / "my.wbt"
+        path.write_bytes(world if isinstance(world, bytes) else f"{HEAD}{world}".encode())
+        code = main([str(path), "--check", *options])
+        out, err = capsys.readouterr()
+        return code, (out or err).splitlines()
+
+    return run
+
+
+def test_a_world_that_can_start_is_described(check):
+    """Robots with their drives and devices; no ROS master is asked."""
+    assert check(builtin("arena")) == (
+        0,
+        [
+            (
+                'robot "robotino": controller "ros", omnidirectional drive on 3 wheels,'
+                " 9 DistanceSensor, 3 PositionSensor, 3 RotationalMotor, 1 TouchSensor"
+            )
+        ],
+    )
+
+
+def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
+    """Both differ from Webots without an error."""
+    code, lines = check('E-puck { name "a" controller "patrol" } WoodenBox { } WoodenBox { } Floor { }')
+
+    assert code == 0
+    assert lines[0].startswith(
+        'robot "a": controller "patrol" does not run here, differential drive on 2 wheels'
+    )
+    assert lines[1:] == ["stand-ins, which stand still: 1 Floor, 2 WoodenBox"]
+
+
+def test_all_that_the_stub_lacks_is_listed_at_once(check):
+    """With exit code 2, as for a start."""
+    code, lines = check('Roundabout { }\nRobot { controller "ros" children [ Radar { } ] }\nRoundabout { }')
+
+    assert code == 2
+    assert lines[1:] == [
+        "cannot be simulated; --leave-out leaves it out:",
+        "my.wbt:2:1: the stub simulates no Roundabout (2 places, in lines 2, 4); left out",
+        "my.wbt:3:37: the stub simulates no Radar on a robot; left out",
+    ]
+
+
+def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
+    """Most worlds that were made for the ros controller have none."""
+    assert check('Robot { controller "ros" }')[0] == 0
+
+
+def test_a_user_s_stand_ins_count(check, tmp_path):
+    """The check is of the world as it would start."""
+    table = tmp_path / "mine.toml"
+    table.write_text("[Roundabout]\nflat = true\n")
+
+    assert check("Roundabout { }", "--stand-ins", str(table))[0] == 0
+
+
+def test_a_mistake_is_an_error(check):
+    """It has no description."""
+    code, [line] = check("Solid { translation 1 }")
+
+    assert code == 2
+    assert "Solid.translation is not 3 numbers" in line
