@@ -124,6 +124,41 @@ def test_world_refuses_a_world_without_a_robot_that_ros_drives(tmp_path, fails):
     assert 'no robot has the controller "ros": there are "robotino" (controller "void"); set' in line
 
 
+def test_world_without_a_job_is_refused(tmp_path, fails):
+    """The names come from the job; a check needs none."""
+    path = tmp_path / "my.wbt"
+    path.write_bytes(builtin("arena"))
+
+    [line] = fails("world", path, "--group", "g")
+
+    assert line == "--job and --group: at least one is missing; give both, or --check"
+
+
+def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
+    """The simulators answer for themselves; nothing is started."""
+    path = tmp_path / "my.wbt"
+    path.write_bytes(builtin("arena"))
+    assert main(["world", str(path), "--check"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "stub: starts as it is"
+    assert lines[1].startswith('  robot "robotino": controller "ros", omnidirectional drive on 3 wheels')
+    assert lines[2].startswith("webots: ")
+
+    path.write_text("#VRML_SIM R2023b utf8\nRoundabout { }\n")
+    assert main(["world", str(path), "--check"]) == 2
+    assert "  my.wbt:2:1: the stub simulates no Roundabout; left out" in capsys.readouterr().out.splitlines()
+
+
+def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch):
+    """An operator's image has none."""
+    path = tmp_path / "my.wbt"
+    path.write_bytes(builtin("arena"))
+    monkeypatch.setattr("palaestra.local.world_check.program_path", lambda: str(tmp_path))
+
+    assert main(["world", str(path), "--check"]) == 2
+    assert "  palaestra-stub is not installed on this machine" in capsys.readouterr().out.splitlines()
+
+
 def test_world_s_help_names_all_that_changes(capsys):
     """A world builder compares the two files, and must find no other difference."""
     with pytest.raises(SystemExit) as ended:

@@ -2,6 +2,8 @@
 
 import contextlib
 import math
+import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -114,3 +116,15 @@ def test_every_part_that_ships_has_a_size():
     """A box of no height would be seen by no ray."""
     for entry in shipped().values():
         assert all(min(part.size) > 0.0 for part in entry.parts({}))
+
+
+def test_the_example_of_the_docs_is_a_table():
+    """As a reader copies it."""
+    page = (Path(__file__).parents[3] / "docs" / "simulators.md").read_text()
+    (example,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+
+    table = load(example, "docs")
+
+    assert table["Crate"].parts({})[0].at == (0.0, 0.0, 0.15)
+    assert table["Lamp"].parts({})[0].size == (0.15, 1.8)
+    assert table["Poster"].parts({}) == ()

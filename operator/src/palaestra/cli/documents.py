@@ -4,16 +4,20 @@ import argparse
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from textwrap import indent
 
 from palaestra.api.generated import crd_text
 from palaestra.cli.files import add_dir, job, read
 from palaestra.cli.parsing import Commands, command
+from palaestra.errors import PalaestraError
 from palaestra.local.rundir import job_directory, uid_of
+from palaestra.local.world_check import check_world
 from palaestra.plan import ClusterLayout, Images, Layout, LocalLayout, identified, plan
 from palaestra.plan.text import as_yaml
 from palaestra_protocol.numbers import whole
 from palaestra_sim.world import RunIdentity, generate
 
+_NOT_AS_IT_IS = 2
 UNASSIGNED = "00000000-0000-0000-0000-000000000000"  # stands for the uid that a cluster gives
 
 PLAN = """\
@@ -24,6 +28,9 @@ WORLD = """\
 Reads the world in FILE and prints the copy that one simulator of a job gets. Only the controllerArgs of
 robots whose controller is "ros" change: --name= is set, --synchronize is added, and --clock is removed. With
 the option --clock, the first --clock is kept.
+
+With --check, it prints what each simulator of this machine can and cannot do with the world instead, and
+starts nothing. The exit code is then 0 if each can start it as it is, 2 otherwise.
 """
 CRD = "Prints the CustomResourceDefinition of TrainingJobs, as YAML."
 
@@ -48,6 +55,10 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _world(options: argparse.Namespace) -> int:
+    if options.check:
+        return _check(options.file)
+    if options.job is None or options.group is None:
+        raise PalaestraError("--job and --group: at least one is missing; give both, or --check")
     identity = RunIdentity(
         job=options.job,
         namespace=options.namespace,
@@ -65,6 +76,17 @@ def _world(options: argparse.Namespace) -> int:
     )
     sys.stdout.write(world.decode())
     return 0
+
+
+def _check(file: Path) -> int:
+    """Print what each simulator makes of a world."""
+    read(file)
+    answers = check_world(file)
+    for answer in answers:
+        verdict = "starts as it is" if answer.starts else "does not start as it is"
+        sys.stdout.write(f"{answer.driver}: {verdict}\n{indent(answer.text, '  ')}\n")
+    sys.stdout.write("webots: simulates all that its own files describe; its log has the errors of a world\n")
+    return 0 if all(answer.starts for answer in answers) else _NOT_AS_IT_IS
 
 
 def _crd(options: argparse.Namespace) -> int:
@@ -88,10 +110,11 @@ def _add_plan(commands: Commands) -> None:
 def _add_world(commands: Commands) -> None:
     parser = command(commands, "world", _world, "print one simulator's own world", WORLD)
     parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt)")
-    parser.add_argument("--job", metavar="NAME", required=True, help="name of the job")
+    parser.add_argument("--check", action="store_true", help="print what each simulator makes of it")
+    parser.add_argument("--job", metavar="NAME", help="name of the job")
     parser.add_argument("--namespace", default="default", help="namespace of the job")
     parser.add_argument("--uid", default="", help="uid of the job in its cluster")
     parser.add_argument("--replica", type=whole(), default=0, help="number of the replica")
-    parser.add_argument("--group", required=True, help="name of the group of simulators")
+    parser.add_argument("--group", help="name of the group of simulators")
     parser.add_argument("--index", type=whole(), default=0, help="number of the simulator in the group")
     parser.add_argument("--clock", action="store_true", help="keep the world's first --clock")

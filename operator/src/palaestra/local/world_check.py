@@ -1,0 +1,65 @@
+"""What the simulators of this machine make of a world: each is asked by its own `--check`.
+
+The operator's package knows no simulator, so the answer comes from the simulator itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from palaestra.local.process import NOT_RUNNABLE, Process, program_path
+
+_CHECKERS: Final = {"stub": "palaestra-stub"}
+_DEADLINE_S: Final = 60.0
+_TIMED_OUT: Final = 124
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """The answer of one simulator.
+
+    Attributes:
+        driver: as in a TrainingJob.
+        starts: whether it can start the world as it is.
+        text: its own words.
+    """
+
+    driver: str
+    starts: bool
+    text: str
+
+
+def check_world(world: Path) -> tuple[Answer, ...]:
+    """Return the answer of each simulator that can check a world; without an answer it cannot start it."""
+    return tuple(asyncio.run(_ask(driver, program, world)) for driver, program in _CHECKERS.items())
+
+
+async def _ask(driver: str, program: str, world: Path) -> Answer:
+    with tempfile.TemporaryFile() as output:
+        code = await _run([program, "--check", str(world)], output.fileno())
+        output.seek(0)
+        text = output.read().decode(errors="replace").rstrip()
+    if code == NOT_RUNNABLE:
+        text = f"{program} is not installed on this machine"
+    elif code == _TIMED_OUT:
+        text = f"{program} did not answer within {_DEADLINE_S:.0f} s"
+    return Answer(driver=driver, starts=code == 0, text=text)
+
+
+async def _run(command: list[str], output: int) -> int:
+    env = {**os.environ, "PATH": program_path()}
+    try:
+        process = Process.start(command, env, stdout=output, stderr=output)
+    except OSError:
+        return NOT_RUNNABLE
+    if not await process.ended_within(_DEADLINE_S):
+        process.send(signal.SIGKILL)
+        await process.wait()
+        return _TIMED_OUT
+    return await process.wait()
