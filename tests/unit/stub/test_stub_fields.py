@@ -209,8 +209,7 @@ def test_values_that_are_drawn_only_are_kept_and_change_nothing(ros, start, worl
     ("path", "setter", "value", "fact"),
     [
         ("BODY.radius", "set_float", 0.3, "Cylinder.radius of a boundingObject"),
-        ("FLOOR_BOX.size", "set_vec3f", {"x": 9.0, "y": 9.0, "z": 0.1}, "Box.size of a boundingObject"),
-        ("CYLINDER_0_SHAPE.radius", "set_float", 0.1, "Cylinder.radius of a boundingObject"),
+        ("CYLINDER_0_SHAPE.subdivision", "set_int32", 8, "Cylinder.subdivision of a boundingObject"),
         ("ROBOTINO.controllerArgs", "set_string", "--clock", "Robot.controllerArgs"),
     ],
 )

@@ -9,6 +9,7 @@ from palaestra_sim.errors import WorldError, WorldRefusedError
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.reader import read_scene
 from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.stub.scene.tree.catalogue import FieldType
 from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world import builtin, parse
 
@@ -147,6 +148,23 @@ def test_a_bumper_without_a_boundingobject_never_fires(world, simple_robot):
 
     assert simulation.robots[0].body.x < 0.0
     assert simulation.robots[0].sensors["touch sensor"].value is False
+
+
+def test_an_obstacle_may_get_another_size(world):
+    """A client that randomizes sizes trains in the worlds that it wrote."""
+    post = """Solid { translation 1 0 0.1 name "post" children [ Shape {
+      geometry DEF SIZE Cylinder { radius 0.1 height 0.2 } } ] boundingObject USE SIZE }"""
+    simulation = Simulation.load(world(post))
+    assert distance(simulation) == pytest.approx(0.7)
+    radius = simulation.tree.field_of(simulation.tree.of_def("SIZE"), "radius", simulation)
+
+    radius.set(FieldType.FLOAT, 0, 0.3)
+    assert distance(simulation) == pytest.approx(0.5)
+
+    radius.set(FieldType.FLOAT, 0, -1.0)
+    assert radius.get(FieldType.FLOAT) == 0.3
+    simulation.reset()
+    assert distance(simulation) == pytest.approx(0.5)  # as in Webots: a reset restores places only
 
 
 BAD = {

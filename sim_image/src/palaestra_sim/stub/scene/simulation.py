@@ -20,8 +20,9 @@ from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reader import Scene, read_scene
-from palaestra_sim.stub.scene.reading import LeaveOut
+from palaestra_sim.stub.scene.reading import LeaveOut, Reading
 from palaestra_sim.stub.scene.robot import Robot
+from palaestra_sim.stub.scene.shapes import bounding_shapes
 from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world import World, parse
 
@@ -153,6 +154,9 @@ class Simulation:
 
     def changed(self, node: SceneNode, field: str) -> None:
         """Take the effect of a field that has a new value."""
+        if node.outline:
+            self._resize(node)
+            return
         if node.place is None or field not in {"translation", "rotation"}:
             return
         if field == "translation":
@@ -162,6 +166,17 @@ class Simulation:
             x, y, z, angle_rad = node.numbers(field) or (0.0, 0.0, 1.0, 0.0)
             node.place.rotation = (x, y, z, angle_rad)
         self._moved(node.place)
+
+    def _resize(self, node: SceneNode) -> None:
+        """Read the outline of an obstacle anew, of which a part has another size."""
+        owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
+        if owner is not None and owner.place is not None:
+            fresh = bounding_shapes(Reading(), owner, owner.place)
+            solids = self.scene.solids
+            first = next((at for at, shape in enumerate(solids) if shape.place is owner.place), len(solids))
+            kept = [shape for shape in solids if shape.place is not owner.place]
+            self.scene.solids = [*kept[:first], *fresh, *kept[first:]]
+            self._arrange()
 
     def _moved(self, place: Place) -> None:
         """Update the places of the solids, if `place` is part of one of them."""

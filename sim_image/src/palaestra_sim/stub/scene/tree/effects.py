@@ -30,6 +30,12 @@ _ACTING: Final = DEVICES.keys() | frozenset(
 )
 _FOR_PEOPLE: Final = frozenset(("description", "info", "model", "recognitionColors", "title"))
 _PLACING: Final = frozenset(("translation", "rotation"))
+_SIZES: Final = {
+    "Box": ("size",),
+    "Capsule": ("height", "radius"),
+    "Cylinder": ("height", "radius"),
+    "Sphere": ("radius",),
+}
 _MOUNTED: Final = frozenset(kind.node for kind in DEVICES.values() if not kind.on_joint)
 
 
@@ -39,13 +45,21 @@ def require_effect(node: SceneNode, field: str) -> None:
     Raises:
         UnsimulatedError: it would have no effect.
     """
-    takes_effect = _is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)
-    if node.outline or not takes_effect:
+    if node.outline:
+        takes_effect = resizes(node, field)
+    else:
+        takes_effect = _is_drawn_only(node, field) or _reaches_robot(node, field) or _moves(node, field)
+    if not takes_effect:
         part = " of a boundingObject" if node.outline else ""
         raise UnsimulatedError(
             f"the stub cannot change {node.type_name}.{field}{part} while it runs;"
             " write it into the world file, or use driver webots"
         )
+
+
+def resizes(node: SceneNode, field: str) -> bool:
+    """Return whether a write changes the size of a standing obstacle, and of nothing on a robot."""
+    return field in _SIZES.get(node.type_name, ()) and not any(_on_robot(twin) for twin in node.twins)
 
 
 def _is_drawn_only(node: SceneNode, field: str) -> bool:

@@ -84,6 +84,8 @@ class Field:
         values = list(self._current())
         if not -len(values) <= at < len(values):
             return
+        if self.node.outline and not _positive(value):
+            return
         self._require_effect()
         values[at] = value
         self._values = values
@@ -164,6 +166,12 @@ def _acceptable(type_: FieldType, value: Any) -> bool:
     if isinstance(value, tuple):
         return all(map(math.isfinite, value))
     return type_ is not FieldType.FLOAT or math.isfinite(value)
+
+
+def _positive(value: Any) -> bool:
+    """Return whether a size is one; Webots refuses others."""
+    numbers: tuple[float, ...] = value if isinstance(value, tuple) else (value,)
+    return min(numbers) > 0.0
 
 
 def _initial(node: SceneNode, name: str, kind: FieldKind) -> list[Any]:
