@@ -204,3 +204,10 @@ def test_a_damaged_proto_is_read_or_refused(at: float, cut: int, new: str) -> No
     error = problem((HEADER + damaged).encode())
 
     assert error is None or error.line >= 1
+
+
+def test_of_two_values_of_a_field_in_a_body_the_last_counts() -> None:
+    """Published PROTOs have such fields, and Webots reads them; a world is still refused."""
+    proto = read("PROTO Stool [ field SFVec3f at 1 1 1 ] { Solid { translation IS at translation 0 0 2 } }")
+
+    assert proto.body.numbers("translation") == (0, 0, 2)

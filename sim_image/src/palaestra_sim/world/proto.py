@@ -78,6 +78,16 @@ def parse_proto(data: bytes, name: str) -> Proto:
     return proto
 
 
+def parse_fields(text: str, name: str) -> dict[str, ProtoField]:
+    """Return the fields that `text` declares as a PROTO does; the word before a type may be missing.
+
+    Raises:
+        WorldError: the text has something else; its lines count from 1.
+    """
+    source = Source(data=text.encode(), name=name, kind="PROTO")
+    return _ProtoReader(source, tokenize(source)).fields(name)
+
+
 def _templates(data: bytes) -> Iterator[int]:
     """Yield the place of each opening of a template, and of each comment that names its language.
 
@@ -104,6 +114,8 @@ def _undeclared(proto: Proto) -> Iterator[WorldError]:
 class _ProtoReader(Reader):
     """The rules of a PROTO file, beside those for its nodes."""
 
+    _access_needed = True
+
     def proto(self) -> Proto:
         """Read `file := extern* "PROTO" name "[" declaration* "]" "{" node "}"`."""
         self._is_refused = "IS outside the body of the PROTO"
@@ -115,10 +127,20 @@ class _ProtoReader(Reader):
         fields = self._declarations(name)
         self._expect(b"{", "the body of a PROTO is written { Type { … } }")
         self._is_refused = None
+        self._last_counts = True  # published PROTOs have such fields
         body = self._body(name)
         self._expect(b"}", "a PROTO has one node")
         self._end()
         return Proto(name=name, externs=tuple(externs), fields=fields, body=body, source=self._source)
+
+    def fields(self, proto: str) -> dict[str, ProtoField]:
+        """Read `declaration*` to the end of the text."""
+        self._is_refused = "IS outside the body of the PROTO"
+        self._access_needed = False
+        fields: dict[str, ProtoField] = {}
+        while (token := self._peek()).kind != "end":
+            self._add(fields, token, proto)
+        return fields
 
     def _declarations(self, proto: str) -> dict[str, ProtoField]:
         """Read `"[" declaration* "]"`."""
@@ -129,18 +151,19 @@ class _ProtoReader(Reader):
             token = self._peek()
             if token.kind == "end":
                 raise self._error(opening, f'the "[" of {proto} is never closed', 'add the missing "]"')
-            name, declared = self._declaration(proto)
-            if name in fields:
-                raise self._error(token, f"{proto} declares the field {name} twice", "keep one of them")
-            fields[name] = declared
+            self._add(fields, token, proto)
         return fields
+
+    def _add(self, fields: dict[str, ProtoField], token: Token, proto: str) -> None:
+        """Read the declaration that begins with `token`, and add it to `fields`."""
+        name, declared = self._declaration(proto)
+        if name in fields:
+            raise self._error(token, f"{proto} declares the field {name} twice", "keep one of them")
+        fields[name] = declared
 
     def _declaration(self, proto: str) -> tuple[str, ProtoField]:
         """Read `declaration := access type ["{" item* "}"] name value`."""
-        access = self._take()
-        if access.text not in _ACCESSES:
-            fact = f"{shown(access)} where a field of {proto} should be declared"
-            raise self._error(access, fact, "write field, a type, a name and a default")
+        access = self._access(proto)
         kind = self._take()
         type_name = kind.text.decode()
         if type_name not in _TYPES:
@@ -149,8 +172,17 @@ class _ProtoReader(Reader):
         allowed = self._allowed(type_name)
         name = self._name(f"the name of a {type_name} of {proto}")
         default = self._default(type_name, name)
-        access_name = access.text.decode()
-        return name, ProtoField(type=type_name, default=default, access=access_name, allowed=allowed)
+        return name, ProtoField(type=type_name, default=default, access=access, allowed=allowed)
+
+    def _access(self, proto: str) -> str:
+        """Read the word before the type of a field."""
+        access = self._peek()
+        if access.text in _ACCESSES:
+            return self._take().text.decode()
+        if self._access_needed:
+            fact = f"{shown(access)} where a field of {proto} should be declared"
+            raise self._error(access, fact, "write field, a type, a name and a default")
+        return "field"
 
     def _allowed(self, type_name: str) -> tuple[Item, ...]:
         """Read the values to which a field is restricted, `["{" item* "}"]`."""

@@ -42,6 +42,9 @@ class Reader:
         self._tokens = tokens
         self._at = 0
         self._is_refused: str | None = "IS outside a PROTO file"  # None where IS is allowed
+        self._last_counts = (
+            False  # of two values of one field: Webots reads both, and a world needs no second
+        )
 
     def world(self, header: str) -> World:
         """Read `file := header (["IMPORTABLE"] "EXTERNPROTO" string | node)*`."""
@@ -101,7 +104,7 @@ class Reader:
                 raise self._error(opening, fact, 'add the missing "}"')
             hidden = "hidden " if self._skip(b"hidden") else ""
             name = hidden + self._name(f"a field of {type_name}")
-            if name in fields:
+            if name in fields and not self._last_counts:
                 fact = f"{type_name} has the field {name} twice"
                 raise self._error(token, fact, "keep one of them")
             fields[name] = self._value(name, depth)
