@@ -3,7 +3,7 @@
     SimError
     ├── WorldError              the .wbt file is wrong: retrying cannot help
     │   └── WorldRefusedError   it has several mistakes; the message lists them all
-    ├── StandInError            a table of stand-ins is wrong: retrying cannot help
+    ├── StandInError            a file of stand-ins is wrong: retrying cannot help
     ├── UnknownWorldError       no shipped world has that name: retrying cannot help
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
     ├── SidecarError            the sidecar cannot run as requested: retrying cannot help
@@ -90,7 +90,7 @@ def _in_one_line(errors: list[WorldError]) -> str:
 
 
 class StandInError(SimError, ValueError):
-    """A table of stand-ins is wrong; the message has the entry, the fact and the remedy."""
+    """A file of stand-ins is wrong; the message has file, type, field, fact and remedy."""
 
 
 class UnknownWorldError(SimError, LookupError):

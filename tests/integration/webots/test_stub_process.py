@@ -105,15 +105,15 @@ def test_all_refusals_of_a_world_are_printed_and_the_last_line_sums_them_up(mast
     """A sidecar reports the last line, and a person reads the rest."""
     del master
     world = tmp_path / "forest.wbt"
-    world.write_text("#VRML_SIM R2023b utf8\nPond { }\nTree { }\nTree { }\n")
+    world.write_text("#VRML_SIM R2023b utf8\nColosseum { }\nMinotaur { }\nMinotaur { }\n")
 
     result = subprocess.run([STUB, world], capture_output=True, text=True, timeout=20, check=False)
     *refusals, last = result.stderr.splitlines()
 
     assert result.returncode == 2
     assert [line.partition(";")[0] for line in refusals] == [
-        "forest.wbt:2:1: the stub simulates no Pond",
-        "forest.wbt:3:1: the stub simulates no Tree (2 places, in lines 3, 4)",
+        "forest.wbt:2:1: the stub simulates no Colosseum",
+        "forest.wbt:3:1: the stub simulates no Minotaur (2 places, in lines 3, 4)",
     ]
     assert last.startswith("palaestra-stub: forest.wbt: 3 places are refused, the first is forest.wbt:2:1: ")
 

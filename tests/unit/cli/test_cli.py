@@ -144,9 +144,9 @@ def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
     assert lines[1].startswith('  robot "robotino": controller "ros", omnidirectional drive on 3 wheels')
     assert lines[2].startswith("webots: ")
 
-    path.write_text("#VRML_SIM R2023b utf8\nRoundabout { }\n")
+    path.write_text("#VRML_SIM R2023b utf8\nColosseum { }\n")
     assert main(["world", str(path), "--check"]) == 2
-    assert "  my.wbt:2:1: the stub simulates no Roundabout; left out" in capsys.readouterr().out.splitlines()
+    assert "  my.wbt:2:1: the stub simulates no Colosseum; left out" in capsys.readouterr().out.splitlines()
 
 
 def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch):

@@ -28,9 +28,9 @@ def test_robots_with_other_controllers_are_left_alone(ros, start, world, simple_
 def test_nothing_starts_from_a_wrong_world(ros, tmp_path):
     """The error comes before any node does."""
     path = tmp_path / "bad.wbt"
-    path.write_bytes(b"#VRML_SIM R2023b utf8\nRoundabout { }\n")
+    path.write_bytes(b"#VRML_SIM R2023b utf8\nColosseum { }\n")
 
-    with pytest.raises(WorldError, match=r"bad.wbt:2:1: the stub simulates no Roundabout"):
+    with pytest.raises(WorldError, match=r"bad.wbt:2:1: the stub simulates no Colosseum"):
         StubSimulator(path, ros.make_node)
 
     assert ros.nodes == []

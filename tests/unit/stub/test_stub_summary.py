@@ -48,12 +48,12 @@ def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
 
 def test_all_that_the_stub_lacks_is_listed_at_once(check):
     """With exit code 2, as for a start."""
-    code, lines = check('Roundabout { }\nRobot { controller "ros" children [ Radar { } ] }\nRoundabout { }')
+    code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Radar { } ] }\nColosseum { }')
 
     assert code == 2
     assert lines[1:] == [
         "cannot be simulated; --leave-out leaves it out:",
-        "my.wbt:2:1: the stub simulates no Roundabout (2 places, in lines 2, 4); left out",
+        "my.wbt:2:1: the stub simulates no Colosseum (2 places, in lines 2, 4); left out",
         "my.wbt:3:37: the stub simulates no Radar on a robot; left out",
     ]
 
@@ -66,9 +66,9 @@ def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):
 def test_a_user_s_stand_ins_count(check, tmp_path):
     """The check is of the world as it would start."""
     table = tmp_path / "mine.toml"
-    table.write_text("[Roundabout]\nflat = true\n")
+    table.write_text("[Colosseum]\nflat = true\n")
 
-    assert check("Roundabout { }", "--stand-ins", str(table))[0] == 0
+    assert check("Colosseum { }", "--stand-ins", str(table))[0] == 0
 
 
 def test_a_mistake_is_an_error(check):

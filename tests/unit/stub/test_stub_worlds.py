@@ -11,7 +11,8 @@ from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.world import builtin_protos, parse, parse_proto
-from palaestra_sim.world.stand_ins import load, shipped
+from palaestra_sim.world.stand_ins import load_stand_ins as load
+from palaestra_sim.world.stand_ins import shipped
 
 HEAD = "#VRML_SIM R2023b utf8\n"
 STOOL = """PROTO Stool [ field SFVec3f translation 0 0 0 field SFFloat radius 0.2 field MFNode parts [ ] ]
@@ -51,13 +52,13 @@ def test_an_instance_of_a_proto_has_its_values_or_the_defaults():
 
 def test_a_proto_may_be_made_of_protos_and_take_nodes():
     """Nested values are read where they were written."""
-    bench = """PROTO Bench [ field SFFloat wide 0.3 ] { Pose { translation 5 0 0 children [
+    perch = """PROTO Perch [ field SFFloat wide 0.3 ] { Pose { translation 5 0 0 children [
       Stool { radius IS wide parts [ DEF TOP Stool { radius 0.7 } ] } ] } }"""
-    simulation = load_world("DEF A Bench { wide 0.6 }", STOOL, bench)
+    simulation = load_world("DEF A Perch { wide 0.6 }", STOOL, perch)
 
     assert [it[3][0] for it in obstacles(simulation)] == [1.2, 1.4]
     assert {it[1] for it in obstacles(simulation)} == {5.0}
-    assert simulation.tree.of_def("A").proto_name == "Bench"
+    assert simulation.tree.of_def("A").proto_name == "Perch"
     assert simulation.tree.of_def("A.TOP").proto_name == "Stool"
 
 
@@ -118,14 +119,14 @@ def test_a_robot_for_ros_is_never_replaced_by_a_stand_in():
         load_world('Rover { controller "ros" }', stand_ins=own)
 
 
-@pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Roundabout"}))])
+@pytest.mark.parametrize("leave_out", [LeaveOut(everything=True), LeaveOut(types=frozenset({"Colosseum"}))])
 def test_what_is_left_out_is_not_there_and_is_reported(leave_out):
     """With its place: one line each for the log."""
-    simulation = load_world("Roundabout { } WoodenBox { }", leave_out=leave_out)
+    simulation = load_world("Colosseum { } WoodenBox { }", leave_out=leave_out)
 
     assert len(simulation.scene.solids) == 1
     assert [str(it) for it in simulation.scene.left_out] == [
-        "my.wbt:2:32: the stub simulates no Roundabout; left out"
+        "my.wbt:2:32: the stub simulates no Colosseum; left out"
     ]
 
 
@@ -218,7 +219,7 @@ def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
     with pytest.raises(WorldError, match=r"mine.wbt:3:1: Lamp is not expanded \(.*Lamp.proto:2:.*template"):
         StubSimulator(world, ros.make_node)
 
-    lamp = StubOptions(stand_ins=load("[Lamp]\ncylinder = [0.1, 2]", "mine.toml"))
+    lamp = StubOptions(stand_ins=load("[Lamp]\ncylinder = { radius = 0.1, height = 2 }", "mine.toml"))
     assert len(StubSimulator(world, ros.make_node, options=lamp).simulation.scene.solids) == 1
 
 

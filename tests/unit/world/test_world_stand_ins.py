@@ -1,130 +1,348 @@
-"""The table of stand-ins: its form, its errors, and the solids that it gives."""
+"""Stand-ins: what ships is whole and sensible, and a mistake in a user's file is named where it is."""
 
-import contextlib
 import math
-import re
+import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.errors import StandInError
-from palaestra_sim.stub.scene.nodes.types import is_base_type
-from palaestra_sim.world.stand_ins import Part, load, shipped
+from palaestra_sim.world import (
+    Item,
+    Part,
+    StandInError,
+    expand,
+    load_stand_ins,
+    shipped_stand_ins,
+)
+from palaestra_sim.world.formulas import parse_formula
 
-CRATE = '[Crate]\nfields = { size = [1, 2, 3] }\nbox = "size"\n'
+PAGE = Path(__file__).parents[3] / "docs/simulators.md"
+# The types that are in most worlds of other people, beside robots and devices.
+COMMON = """
+RectangleArena Floor WoodenBox StraightRoadSegment Wall HighwayPole CurvedRoadSegment
+RoadIntersection TeslaModel3Simple CardboardBox OilBarrel WoodenChair BmwX5 RangeRoverSportSVRSimple
+CitroenCZeroSimple LincolnMKZSimple SpeedLimitSign GenericTrafficLight Cabinet Table SquareManhole
+Door PottedTree Sofa Window Forest Sink SolidBox Desk Fridge CeilingLight Carpet Chair HotPlate Oven
+Worktop Armchair BunchOfSunFlowers Can LandscapePainting halfTile worldTile SpeedLimitPanel
+HazardMap Victim FireSmoke SmallResidentialTower Keyboard Monitor TexturedBackground
+TexturedBackgroundLight
+"""
 
 
-def parts(text, **given_fields):
-    """The parts of the one entry of a table."""
-    (entry,) = load(text, "mine.toml").values()
-    return entry.parts(given_fields)
+def parts(name: str, **values: Sequence[Item]) -> tuple[Part, ...]:
+    """Return the parts of an object of a type that ships."""
+    return expand(shipped_stand_ins()[name], values)
 
 
-def test_a_box_has_the_size_of_its_instance_or_the_default():
-    """As a PROTO's field has."""
-    assert parts(CRATE) == (Part(kind="Box", size=(1.0, 2.0, 3.0)),)
-    assert parts(CRATE, size=(4.0, 5.0, 6.0)) == (Part(kind="Box", size=(4.0, 5.0, 6.0)),)
+def made(text: str, **values: Sequence[Item]) -> tuple[Part, ...]:
+    """Return the parts of an object of the only type of a file."""
+    (stand_in,) = load_stand_ins(text, "mine.toml").values()
+    return expand(stand_in, values)
+
+
+def refusal(text: str) -> str:
+    """Return the message for a file that can't be used."""
+    with pytest.raises(StandInError) as caught:
+        load_stand_ins(text, "mine.toml")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", COMMON.split())
+def test_what_most_worlds_are_made_of_has_a_stand_in(name: str) -> None:
+    """The list is a count over worlds of public projects."""
+    assert name in shipped_stand_ins()
+
+
+def test_every_solid_that_ships_has_parts_of_a_sensible_size() -> None:
+    """From a bolt to a tower; a barrier that is off and a tile without walls have none."""
+    for name, stand_in in shipped_stand_ins().items():
+        found = expand(stand_in, {})
+        assert bool(found) == (
+            stand_in.kind == "solid" and name not in ("CrashBarrier", "worldTile", "halfTile")
+        ), name
+        assert all(0.001 < length < 100 for part in found for length in part.size), name
+        assert all(abs(place) < 60 for part in found for place in part.position), name
+
+
+def test_every_object_has_a_place_and_a_name() -> None:
+    """The fields of the type come after them, and may replace them."""
+    barrel = shipped_stand_ins()["OilBarrel"].fields
+
+    assert list(barrel) == [
+        "translation",
+        "rotation",
+        "name",
+        "height",
+        "radius",
+        "physics",
+        "immersionProperties",
+    ]
+    assert barrel["translation"].default.items == (0, 0, 0.44)
+    assert barrel["rotation"].type == "SFRotation"
+    assert barrel["name"].default.items == ("oil barrel",)
+
+
+def test_a_box_has_the_size_of_its_field() -> None:
+    """In both places: the default, and the value of the world."""
+    assert parts("WoodenBox") == (Part(shape="box", size=(0.6, 0.6, 0.6)),)
+    assert parts("WoodenBox", size=(1.0, 2.0, 3.0)) == (Part(shape="box", size=(1, 2, 3)),)
+
+
+@pytest.mark.parametrize("value", [(), (1.0, 2.0), ("a", "b", "c"), (None,)])
+def test_a_value_that_does_not_fit_is_the_default(value: Sequence[Item]) -> None:
+    """Webots does the same, with a message."""
+    assert parts("WoodenBox", size=value) == parts("WoodenBox")
+
+
+def test_a_wall_stands_on_its_origin_and_a_box_is_around_it() -> None:
+    """Most of what is built stands; most of what is put down has its origin in the middle."""
+    (wall,) = parts("Wall")
+
+    assert wall == Part(shape="box", size=(0.2, 1, 2.4), position=(0, 0, 1.2))
+
+
+def test_an_arena_is_a_floor_within_four_walls() -> None:
+    """The walls stand around the floor, not on it."""
+    floor, front, back, left, right = parts("RectangleArena", floorSize=(3.0, 2.0), wallHeight=(0.4,))
+
+    assert floor == Part(shape="plane", size=(3, 2))
+    assert front == Part(shape="box", size=(0.01, 2, 0.4), position=(1.505, 0, 0.2))
+    assert back.position == (-1.505, 0.0, 0.2)
+    assert left == Part(shape="box", size=(3.02, 0.01, 0.4), position=(0, 1.005, 0.2))
+    assert right.position == (0.0, -1.005, 0.2)
+
+
+def test_a_round_arena_is_closed() -> None:
+    """Its wall is a ring of boxes that overlap at the corners."""
+    floor, *ring = parts("CircleArena", radius=(2.0,))
+
+    assert floor == Part(shape="plane", size=(4, 4))
+    assert len(ring) == 24
+    assert {round(math.hypot(*box.position[:2]), 2) for box in ring} == {1.99}
+    assert math.isclose(sum(box.size[0] - box.size[1] for box in ring), 2 * math.pi * 2.005, rel_tol=0.01)
+
+
+def test_a_building_has_a_wall_between_each_two_corners() -> None:
+    """And one from the last to the first."""
+    corners = (0.0, 0.0, 6.0, 0.0, 6.0, 4.0)
+
+    first, second, third = parts("SimpleBuilding", corners=corners, floorNumber=(2.0,))
+
+    assert first == Part(shape="box", size=(6.2, 0.2, 6), position=(3, 0, 3))
+    assert second == Part(shape="box", size=(4.2, 0.2, 6), position=(6, 2, 3), turn=math.pi / 2)
+    assert third.position == (3.0, 2.0, 3.0)
+
+
+def test_a_door_that_is_open_leaves_its_frame() -> None:
+    """A robot can drive through; a closed one is a wall."""
+    assert len(parts("Door")) == 4
+    assert len(parts("Door", position=(1.2,))) == 3
+
+
+def test_a_cabinet_is_as_large_as_its_rows_and_columns() -> None:
+    """Its origin is at its back."""
+    (box,) = parts("Cabinet", rowsHeights=(0.5,), columnsWidths=(0.3, 0.3))
+
+    assert box.size == pytest.approx((0.5, 0.66, 0.56))
+    assert box.position == pytest.approx((0.25, 0, 0.28))
+
+
+def test_a_bounding_object_can_be_off() -> None:
+    """Robots drive through such an object in Webots too."""
+    assert parts("SolidBox", enableBoundingObject=(False,)) == ()
 
 
 @pytest.mark.parametrize(
-    ("shape", "height"), [("box = [1, 2, 3]", 3.0), ("cylinder = [1, 4]", 4.0), ("sphere = 2", 4.0)]
+    ("name", "kind"), [("Carpet", "flat"), ("RoadIntersection", "flat"), ("Asphalt", "drawn")]
 )
-def test_what_stands_on_its_origin_is_lifted_by_half_its_height(shape, height):
-    """Furniture has its origin on the floor, crates in their middle."""
-    (part,) = parts(f'[A]\norigin = "floor"\nat = [1, 2, 0]\n{shape}')
+def test_what_nothing_runs_into_has_no_parts(name: str, kind: str) -> None:
+    """What lies on the ground, and what is only looked at."""
+    stand_in = shipped_stand_ins()[name]
 
-    assert part.at == (1.0, 2.0, height / 2)
-
-
-def test_a_size_may_be_a_sum():
-    """A cabinet is as wide as its columns and its frame."""
-    text = '[A]\nfields = { widths = [1, 2] }\nbox = [1, "sum widths + 0.5", "sum widths"]'
-
-    assert parts(text)[0].size == (1.0, 3.5, 3.0)
-    assert parts(text, widths=(1.0, 1.0, 1.0, 1.0))[0].size == (1.0, 4.5, 4.0)
+    assert (stand_in.kind, expand(stand_in, {})) == (kind, ())
 
 
-def test_an_arena_has_four_walls_around_its_floor():
-    """The inner faces are at the edges of the floor."""
-    walls = shipped()["RectangleArena"].parts({"floorSize": (4.0, 2.0), "wallThickness": (0.1,)})
+def test_a_part_is_placed_turned_and_left_out_by_formulas() -> None:
+    """Each number may be a field of the object."""
+    text = """
+        [Stool]
+        fields = "SFFloat height 0.5  SFFloat angle 0.1  SFBool hasBack FALSE"
+        parts = [
+            { cylinder = { radius = 0.2, height = "height" }, origin = "base" },
+            { box = [0.03, 0.4, 0.4], at = [-0.19, 0, "height + 0.2"], turn = "2 * angle", when = "hasBack" },
+            { sphere = 0.1, unless = "hasBack" },
+        ]
+    """
 
-    assert [(wall.at, wall.size) for wall in walls] == [
-        ((pytest.approx(2.05), 0.0, 0.05), (0.1, 2.0, 0.1)),
-        ((pytest.approx(-2.05), 0.0, 0.05), (0.1, 2.0, 0.1)),
-        ((0.0, pytest.approx(1.05), 0.05), (pytest.approx(4.2), 0.1, 0.1)),
-        ((0.0, pytest.approx(-1.05), 0.05), (pytest.approx(4.2), 0.1, 0.1)),
-    ]
-
-
-@given(radius=st.floats(0.5, 10), thickness=st.floats(0.01, 0.2))
-def test_a_round_arena_has_no_gap_and_nothing_inside(radius, thickness):
-    """Every wall touches the circle from outside, and its neighbors."""
-    walls = shipped()["CircleArena"].parts({"radius": (radius,), "wallThickness": (thickness,)})
-    turn = 2 * math.pi / len(walls)
-
-    for wall in walls:
-        assert math.hypot(*wall.at[:2]) - wall.size[0] / 2 == pytest.approx(radius)
-        assert wall.size[1] >= 2 * (radius + thickness) * math.tan(turn / 2) - 1e-9
+    assert made(text) == (
+        Part(shape="cylinder", size=(0.2, 0.5), position=(0, 0, 0.25)),
+        Part(shape="sphere", size=(0.1,)),
+    )
+    assert made(text, hasBack=(True,), height=(0.4,))[1] == Part(
+        shape="box", size=(0.03, 0.4, 0.4), position=(-0.19, 0, 0.4 + 0.2), turn=0.2
+    )
 
 
-@pytest.mark.parametrize("shape", ["flat", "drawn"])
-def test_a_road_and_a_picture_are_nothing_to_run_into(shape):
-    """They exist, and touch nothing."""
-    assert parts(f"[A]\n{shape} = true") == ()
+@pytest.mark.parametrize("height", [0.0, -1.0, math.inf, math.nan])
+def test_a_length_that_is_none_makes_no_part(height: float) -> None:
+    """Nothing can be run into, and no physics fails on it."""
+    assert made('[A]\nfields = "SFFloat height 1"\nbox = [1, 1, "height"]', height=(height,)) == ()
+
+
+def test_a_users_file_is_what_the_manual_shows() -> None:
+    """The example of the page is read as it stands there."""
+    text = PAGE.read_text().partition("```toml stand-ins\n")[2].partition("```")[0]
+
+    mine = load_stand_ins(text, "mine.toml")
+
+    assert {name: stand_in.kind for name, stand_in in mine.items()} == {
+        "RoadMarking": "flat",
+        "NightSky": "drawn",
+        "BlueSteel": "drawn",
+        "Crate": "solid",
+        "Stool": "solid",
+    }
+    assert expand(mine["Crate"], {}) == (Part(shape="box", size=(0.6, 0.4, 0.3), position=(0, 0, 0.15)),)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[A", "mine.toml: Expected ']'"),
-        ("A = 1", "mine.toml: A: is no table; write [A] and its lines below"),
-        ("[A]\nbox = [1, 2, 3]\nmass = 1", "mine.toml: A.mass: no such key; use arena, at, box"),
-        ("[A]", "mine.toml: A: has 0 shapes; write one of box, cylinder"),
-        ("[A]\nbox = [1, 1, 1]\nsphere = 1", "mine.toml: A: has 2 shapes"),
-        ("[A]\nbox = [1, 2]", "mine.toml: A.box: has 2 numbers; write 3, in meters"),
-        ('[A]\nbox = "size"', "mine.toml: A.box: 'size' is no sum of fields and numbers; add it to fields"),
-        ('[A]\nfields = { x = "y" }\nsphere = 1', "mine.toml: A.fields.x: 'y' is not a number"),
-        ('[A]\nsphere = 1\norigin = "top"', "mine.toml: A.origin: is 'top'; write center or floor"),
-        ("[A]\nsphere = 1\nat = [1, 2]", "mine.toml: A.at: has 2 numbers; write x, y, z in meters"),
-        ("[A]\nsphere = nan", "mine.toml: A.sphere: nan is not a number"),
-        ("[A]\nsphere = true", "mine.toml: A.sphere: True is not a number"),
+        ("[A", "mine.toml: this is no TOML: "),
+        ('flat = "A"', 'mine.toml: flat: this is no list of types; write ["Carpet"], before the first table'),
+        ("drawn = [1]", "mine.toml: drawn: this is no list of types"),
+        ('flat = ["A"]\n[A]\nbox = [1, 1, 1]', "mine.toml: A: it is also in a list; keep one of the two"),
+        ("A = 1", "mine.toml: A: this is no table; write [A] and its shape"),
+        (
+            "[A]",
+            "mine.toml: A: shape: it has 0 shapes; write one of box, cylinder, plane, ring, sphere, wall",
+        ),
+        ("[A]\nbox = [1, 1, 1]\nsphere = 1", "mine.toml: A: shape: it has 2 shapes; write one of"),
+        ("[A]\nsize = 1", "mine.toml: A: size: there is no such key; choose of at, box, cylinder, origin"),
+        (
+            "[A]\nbox = [1, 1]",
+            "mine.toml: A: box: it has no 3 lengths; write them in a list, or the name of a field",
+        ),
+        ("[A]\nplane = [1, 1, 1]", "mine.toml: A: plane: it has no 2 lengths"),
+        (
+            "[A]\nsphere = true",
+            "mine.toml: A: sphere: True is no length; write a number, the name of a field, or a",
+        ),
+        (
+            "[A]\ncylinder = 1",
+            "mine.toml: A: cylinder: it needs other keys; write { radius = 1, height = 1 }",
+        ),
+        (
+            "[A]\nring = { radius = 1, height = 1 }",
+            "mine.toml: A: ring: it needs other keys; write { radius = 1, th",
+        ),
+        (
+            '[A]\nbox = "size"',
+            "mine.toml: A: box: A has no field size; declare it in fields, or write a number",
+        ),
+        (
+            '[A]\nfields = "SFVec2f size 1 1"\nbox = "size"',
+            "mine.toml: A: box: size.z is no number of SFVec2f size; name one, such as size.x",
+        ),
+        (
+            '[A]\nfields = "SFVec3f size 1 1 1"\nsphere = "size"',
+            "mine.toml: A: sphere: size is no number of SFVec3f size; name one, such as size.x",
+        ),
+        ('[A]\nfields = "SFString s \'\'"\nsphere = "s"', "mine.toml: A: fields: in its line 1: "),
+        ('[A]\nfields = "MFFloat s []"\nsphere = "s"', "mine.toml: A: sphere: s is no number of MFFloat s"),
+        (
+            "[A]\nfields = 1\nsphere = 1",
+            "mine.toml: A: fields: this is no text; declare fields as SFVec3f size 1 1 1",
+        ),
+        (
+            "[A]\nfields = '''\nSFFloat a 1\nSFFloat b x\n'''\nsphere = 1",
+            'mine.toml: A: fields: in its line 3: the end of the file where the "{" of x should be',
+        ),
+        (
+            '[A]\nsphere = "1 +"',
+            "mine.toml: A: sphere: '1 +' is no formula; write numbers and fields with + - * / ( )",
+        ),
+        (
+            '[A]\nsphere = "1 % 2"',
+            "mine.toml: A: sphere: '% 2' in '1 % 2' is no part of a formula; write numbers",
+        ),
+        ('[A]\nsphere = 1\nat = "0"', "mine.toml: A: at: '0.x' is no formula"),
+        (
+            '[A]\nsphere = 1\norigin = "top"',
+            'mine.toml: A: origin: \'top\' is no origin; write "center", or "base"',
+        ),
+        ('[A]\nsphere = 1\nwhen = "on"', "mine.toml: A: when: A has no field on; declare it in fields"),
+        (
+            "[A]\nflat = false",
+            "mine.toml: A: flat: it has a shape too, or is not true; write flat = true alone",
+        ),
+        ("[A]\ndrawn = true\nsphere = 1", "mine.toml: A: drawn: it has a shape too, or is not true"),
+        ("[A]\nparts = 1", "mine.toml: A: parts: it is no list of tables, or not alone; write [ { box ="),
+        ("[A]\nparts = [ { } ]", "mine.toml: A: parts[0]: it has 0 shapes; write one of"),
+        (
+            '[A]\nparts = [ { sphere = 1 }, { sphere = "r" } ]',
+            "mine.toml: A: parts[1].sphere: A has no field r",
+        ),
+        (
+            '[A]\nwall = { path = "p", thickness = 1, height = 1 }',
+            "mine.toml: A: wall: its path is no field with a list of points; declare MFVec3f path [ … ]",
+        ),
     ],
 )
-def test_a_wrong_table_is_answered_with_entry_fact_and_remedy(text, message):
-    """Before a world is read."""
-    with pytest.raises(StandInError) as caught:
-        load(text, "mine.toml")
-
-    assert str(caught.value).startswith(message)
+def test_a_mistake_is_named_with_file_type_field_and_remedy(text: str, message: str) -> None:
+    """TOML gives no lines of keys, so the path of keys is the place."""
+    assert refusal(text).startswith(message)
 
 
-@given(st.text(max_size=60))
-def test_any_text_is_a_table_or_an_error(text):
-    """Never another exception."""
-    with contextlib.suppress(StandInError):
-        assert isinstance(load(text, "any.toml"), dict)
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        (2, 2),
+        ("1.5", 1.5),
+        ("a + 2 * b.y - 1", 1 + 2 * 20 - 1),
+        ("(a + 2) * -b.x / 4", -7.5),
+        ("sum(b) / 3", 20),
+        ("a - b.x - b.y", -29),
+        ("1 / (a - 1)", 0),
+    ],
+)
+def test_a_formula_is_arithmetic_over_fields(text: object, value: float) -> None:
+    """Products before sums, from the left; a division by zero is no failure of a simulator."""
+    numbers: Mapping[str, Sequence[float]] = {"a": (1.0,), "b": (10.0, 20.0, 30.0)}
+
+    assert parse_formula(text).value(numbers.__getitem__) == value
 
 
-def test_no_entry_that_ships_takes_the_place_of_a_type_of_webots():
-    """A Solid stays a Solid."""
-    assert not [name for name in shipped() if is_base_type(name)]
+@given(st.one_of(st.text(max_size=60), st.text("0.5abx+-*/() ", max_size=300), st.floats(), st.none()))
+def test_any_formula_is_read_or_refused(written: object) -> None:
+    """No other exception, whatever somebody writes."""
+    try:
+        formula = parse_formula(written)
+    except ValueError as error:
+        message = str(error)
+    else:
+        message = f"{formula.text}; read"
+    assert "; " in message
 
 
-def test_every_part_that_ships_has_a_size():
-    """A box of no height would be seen by no ray."""
-    for entry in shipped().values():
-        assert all(min(part.size) > 0.0 for part in entry.parts({}))
+@given(st.text("[]{}=\"'ab1 \n,.#", max_size=80))
+def test_any_file_is_read_or_refused(text: str) -> None:
+    """A file of a user has no other outcome."""
+    try:
+        found = load_stand_ins(text, "mine.toml")
+    except StandInError as error:
+        message = str(error)
+    else:
+        message = f"mine.toml: {len(found)} types"
+    assert message.startswith("mine.toml: ")
 
 
-def test_the_example_of_the_docs_is_a_table():
-    """As a reader copies it."""
-    page = (Path(__file__).parents[3] / "docs" / "simulators.md").read_text()
-    (example,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+def test_types_stand_once_in_the_file_that_ships() -> None:
+    """TOML refuses a second table; here a list could repeat a type."""
+    lists = tomllib.loads((Path(expand.__code__.co_filename).parent / "stand_ins.toml").read_text())
+    names = [*lists["flat"], *lists["drawn"]]
 
-    table = load(example, "docs")
-
-    assert table["Crate"].parts({})[0].at == (0.0, 0.0, 0.15)
-    assert table["Lamp"].parts({})[0].size == (0.15, 1.8)
-    assert table["Poster"].parts({}) == ()
+    assert len(names) == len(set(names))

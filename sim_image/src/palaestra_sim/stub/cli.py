@@ -21,7 +21,7 @@ from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.stub.scene.summary import summary
-from palaestra_sim.world.stand_ins import StandIn, load
+from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
 log = logging.getLogger(__name__)
 
@@ -220,7 +220,7 @@ def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
     """
     table: dict[str, StandIn] = {}
     for file in files:
-        table.update(load(file.read_text("utf-8"), str(file)))
+        table.update(load_stand_ins(file.read_text("utf-8"), str(file)))
     return table
 
 

@@ -13,27 +13,35 @@ Pure: bytes in, bytes out. No clock, no network, and no file except what ships a
     builtin_protos()                           descriptions of robots that ship
     parse_proto(data, "Stool.proto")           the declaration of a type of node
     local_protos(path, world)                  the PROTOs whose files lie beside a world
+    shipped_stand_ins()                        solids in the place of PROTOs whose files are not read
+    expand(stand_in, values)                   the boxes, cylinders, spheres and planes of one of them
 """
 
-from palaestra_sim.errors import UnknownWorldError, WorldError
+from palaestra_sim.errors import StandInError, UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path, builtin_protos
 from palaestra_sim.world.checks import check
 from palaestra_sim.world.externs import Protos, local_protos
 from palaestra_sim.world.generate import generate, rename
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
+from palaestra_sim.world.parts import Part
 from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
 from palaestra_sim.world.reader import parse
 from palaestra_sim.world.robots import WorldRobot, own_controllers, robots
+from palaestra_sim.world.stand_ins import StandIn, expand, load_stand_ins
+from palaestra_sim.world.stand_ins import shipped as shipped_stand_ins
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
 __all__ = [
     "Is",
     "Item",
     "Node",
+    "Part",
     "Proto",
     "ProtoField",
     "Protos",
     "RunIdentity",
+    "StandIn",
+    "StandInError",
     "UnknownWorldError",
     "Value",
     "World",
@@ -43,7 +51,9 @@ __all__ = [
     "builtin_path",
     "builtin_protos",
     "check",
+    "expand",
     "generate",
+    "load_stand_ins",
     "local_protos",
     "name_prefix",
     "own_controllers",
@@ -52,4 +62,5 @@ __all__ = [
     "rename",
     "robots",
     "ros_name",
+    "shipped_stand_ins",
 ]

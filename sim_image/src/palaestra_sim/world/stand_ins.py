@@ -1,216 +1,276 @@
-"""Stand-ins: simple solids in place of PROTOs that only Webots can run.
+"""Stand-ins: descriptions of PROTOs whose files are not read, by their fields and a few simple shapes.
 
-A table, `stand_ins.toml`, has one entry a PROTO; a user adds entries of the same form. A stand-in stands
-still, even where the PROTO would be pushed or driven. `docs/simulators.md` describes the form.
+A file of stand-ins is TOML, one table for each type:
 
-    [OilBarrel]
-    fields = { height = 0.88, radius = 0.305 }    # with their defaults
-    cylinder = ["radius", "height"]               # names of fields, or numbers; in meters
+    [WoodenBox]
+    fields = '''
+    SFVec3f size 0.6 0.6 0.6
+    SFFloat mass 0
+    '''
+    box = "size"
+
+`fields` declares the fields and their defaults as a PROTO does, and as Webots' manual prints them. Every
+object has `translation`, `rotation` and `name` too. The shape is `box`, `cylinder`, `sphere`, `plane`, `ring`
+or `wall`, or several of them in `parts`; lengths are numbers or formulas (`formulas.py`). The lists `flat`
+and `drawn` at the top of the file name types with nothing to run into: what lies on the ground, and what is
+only looked at.
 """
 
-from __future__ import annotations
-
-import math
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
-from importlib import resources
-from typing import Any, Final, Literal, TypeAlias
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, NoReturn, TypeAlias
 
-from palaestra_sim.errors import StandInError
+from palaestra_sim.errors import StandInError, WorldError
+from palaestra_sim.world.formulas import Formula, parse_formula
+from palaestra_sim.world.parts import LENGTHS, Form, FormKind, Part
+from palaestra_sim.world.proto import ProtoField, parse_fields
+from palaestra_sim.world.tree import Item
 
-ShapeKind = Literal["Box", "Cylinder", "Sphere"]
-Size: TypeAlias = "str | float | Sequence[str | float]"
-Values = Mapping[str, Sequence[float]]
+_SHIPPED = Path(__file__).parent / "stand_ins.toml"
+_LISTS: tuple[Literal["flat", "drawn"], ...] = ("flat", "drawn")
+_OPTIONS = frozenset(("at", "origin", "turn", "when", "unless"))
+_AXES = {"Float": 0, "Int32": 0, "Bool": 0, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 3}
+_FIELDS_OF_FORM: dict[FormKind, tuple[str, ...]] = {
+    "cylinder": ("radius", "height"),
+    "ring": ("radius", "thickness", "height"),
+    "wall": ("thickness", "height"),
+}
 
-_SHAPES: Final = {"box": 3, "cylinder": 2, "sphere": 1, "arena": 4, "ring": 3}
-_EMPTY: Final = ("flat", "drawn")
-_KEYS: Final = frozenset((*_SHAPES, *_EMPTY, "fields", "at", "origin", "translation"))
-_RING_SIDES: Final = 32
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
-    """One solid of a stand-in, in its frame: a box of x, y, z; or radius and height; or a radius. Meters."""
-
-    kind: ShapeKind
-    size: tuple[float, ...]
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    heading_rad: float = 0.0
+Values: TypeAlias = Mapping[str, Sequence[Item]]
+"""The items of an object's fields; a field that is missing, or has no fitting items, has its default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StandIn:
-    """One entry of the table.
+    """The description of a type: its fields, and what stands for it.
 
-    Attributes:
-        name: of the PROTO.
-        fields: its fields that matter, with their defaults.
-        shape: "box", "cylinder", "sphere", "arena", "ring"; "" if there is nothing to run into.
-        size: of the shape: names of fields or numbers.
-        at: the place of its middle in the frame of the PROTO.
-        on_floor: whether the frame is at its lower end; otherwise it is in the middle.
-        translation: the default of the PROTO's field.
+    `kind` is "solid"; or "flat" for what lies on the ground, or "drawn" for what is only looked at, which
+    both have no forms.
     """
 
     name: str
-    fields: Values = field(default_factory=dict)
-    shape: str = ""
-    size: tuple[str | float, ...] = ()
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    on_floor: bool = False
-    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def parts(self, given: Values) -> tuple[Part, ...]:
-        """Return the solids of an instance that has these values."""
-        numbers = self._numbers({**self.fields, **given})
-        match self.shape:
-            case "box":
-                parts = [Part(kind="Box", size=numbers)]
-            case "cylinder":
-                parts = [Part(kind="Cylinder", size=numbers)]
-            case "sphere":
-                parts = [Part(kind="Sphere", size=numbers)]
-            case "arena":
-                parts = list(_walls(*numbers))
-            case "ring":
-                parts = list(_ring(*numbers))
-            case _:
-                parts = []
-        return tuple(self._placed(part) for part in parts)
-
-    def _numbers(self, values: Values) -> tuple[float, ...]:
-        return tuple(number for item in self.size for number in _evaluated(item, values))
-
-    def _placed(self, part: Part) -> Part:
-        lift = _height(part) / 2.0 if self.on_floor else 0.0
-        x, y, z = (sum(pair) for pair in zip(part.at, self.at, strict=True))
-        return Part(kind=part.kind, size=part.size, at=(x, y, z + lift), heading_rad=part.heading_rad)
+    fields: Mapping[str, ProtoField]
+    kind: Literal["solid", "flat", "drawn"] = "solid"
+    forms: tuple[Form, ...] = ()
 
 
-def _evaluated(item: str | float, values: Values) -> Sequence[float]:
-    """Return the numbers of a field, or of a sum such as `sum widths + 0.06`."""
-    if not isinstance(item, str):
-        return (item,)
-    if item in values:
-        return values[item]
-    return (sum(sum(_term(term, values)) for term in item.split(" + ")),)
+def expand(stand_in: StandIn, values: Values) -> tuple[Part, ...]:
+    """Return the parts of an object of the type with these values of its fields."""
 
+    def items(name: str) -> Sequence[float]:
+        declared = stand_in.fields[name]
+        default = _numbers(declared.default.items)
+        given = _numbers(values.get(name, ()))
+        several = declared.type.startswith("M")
+        return given if given and (several or len(given) == len(default)) else default
 
-def _term(term: str, values: Values) -> Sequence[float]:
-    name = term.removeprefix("sum ")
-    return values[name] if name in values else (float(name),)
+    def points(name: str) -> list[Sequence[float]]:
+        numbers = items(name)
+        size = _AXES[stand_in.fields[name].type[2:]]
+        return [numbers[at : at + size] for at in range(0, len(numbers) - size + 1, size)]
 
-
-def _height(part: Part) -> float:
-    return 2.0 * part.size[0] if part.kind == "Sphere" else part.size[-1]
-
-
-def _walls(length: float, width: float, thickness: float, height: float) -> Iterator[Part]:
-    """Yield the four walls around a floor."""
-    for x, y, size in (
-        ((length + thickness) / 2.0, 0.0, (thickness, width, height)),
-        (-(length + thickness) / 2.0, 0.0, (thickness, width, height)),
-        (0.0, (width + thickness) / 2.0, (length + 2.0 * thickness, thickness, height)),
-        (0.0, -(width + thickness) / 2.0, (length + 2.0 * thickness, thickness, height)),
-    ):
-        yield Part(kind="Box", size=size, at=(x, y, 0.0))
-
-
-def _ring(radius: float, thickness: float, height: float) -> Iterator[Part]:
-    """Yield the pieces of a round wall, whose inner faces touch the circle."""
-    side = 2.0 * (radius + thickness) * math.tan(math.pi / _RING_SIDES)
-    middle = radius + thickness / 2.0
-    for index in range(_RING_SIDES):
-        angle = 2.0 * math.pi * index / _RING_SIDES
-        at = (middle * math.cos(angle), middle * math.sin(angle), 0.0)
-        yield Part(kind="Box", size=(thickness, side, height), at=at, heading_rad=angle)
+    return tuple(part for form in stand_in.forms for part in form.parts(items, points))
 
 
 @cache
 def shipped() -> Mapping[str, StandIn]:
-    """Return the table that ships."""
-    table = resources.files("palaestra_sim.world").joinpath("stand_ins.toml")
-    return load(table.read_text("utf-8"), table.name)
+    """Return the stand-ins that ship, by type."""
+    return load_stand_ins(_SHIPPED.read_text(encoding="utf-8"), _SHIPPED.name)
 
 
-def load(text: str, name: str) -> Mapping[str, StandIn]:
-    """Return the entries of a table; `name` is its name in errors.
+def load_stand_ins(text: str, name: str) -> Mapping[str, StandIn]:
+    """Return the stand-ins of the file with the content `text`, by type; `name` is its name in errors.
 
     Raises:
-        StandInError: the text is no such table; the message has entry, fact and remedy.
+        StandInError: the file is not TOML, or an entry is wrong; the message has file, type, field, fact and
+            remedy.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise StandInError(f"{name}: {error}; see docs/simulators.md") from error
-    return {proto: _entry(f"{name}: {proto}", proto, entry) for proto, entry in table.items()}
+        tables = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise StandInError(f"{name}: this is no TOML: {error}; correct it there") from None
+    found: dict[str, StandIn] = {}
+    for kind in _LISTS:
+        for type_name in _listed(tables.pop(kind, []), f"{name}: {kind}"):
+            found[type_name] = StandIn(name=type_name, fields=_standard(type_name), kind=kind)
+    for type_name, table in tables.items():
+        if type_name in found:
+            raise StandInError(f"{name}: {type_name}: it is also in a list; keep one of the two")
+        if not isinstance(table, dict):
+            raise StandInError(f"{name}: {type_name}: this is no table; write [{type_name}] and its shape")
+        found[type_name] = _Entry(f"{name}: {type_name}", type_name, table).stand_in()
+    return MappingProxyType(found)
 
 
-def _entry(where: str, proto: str, entry: Any) -> StandIn:
-    if not isinstance(entry, dict):
-        raise StandInError(f"{where}: is no table; write [{proto}] and its lines below")
-    if unknown := sorted(set(entry) - _KEYS):
-        raise StandInError(f"{where}.{unknown[0]}: no such key; use {', '.join(sorted(_KEYS))}")
-    shapes = [key for key in (*_SHAPES, *_EMPTY) if key in entry]
-    if len(shapes) != 1:
-        raise StandInError(
-            f"{where}: has {len(shapes)} shapes; write one of {', '.join((*_SHAPES, *_EMPTY))}"
+def _listed(names: object, place: str) -> Iterator[str]:
+    """Yield the types of one of the lists."""
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise StandInError(f'{place}: this is no list of types; write ["Carpet"], before the first table')
+    yield from names
+
+
+class _Entry:
+    """One table of a file of stand-ins; `place` is where it is, for errors."""
+
+    def __init__(self, place: str, type_name: str, table: dict[str, Any]) -> None:
+        self._place = place
+        self._type = type_name
+        self._table = table
+        self._fields: dict[str, ProtoField] = {}
+
+    def stand_in(self) -> StandIn:
+        """Return the stand-in of this table."""
+        rest = dict(self._table)
+        self._fields = self._declared(rest.pop("fields", ""))
+        kinds: list[Literal["flat", "drawn"]] = [kind for kind in _LISTS if rest.get(kind) is not None]
+        if kinds:
+            if rest != {kinds[0]: True}:
+                self._refuse(kinds[0], "it has a shape too, or is not true", f"write {kinds[0]} = true alone")
+            return StandIn(name=self._type, fields=self._fields, kind=kinds[0])
+        forms = self._parts(rest) if "parts" in rest else (self._form(rest, ""),)
+        return StandIn(name=self._type, fields=self._fields, forms=forms)
+
+    def _declared(self, text: object) -> dict[str, ProtoField]:
+        """Return the declared fields, after those that every object has."""
+        if not isinstance(text, str):
+            self._refuse("fields", "this is no text", "declare fields as SFVec3f size 1 1 1, one a line")
+        try:
+            declared = parse_fields(text, self._type)
+        except WorldError as error:
+            self._refuse("fields", f"in its line {error.line}: {error.fact}", error.remedy)
+        return {**_standard(self._type), **declared}
+
+    def _parts(self, rest: dict[str, Any]) -> tuple[Form, ...]:
+        parts = rest.pop("parts")
+        if rest or not isinstance(parts, list) or not all(isinstance(part, dict) for part in parts):
+            self._refuse("parts", "it is no list of tables, or not alone", 'write [ { box = "size" } ]')
+        return tuple(self._form(part, f"parts[{number}].") for number, part in enumerate(parts))
+
+    def _form(self, table: dict[str, Any], prefix: str) -> Form:
+        """Return the form of a table with one shape; `prefix` is where it is in the entry."""
+        shapes: list[FormKind] = [kind for kind in LENGTHS if table.get(kind) is not None]
+        unknown = sorted(table.keys() - LENGTHS.keys() - _OPTIONS)
+        if unknown:
+            self._refuse(
+                prefix + unknown[0], "there is no such key", f"choose of {_words({*LENGTHS, *_OPTIONS})}"
+            )
+        if len(shapes) != 1:
+            fact = f"it has {len(shapes)} shapes"
+            self._refuse(
+                prefix.rstrip(".") or "shape", fact, f"write one of {_words(LENGTHS)}, flat, drawn or parts"
+            )
+        kind = shapes[0]
+        path, closed = self._path(table[kind], prefix + kind) if kind == "wall" else ("", False)
+        return Form(
+            kind=kind,
+            lengths=self._lengths(kind, table[kind], prefix + kind),
+            at=self._three(table["at"], prefix + "at") if "at" in table else (),
+            on_base=self._on_base(table.get("origin", "center"), prefix + "origin"),
+            turn=self._optional(table, "turn", prefix),
+            when=self._optional(table, "when", prefix),
+            unless=self._optional(table, "unless", prefix),
+            path=path,
+            closed=closed,
         )
-    (shape,) = shapes
-    fields = {
-        name: _vector(f"{where}.fields.{name}", value) for name, value in entry.get("fields", {}).items()
-    }
-    size = () if shape in _EMPTY else _size(f"{where}.{shape}", entry[shape], fields, _SHAPES[shape])
-    origin = entry.get("origin", "center")
-    if origin not in {"center", "floor"}:
-        raise StandInError(f"{where}.origin: is {origin!r}; write center or floor")
-    return StandIn(
-        name=proto,
-        fields=fields,
-        shape="" if shape in _EMPTY else shape,
-        size=size,
-        at=_triple(f"{where}.at", entry.get("at", (0.0, 0.0, 0.0))),
-        on_floor=origin == "floor",
-        translation=_triple(f"{where}.translation", entry.get("translation", (0.0, 0.0, 0.0))),
-    )
+
+    def _lengths(self, kind: FormKind, written: object, place: str) -> tuple[Formula, ...]:
+        """Return the lengths of a shape."""
+        if kind in _FIELDS_OF_FORM:
+            keys = _FIELDS_OF_FORM[kind]
+            if not isinstance(written, dict) or not {*keys} <= written.keys() <= {*keys, "path", "closed"}:
+                self._refuse(
+                    place, "it needs other keys", f"write {{ {', '.join(f'{key} = 1' for key in keys)} }}"
+                )
+            return tuple(self._formula(written[key], f"{place}.{key}") for key in keys)
+        if kind == "sphere":
+            return (self._formula(written, place),)
+        if kind == "box":
+            return self._three(written, place)
+        return self._vector(written, place, "xy")
+
+    def _three(self, written: object, place: str) -> tuple[Formula, ...]:
+        return self._vector(written, place, "xyz")
+
+    def _vector(self, written: object, place: str, axes: str) -> tuple[Formula, ...]:
+        """Return the formulas of a list of lengths, or of the name of a field with as many."""
+        if isinstance(written, str):
+            written = [f"{written}.{axis}" for axis in axes]
+        if not isinstance(written, list) or len(written) != len(axes):
+            self._refuse(
+                place, f"it has no {len(axes)} lengths", "write them in a list, or the name of a field"
+            )
+        return tuple(self._formula(length, place) for length in written)
+
+    def _path(self, written: object, place: str) -> tuple[str, bool]:
+        """Return the field with the points of a wall, and whether it is closed."""
+        path = str(written.get("path", "")) if isinstance(written, dict) else ""
+        closed = written.get("closed", False) if isinstance(written, dict) else None
+        declared = self._fields.get(path)
+        if declared is None or declared.type not in ("MFVec2f", "MFVec3f") or not isinstance(closed, bool):
+            fact = "its path is no field with a list of points"
+            self._refuse(place, fact, 'declare MFVec3f path [ … ], and write path = "path"')
+        return path, closed
+
+    def _on_base(self, origin: object, place: str) -> bool:
+        if origin not in ("center", "base"):
+            self._refuse(place, f"{origin!r} is no origin", 'write "center", or "base" for the lower side')
+        return origin == "base"
+
+    def _optional(self, table: dict[str, Any], key: str, prefix: str) -> Formula | None:
+        return self._formula(table[key], prefix + key) if key in table else None
+
+    def _formula(self, written: object, place: str) -> Formula:
+        """Return a formula whose fields are declared, and have such numbers."""
+        try:
+            formula = parse_formula(written)
+        except ValueError as error:
+            fact, _, remedy = str(error).rpartition("; ")
+            self._refuse(place, fact, remedy)
+        for used in formula.names:
+            self._check(used, place)
+        return formula
+
+    def _check(self, used: str, place: str) -> None:
+        """Refuse a field that is not declared, or has no such numbers."""
+        summed = used.startswith("sum(")
+        name, _, axis = used.removeprefix("sum(").removesuffix(")").partition(".")
+        declared = self._fields.get(name)
+        if declared is None:
+            self._refuse(
+                place, f"{self._type} has no field {name}", "declare it in fields, or write a number"
+            )
+        size = _AXES.get(declared.type[2:])
+        fits = size is not None and (summed or (declared.type.startswith("S") and _has_axis(size, axis)))
+        if not fits:
+            self._refuse(place, f"{used} is no number of {declared.type} {name}", "name one, such as size.x")
+
+    def _refuse(self, field: str, fact: str, remedy: str) -> NoReturn:
+        raise StandInError(f"{self._place}: {field}: {fact}; {remedy}")
 
 
-def _size(where: str, given: Any, fields: Values, count: int) -> tuple[str | float, ...]:
-    items = given if isinstance(given, list) else [given]
-    found = 0
-    size: list[str | float] = []
-    for item in items:
-        if isinstance(item, str):
-            try:
-                found += len(_evaluated(item, fields))
-            except ValueError:
-                raise StandInError(
-                    f"{where}: {item!r} is no sum of fields and numbers; add it to fields"
-                ) from None
-            size.append(item)
-        else:
-            (number,) = _vector(where, item)
-            found += 1
-            size.append(number)
-    if found != count:
-        raise StandInError(f"{where}: has {found} numbers; write {count}, in meters")
-    return tuple(size)
+def _has_axis(size: int, axis: str) -> bool:
+    return "xyz".find(axis) < size if axis else size == 0
 
 
-def _vector(where: str, given: Any) -> tuple[float, ...]:
-    items = given if isinstance(given, list | tuple) else [given]
-    numbers = tuple(
-        float(item) for item in items if isinstance(item, int | float) and not isinstance(item, bool)
-    )
-    if len(numbers) != len(items) or not all(map(math.isfinite, numbers)):
-        raise StandInError(f"{where}: {given!r} is not a number or a list of numbers")
-    return numbers
+def _words(names: Any) -> str:
+    return ", ".join(sorted(names))
 
 
-def _triple(where: str, given: Any) -> tuple[float, float, float]:
-    numbers = _vector(where, given)
-    if len(numbers) != 3:  # noqa: PLR2004 - x, y, z
-        raise StandInError(f"{where}: has {len(numbers)} numbers; write x, y, z in meters")
-    return numbers[0], numbers[1], numbers[2]
+def _numbers(items: Sequence[Item]) -> Sequence[float]:
+    """Return the items as numbers, TRUE as 1; () if one is none."""
+    if not all(isinstance(item, int | float) for item in items):
+        return ()
+    return tuple(float(item) for item in items if isinstance(item, int | float))
+
+
+@cache
+def _standard(type_name: str) -> Mapping[str, ProtoField]:
+    """Return the fields that every object has; its name is the type in small words, as in Webots."""
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", type_name).lower()
+    text = f'SFVec3f translation 0 0 0 SFRotation rotation 0 0 1 0 SFString name "{words}"'
+    return MappingProxyType(parse_fields(text, type_name))

@@ -15,9 +15,16 @@ from palaestra_sim.stub.scene.nodes.scene_node import Content, FieldContent, Ori
 from palaestra_sim.stub.scene.nodes.scope import Scope, definitions
 from palaestra_sim.stub.scene.nodes.types import is_base_type
 from palaestra_sim.world import Is, Item, Node, Proto, Value, World
+from palaestra_sim.world.parts import Part
 from palaestra_sim.world.source import Source
-from palaestra_sim.world.stand_ins import Part, StandIn
+from palaestra_sim.world.stand_ins import StandIn, expand
 
+_SHAPES: Final = {
+    "box": ("Box", ("size",)),
+    "cylinder": ("Cylinder", ("radius", "height")),
+    "sphere": ("Sphere", ("radius",)),
+    "plane": ("Plane", ("size",)),
+}
 MAX_DEPTH: Final = 20  # of PROTOs inside PROTOs; Webots' own robots have three
 
 
@@ -124,19 +131,23 @@ class Grower:
         return node
 
     def _solid(self, stand_in: StandIn, source: Node, scope: Scope, parent: SceneNode) -> SceneNode:
-        """Return a Solid of the size of an instance; it keeps the fields that the instance gives."""
+        """Return a Solid of the size of an instance, with the fields of its PROTO."""
         origin = Origin(source, scope.source)
         node = self._new("Solid", origin, parent)
         node.proto_name = stand_in.name
         node.stand_in = True
         node.def_name = source.def_name or ""
-        node.fields["translation"] = FieldContent(list(stand_in.translation))
+        for name, declared in stand_in.fields.items():
+            plain = [item for item in declared.default.items if not isinstance(item, Node | Is)]
+            node.fields[name] = FieldContent(list(plain), bracketed=declared.default.bracketed)
         self._fill(node, source, scope)
-        given = {name: numbers for name in stand_in.fields if (numbers := node.numbers(name))}
+        values = {
+            name: [item for item in node.fields[name].items if not isinstance(item, SceneNode)]
+            for name in stand_in.fields
+        }
         outline = self._new("Group", origin, node)
-        outline.fields["children"] = FieldContent([], bracketed=True)
-        for part in stand_in.parts(given):
-            outline.fields["children"].items.append(self._part(part, origin, outline))
+        parts = [self._part(part, origin, outline) for part in expand(stand_in, values)]
+        outline.fields["children"] = FieldContent(list(parts), bracketed=True)
         node.fields["boundingObject"] = FieldContent([outline])
         for name in ("physics", "children"):
             node.fields.pop(name, None)
@@ -144,14 +155,14 @@ class Grower:
 
     def _part(self, part: Part, origin: Origin, parent: SceneNode) -> SceneNode:
         pose = self._new("Pose", origin, parent)
-        pose.fields["translation"] = FieldContent(list(part.at))
-        pose.fields["rotation"] = FieldContent([0.0, 0.0, 1.0, part.heading_rad])
-        shape = self._new(part.kind, origin, pose)
-        if part.kind == "Box":
-            shape.fields["size"] = FieldContent(list(part.size))
+        pose.fields["translation"] = FieldContent(list(part.position))
+        pose.fields["rotation"] = FieldContent([0.0, 0.0, 1.0, part.turn])
+        type_name, names = _SHAPES[part.shape]
+        shape = self._new(type_name, origin, pose)
+        if len(names) == 1:
+            shape.fields[names[0]] = FieldContent(list(part.size))
         else:
-            names = ("radius", "height") if part.kind == "Cylinder" else ("radius",)
-            shape.fields.update(zip(names, (FieldContent([it]) for it in part.size), strict=True))
+            shape.fields.update(zip(names, (FieldContent([number]) for number in part.size), strict=True))
         pose.fields["children"] = FieldContent([shape], bracketed=True)
         return pose
 

@@ -1,0 +1,111 @@
+"""The simple shapes that stand for an object: boxes, cylinders, spheres and planes in the object's frame.
+
+A Form describes one shape by formulas, as a file of stand-ins writes it. With the fields of an object it
+becomes Parts, which have numbers. A wall along a path, or in a ring, becomes a box for each straight piece.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, TypeAlias
+
+from palaestra_sim.world.formulas import Formula, Numbers
+
+Shape: TypeAlias = Literal["box", "cylinder", "sphere", "plane"]
+FormKind: TypeAlias = Literal["box", "cylinder", "sphere", "plane", "ring", "wall"]
+
+LENGTHS: dict[FormKind, int] = {"box": 3, "cylinder": 2, "sphere": 1, "plane": 2, "ring": 3, "wall": 2}
+"""How many lengths a form has; see `Form`."""
+
+_PIECES_OF_RING = 24
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """One shape, in the frame of its object; lengths in meters, the turn about z in radians.
+
+    The size of a box is (x, y, z), of an upright cylinder (radius, height), of a sphere (radius,), of a plane
+    (x, y). `position` is the center.
+    """
+
+    shape: Shape
+    size: tuple[float, ...]
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Form:
+    """A shape by formulas.
+
+    The lengths of box, cylinder, sphere and plane are those of a Part. A ring has (inner radius, thickness,
+    height), a wall (thickness, height); a wall stands along the points of the field `path`, and goes back to
+    the first one if `closed`. `at` is the center. It is the center of the lower side with `on_base`, and for
+    ring and wall always. The object has the form only if `when` isn't 0, and `unless` is 0.
+    """
+
+    kind: FormKind
+    lengths: tuple[Formula, ...]
+    at: tuple[Formula, ...] = ()
+    on_base: bool = False
+    turn: Formula | None = None
+    when: Formula | None = None
+    unless: Formula | None = None
+    path: str = ""
+    closed: bool = False
+
+    def parts(self, numbers: Numbers, points: Callable[[str], Sequence[Sequence[float]]]) -> Iterator[Part]:
+        """Yield the parts of an object; a length that isn't positive makes none.
+
+        `numbers` returns the numbers of a field, `points` the vectors of one that is a list.
+        """
+        if self.when is not None and not self.when.value(numbers):
+            return
+        if self.unless is not None and self.unless.value(numbers):
+            return
+        lengths = tuple(length.value(numbers) for length in self.lengths)
+        if not all(length > 0 and math.isfinite(length) for length in lengths):
+            return
+        x, y, z = (formula.value(numbers) for formula in self.at) if self.at else (0.0, 0.0, 0.0)
+        turn = self.turn.value(numbers) if self.turn is not None else 0.0
+        if self.kind == "ring":
+            yield from _along(_circle(lengths[0] + lengths[1] / 2), lengths[1:], (x, y, z))
+        elif self.kind == "wall":
+            path = [(*point[:2], *(point[2:] or (0.0,))) for point in points(self.path)]
+            yield from _along([*path, *path[: int(self.closed)]], lengths, (x, y, z))
+        else:
+            raised = z + _height(self.kind, lengths) / 2 if self.on_base else z
+            yield Part(shape=self.kind, size=lengths, position=(x, y, raised), turn=turn)
+
+
+def _along(
+    path: Sequence[Sequence[float]], lengths: Sequence[float], at: tuple[float, float, float]
+) -> Iterator[Part]:
+    """Yield a box for each piece of a path on the ground; `lengths` are thickness and height."""
+    thickness, height = lengths
+    for start, end in pairwise(path):
+        dx, dy = end[0] - start[0], end[1] - start[1]
+        middle = [(a + b) / 2 + offset for a, b, offset in zip(start, end, at, strict=True)]
+        yield Part(
+            shape="box",
+            size=(math.hypot(dx, dy) + thickness, thickness, height),
+            position=(middle[0], middle[1], middle[2] + height / 2),
+            turn=math.atan2(dy, dx),
+        )
+
+
+def _circle(radius: float) -> list[tuple[float, float, float]]:
+    """Return the corners of a closed ring."""
+    angles = [2 * math.pi * piece / _PIECES_OF_RING for piece in range(_PIECES_OF_RING + 1)]
+    return [(radius * math.cos(angle), radius * math.sin(angle), 0.0) for angle in angles]
+
+
+def _height(shape: Shape, lengths: Sequence[float]) -> float:
+    match shape:
+        case "sphere":
+            return 2 * lengths[0]
+        case "plane":
+            return 0.0
+        case _:
+            return lengths[-1]
