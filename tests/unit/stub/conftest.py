@@ -75,8 +75,9 @@ class FakeNode:
         assert path not in self.services, f"{path} served twice"
         self.services[path] = (service_type(type_name), handler)
 
-    def advertise(self, path, type_name, *, latched=False, template=None):
+    def advertise(self, path, type_name, *, latched=False, template=None, reading=""):
         """Return a publisher that keeps what it sends."""
+        del reading
         topic = self._ros.topic(path if path.startswith("/") else f"/{self.name}/{path}")
         publisher = FakePublisher(topic, type_name, dict(template or {}), latched)
         topic.publishers.append(publisher)

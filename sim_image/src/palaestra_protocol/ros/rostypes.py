@@ -10,7 +10,15 @@ from palaestra_protocol.ros import definitions, digests
 from palaestra_protocol.ros.codec import Codec, codec_of
 from palaestra_protocol.ros.fixed import TIMES, has_fixed_size, record
 
-__all__ = ["Codec", "MessageType", "ServiceType", "last_field", "message_type", "service_type"]
+__all__ = [
+    "Codec",
+    "MessageType",
+    "ServiceType",
+    "last_field",
+    "message_type",
+    "reading_field",
+    "service_type",
+]
 
 
 class MessageType(NamedTuple):
@@ -72,3 +80,33 @@ def last_field(name: str) -> struct.Struct | None:
     if last.array or last.type in TIMES or not has_fixed_size(last, definitions.message):
         return None
     return struct.Struct(f"<{record(message, [last], definitions.message).codes}")
+
+
+@cache
+def reading_field(name: str, field: str) -> tuple[struct.Struct, int] | None:
+    """Return the layout of a field of the message type `package/Name`, and how many bytes follow it.
+
+    It is None if the field is no number nor a message of numbers, or if a field behind it may have any size.
+
+    Args:
+        name: of the message type.
+        field: its name; "" is the last field.
+
+    Raises:
+        KeyError: `definitions.txt` has no such message, or it has no such field.
+    """
+    if not field:
+        last = last_field(name)
+        return None if last is None else (last, 0)
+    message = definitions.message(name)
+    names = [it.name for it in message.fields]
+    if field not in names:
+        raise KeyError(f"{name}.{field}")
+    found, *behind = message.fields[names.index(field) :]
+    if found.array or found.type in TIMES:
+        return None
+    if not all(has_fixed_size(it, definitions.message) for it in (found, *behind)):
+        return None
+    codes = record(message, [found], definitions.message).codes
+    after = record(message, behind, definitions.message).codes
+    return struct.Struct(f"<{codes}"), struct.calcsize(f"<{after}")

@@ -70,8 +70,9 @@ class Node(Protocol):
         *,
         latched: bool = False,
         template: Fields | None = None,
+        reading: str = "",
     ) -> Publisher:
-        """Return a publisher of a topic, relative or with a leading slash."""
+        """Return a publisher of a topic, relative or with a leading slash; `reading` has the value."""
         ...
 
     def withdraw(self, publisher: Any) -> None:

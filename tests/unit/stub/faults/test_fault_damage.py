@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from palaestra_protocol.ros.rostypes import message_type, service_type
+from palaestra_protocol.ros.rostypes import message_type, reading_field, service_type
 from palaestra_protocol.ros.tcpros import LENGTH, FrameReader, frame
 from palaestra_sim.stub.faults.damage import damaged_answer, damaged_message
 from palaestra_sim.stub.faults.language import parse
@@ -45,6 +45,37 @@ def test_all_numbers_of_a_reading_become_nan():
     read = message_type("geometry_msgs/PointStamped").codec.decode(wrong)
 
     assert all(map(math.isnan, (read.point.x, read.point.y, read.point.z)))
+
+
+def test_a_reading_in_the_middle_of_a_message_becomes_nan_alone():
+    """A gyro and an accelerometer send the same type; -1 in a covariance says what has no reading."""
+    fields = {
+        "angular_velocity": {"x": 1.0, "y": 2.0, "z": 3.0},
+        "orientation_covariance": [-1.0, *[0.0] * 8],
+    }
+    sound = message("sensor_msgs/Imu", header={"frame_id": "robotino/gyro"}, **fields)
+
+    wrong = payload(damaged_message("sensor_msgs/Imu", sound, WRONG_VALUE, "angular_velocity"))
+    read = message_type("sensor_msgs/Imu").codec.decode(wrong)
+
+    assert all(map(math.isnan, read.angular_velocity))
+    assert read.orientation_covariance[0] == -1.0
+    assert (*read.linear_acceleration, *read.linear_acceleration_covariance) == (0.0,) * 12
+
+
+@pytest.mark.parametrize(
+    ("type_name", "field"),
+    [("sensor_msgs/Image", "height"), ("sensor_msgs/Image", "data"), ("std_msgs/Header", "stamp")],
+)
+def test_a_field_without_a_fixed_place_or_without_numbers_has_no_reading(type_name, field):
+    """The bytes of another field would be overwritten."""
+    assert reading_field(type_name, field) is None
+
+
+def test_a_reading_that_the_message_does_not_have_is_an_error():
+    """A row of the table of devices that is wrong fails its tests, not a client."""
+    with pytest.raises(KeyError, match=r"sensor_msgs/Range\.distance"):
+        reading_field("sensor_msgs/Range", "distance")
 
 
 def test_a_message_too_short_for_a_reading_stays_short():

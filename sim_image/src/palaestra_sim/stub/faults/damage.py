@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from palaestra_protocol.ros.rostypes import Codec, last_field
+from palaestra_protocol.ros.rostypes import Codec, reading_field
 from palaestra_protocol.ros.tcpros import LENGTH, frame
 from palaestra_sim.stub.faults.course import Damage
 from palaestra_sim.stub.faults.kinds import WrongValue
@@ -18,24 +18,26 @@ from palaestra_sim.stub.faults.kinds import WrongValue
 _FRACTIONS = frozenset("fd")  # the codes of `struct`
 
 
-def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage]) -> bytes:
-    """Return a framed message of a topic with all `damages`."""
+def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], field: str = "") -> bytes:
+    """Return a framed message of a topic with all `damages`; `field` has the reading, "" is the last one."""
     payload = data[LENGTH.size :]
-    reading = last_field(type_name) if type_name else None
+    reading = reading_field(type_name, field) if type_name else None
     for damage in damages:
         if not isinstance(damage, WrongValue):
             payload = payload[: len(payload) // 2]
-        elif reading is not None and len(payload) >= reading.size:
-            payload = _with_reading(payload, reading, damage.value)
+        elif reading is not None and len(payload) >= reading[0].size + reading[1]:
+            payload = _with_reading(payload, *reading, damage.value)
     return frame(payload)
 
 
-def _with_reading(payload: bytes, reading: struct.Struct, value: float) -> bytes:
-    """Return a message with `value` in place of each number with a fraction in its last field."""
-    before, numbers = payload[: -reading.size], reading.unpack(payload[-reading.size :])
+def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: float) -> bytes:
+    """Return a message with `value` in place of each number with a fraction in its reading."""
+    end = len(payload) - behind
+    start = end - reading.size
     codes = reading.format.lstrip("<")
-    wrong = (value if code in _FRACTIONS else it for code, it in zip(codes, numbers, strict=True))
-    return before + reading.pack(*wrong)
+    numbers = zip(codes, reading.unpack(payload[start:end]), strict=True)
+    wrong = (value if code in _FRACTIONS else it for code, it in numbers)
+    return payload[:start] + reading.pack(*wrong) + payload[end:]
 
 
 def damaged_answer(response: Codec, data: bytes, damages: Sequence[Damage]) -> bytes:

@@ -133,10 +133,16 @@ class _Listener:
         self.services[path] = handler
 
     def advertise(
-        self, path: str, type_name: str, *, latched: bool = False, template: Fields | None = None
+        self,
+        path: str,
+        type_name: str,
+        *,
+        latched: bool = False,
+        template: Fields | None = None,
+        reading: str = "",
     ) -> _Silent:
         """Record a topic."""
-        del type_name, latched, template
+        del type_name, latched, template, reading
         self.topics.add(path)
         return _Silent()
 

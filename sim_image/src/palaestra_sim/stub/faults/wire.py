@@ -17,6 +17,7 @@ from palaestra_sim.stub.faults.kinds import STEP_PATH
 from palaestra_sim.stub.ros.links import Connection, Endpoint
 from palaestra_sim.stub.ros.loop import Loop
 from palaestra_sim.stub.ros.node import RosNode, ServiceEnd
+from palaestra_sim.stub.ros.topics import Topic
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,11 +99,8 @@ class FaultyNode(RosNode):
         if "service" in header:
             return self._greet_faulty_client(link, header)
         name = header.get("topic", "")
-        topic = self._topics.get(name)
-        type_name = "" if topic is None else topic.type.name
-        return super()._greet(
-            _Messages(self, link, self._failing.course, self._path(name), type_name), header
-        )
+        messages = _Messages(self, link, self._failing.course, self._path(name), self._topics.get(name))
+        return super()._greet(messages, header)
 
     def _greet_faulty_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         name = header["service"]
@@ -168,12 +166,14 @@ class _Messages:
         link: the link itself.
     """
 
-    def __init__(self, node: FaultyNode, link: Connection, course: Course, path: str, type_name: str) -> None:
+    def __init__(
+        self, node: FaultyNode, link: Connection, course: Course, path: str, topic: Topic | None
+    ) -> None:
         self.link = link
         self._node = node
         self._course = course
         self._path = path
-        self._type_name = type_name
+        self._topic = topic
 
     @property
     def closed(self) -> bool:
@@ -186,8 +186,8 @@ class _Messages:
         ruling = self._course.message(self._path)
         if ruling.lost:
             return
-        if ruling.damages:
-            data = damaged_message(self._type_name, data, ruling.damages)
+        if ruling.damages and self._topic is not None:
+            data = damaged_message(self._topic.type.name, data, ruling.damages, self._topic.reading)
         if ruling.delay_s > 0.0:
             self._node.later(ruling.delay_s, lambda: self._send_late(data))
         else:

@@ -73,7 +73,13 @@ class RosNode:
         self._master.call("registerService", name, self._rosrpc, self._slave.uri)
 
     def advertise(
-        self, path: str, type_name: str, *, latched: bool = False, template: Mapping[str, Any] | None = None
+        self,
+        path: str,
+        type_name: str,
+        *,
+        latched: bool = False,
+        template: Mapping[str, Any] | None = None,
+        reading: str = "",
     ) -> Publisher:
         """Return a new publisher of a topic; several of one topic share its subscribers.
 
@@ -82,11 +88,14 @@ class RosNode:
             type_name: e.g. sensor_msgs/Range
             latched: whether a late subscriber gets the last message.
             template: the fields that stay the same, for `Publisher.send_value`.
+            reading: the field of the value, for faults; "" is the last one.
         """
         name = self.resolve(path)
         topic = self._topics.get(name)
         if topic is None:
-            topic = self._topics[name] = Topic(name, message_type(type_name), latched=latched)
+            topic = self._topics[name] = Topic(
+                name, message_type(type_name), latched=latched, reading=reading
+            )
             self._master.call("registerPublisher", name, type_name, self._slave.uri)
         topic.publishers += 1
         return Publisher(topic, dict(template or {}))

@@ -22,14 +22,16 @@ class Topic:
     Attributes:
         links: of the subscribers that are connected.
         publishers: how many share the topic.
+        reading: the field of the value; "" is the last one.
     """
 
-    __slots__ = ("_last", "latched", "links", "name", "publishers", "type")
+    __slots__ = ("_last", "latched", "links", "name", "publishers", "reading", "type")
 
-    def __init__(self, name: str, type_: MessageType, *, latched: bool) -> None:
+    def __init__(self, name: str, type_: MessageType, *, latched: bool, reading: str = "") -> None:
         self.name = name
         self.type = type_
         self.latched = latched
+        self.reading = reading
         self.links: list[Connection] = []
         self.publishers = 0
         self._last: bytes | None = None

@@ -33,7 +33,9 @@ class Feed:
     def begin(self, node: Node, period_ms: int) -> None:
         """Publish every `period_ms` too."""
         if period_ms not in self.publishers:
-            self.publishers[period_ms] = node.advertise(self.path, self.type_name, template=self.template)
+            self.publishers[period_ms] = node.advertise(
+                self.path, self.type_name, template=self.template, reading=self.reading
+            )
 
     def end(self, node: Node) -> None:
         """Withdraw all publishers."""
