@@ -24,11 +24,12 @@ PENDING = object()
 class FakePublisher:
     """Keeps what was sent while somebody was subscribed."""
 
-    def __init__(self, topic, type_name, template, latched):
+    def __init__(self, topic, type_name, template, latched, reading):
         self.topic = topic
         self.type_name = type_name
         self.template = template
         self.latched = latched
+        self.reading = reading
 
     def send(self, fields):
         """Keep the template with these fields."""
@@ -77,9 +78,8 @@ class FakeNode:
 
     def advertise(self, path, type_name, *, latched=False, template=None, reading=""):
         """Return a publisher that keeps what it sends."""
-        del reading
         topic = self._ros.topic(path if path.startswith("/") else f"/{self.name}/{path}")
-        publisher = FakePublisher(topic, type_name, dict(template or {}), latched)
+        publisher = FakePublisher(topic, type_name, dict(template or {}), latched, reading)
         topic.publishers.append(publisher)
         return publisher
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from palaestra_protocol.ros.rostypes import last_field, message_type
+from palaestra_protocol.ros.rostypes import message_type, reading_field
 from palaestra_protocol.ros.tcpros import LENGTH
 from palaestra_sim.stub.faults.damage import damaged_message
 from palaestra_sim.stub.faults.language import parse
@@ -26,6 +26,13 @@ def written(kind):
     """The node of a device as a world has it, with no field but its name."""
     node = f'{kind.node} {{ name "device" }}'
     return f"HingeJoint {{ device {node} }}" if kind.on_joint else node
+
+
+def numbers(topic, data):
+    """The numbers of the reading in a framed message."""
+    layout, behind = reading_field(topic.type_name, topic.reading)
+    end = len(data) - behind
+    return layout.unpack(data[end - layout.size : end])
 
 
 @pytest.fixture
@@ -94,7 +101,8 @@ def test_a_sensor_has_a_value_after_a_step_and_publishes_all_its_topics(device, 
     node.call("robot/time_step", value=32)
 
     assert inboxes
-    for (value,) in inboxes:
+    for topic, (sent,) in zip(kind.topics(found), inboxes, strict=True):
+        value = sent[topic.reading] if topic.reading else sent
         assert all(math.isfinite(it) for it in (value if isinstance(value, tuple) else [value]))
 
 
@@ -112,7 +120,7 @@ def test_enable_0_ends_all_topics(device, name):
 
 
 @pytest.mark.parametrize("name", SENSORS)
-def test_the_message_of_each_topic_ends_with_its_reading(device, name):
+def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, name):
     """The rest of the message is made once; a reading elsewhere would be written over other fields."""
     kind, found, node = device(name)
     node.call("robot/time_step", value=32)
@@ -123,13 +131,15 @@ def test_the_message_of_each_topic_ends_with_its_reading(device, name):
         type_ = message_type(topic.type_name)
         wire = Topic("/device", type_, latched=False)
         wire.links.append(link)
-        Publisher(wire, dict(topic.constants)).send_value(topic.source.value)
+        publisher = Publisher(wire, dict(topic.constants))
+        value = topic.source.value
+        if topic.reading:
+            publisher.send_stamped({topic.reading: value})
+        else:
+            publisher.send_value(value)
         (data,) = link.sent
 
-        numbers = last_field(topic.type_name).unpack(data[-last_field(topic.type_name).size :])
-        value = topic.source.value
-
-        assert numbers == pytest.approx(value if isinstance(value, tuple) else (value,))
+        assert numbers(topic, data) == pytest.approx(value if isinstance(value, tuple) else (value,))
         type_.codec.decode(data[LENGTH.size :])
 
 
@@ -139,11 +149,23 @@ def test_a_wrong_value_reaches_each_fraction_of_a_reading(device, name):
     kind, found, _ = device(name)
 
     for topic in kind.topics(found):
-        layout = last_field(topic.type_name)
-        sound = message_type(topic.type_name).codec.frame({})
-        wrong = damaged_message(topic.type_name, sound, parse("wrong_value", "test"))
-        numbers = layout.unpack(wrong[-layout.size :])
+        sound = message_type(topic.type_name).codec.frame(dict(topic.constants))
+        wrong = damaged_message(topic.type_name, sound, parse("wrong_value", "test"), topic.reading)
 
-        fractions = [it for it in numbers if isinstance(it, float)]
+        fractions = [it for it in numbers(topic, wrong) if isinstance(it, float)]
         assert all(map(math.isnan, fractions))
         assert (wrong == sound) is (not fractions)
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_its_publishers_know_the_field_of_the_reading(stub, ros, name):
+    """Faults find it there: gyro and accelerometer have one type of message, and different readings."""
+    (robot,) = stub(name).simulation.robots
+    kind, found = robot.parts.devices.rows["device"]
+    node = ros.node("robotino")
+
+    node.call("device/enable", value=32)
+
+    for topic in kind.topics(found):
+        (publisher,) = node.publishers(f"device/{topic.name}")
+        assert publisher.reading == topic.reading

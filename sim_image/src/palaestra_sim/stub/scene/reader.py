@@ -65,9 +65,12 @@ def read_scene(tree: SceneTree, leave_out: LeaveOut | None = None) -> Scene:
     """
     reading = Reading(tree.refused, leave_out)
     scene = Scene()
+    # First, because devices read it too, wherever it is in the file.
     for node in tree.root.nodes():
         if node.type_name == "WorldInfo":
+            reading.world_info = node
             _read_world_info(reading, node, scene)
+    for node in tree.root.nodes():
         _read(reading, node, None, scene)
     reading.conclude()
     scene.left_out = tuple(reading.left_out)

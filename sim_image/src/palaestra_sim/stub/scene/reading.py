@@ -49,12 +49,14 @@ class Reading:
     Attributes:
         leave_out: what the user leaves out.
         left_out: the nodes that were left out, each with its place and the reason.
+        world_info: the WorldInfo of the world; None if it has none.
     """
 
     def __init__(self, refused: Iterable[WorldError] = (), leave_out: LeaveOut | None = None) -> None:
         self._refused: list[WorldError] = list(refused)
         self.leave_out = leave_out or LeaveOut()
         self.left_out: list[WorldError] = []
+        self.world_info: SceneNode | None = None
 
     def refuse(self, node: SceneNode, fact: str, remedy: str) -> None:
         """Record a mistake in `node`."""

@@ -14,11 +14,13 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 
 from palaestra_sim.stub.physics.body import Body
+from palaestra_sim.stub.physics.geometry import Vector
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.obstacles import Neighborhood
 from palaestra_sim.stub.physics.rays import Beam, Fan, SlopedBeams, Upright
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.devices.kind import Sample, Source
+from palaestra_sim.stub.scene.motion import Motion, Trail, motion_of
 from palaestra_sim.stub.scene.nodes.scene_node import FieldContent
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.robot_reader import RobotParts
@@ -50,6 +52,7 @@ class Robot:
         self.gauss = self._random.gauss
         self._fans: list[tuple[Fan, tuple[float, float]]] = []
         self._sloped: list[SlopedBeams] = []
+        self._trails: list[Trail] = []
         self.samplers: tuple[Sample, ...] = tuple(
             kind.sampler(devices, self)
             for kind in DEVICES.values()
@@ -110,8 +113,20 @@ class Robot:
         """Return the parts of the body that these shapes are, as bits of `Body.touched`."""
         return sum(1 << index for index, shape in enumerate(self.parts.rim) if shape in outline)
 
+    def motion(self, place: Place) -> Motion:
+        """Return how a place on the robot moves in the world; see `Carrier`."""
+        return motion_of(place, self.body)
+
+    def follow(self, place: Place) -> Callable[[], Vector]:
+        """Return a function that returns the acceleration of a place; see `Carrier`."""
+        trail = Trail(place, self.body)
+        self._trails.append(trail)
+        return trail.acceleration
+
     def advance(self, step_s: float) -> None:
         """Move on by one basic step."""
+        for trail in self._trails:
+            trail.begin(step_s)
         if self.body is not None:
             self.body.advance(step_s)
         for motor in self._stray_motors:
@@ -123,6 +138,8 @@ class Robot:
         for motor in self.motors.values():
             motor.reset()
         self.halt()
+        for trail in self._trails:
+            trail.reset()
         self.sow()
 
     def halt(self) -> None:

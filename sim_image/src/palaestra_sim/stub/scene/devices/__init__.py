@@ -2,11 +2,12 @@
 
 A row (`Kind`) holds everything about one type: how it is read from the world, how its value is sampled, its
 services, its topics with their messages, and the rule of its `enable`. The effect of the fault `wrong_value`
-follows from the message. A new device is one file in this package and one line in `DEVICES`; CONTRIBUTING.md
+follows from the topic. A new device is one file in this package and one line in `DEVICES`; CONTRIBUTING.md
 has the steps.
 
 - `kind`: what a row is
-- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`: the rows
+- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`: the rows
+- `response`: lookup tables, resolution and axes, which several of them have
 - `pseudo`: battery, keyboard and joystick, which every robot has
 """
 
@@ -16,6 +17,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
+from palaestra_sim.stub.scene.devices.gps import GPS
 from palaestra_sim.stub.scene.devices.kind import Kind
 from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
 from palaestra_sim.stub.scene.devices.rotational_motor import ROTATIONAL_MOTOR
@@ -30,5 +32,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         TOUCH_SENSOR,
         POSITION_SENSOR,
         ROTATIONAL_MOTOR,
+        GPS,
     )
 }

@@ -12,15 +12,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import islice, pairwise
+from itertools import islice
 from typing import Final
 
 from palaestra_sim.stub.physics.geometry import Pose, Vector, turn
 from palaestra_sim.stub.physics.rays import Beam, LookupTable, lookup_table
-from palaestra_sim.stub.physics.rays import Row as TableRow
 from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.stub.scene.devices.response import table_rows, table_service
 from palaestra_sim.stub.seam import Row
 
+_TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
 _LEVEL: Final = 1e-3  # a smaller slope counts as none
 _STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
@@ -76,7 +77,7 @@ def _read(part: Part) -> DistanceSensor:
         part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
     if part.number("resolution", -1.0) != -1.0:
         part.lack("a distance sensor with a resolution")
-    table = lookup_table(*_rows(part))
+    table = lookup_table(*table_rows(part, _TABLE, "distances"))
     aperture_rad = part.number("aperture", 1.5708)
     cone = _cone(int(part.number("numberOfRays", 1.0)), aperture_rad)
     return DistanceSensor(
@@ -143,21 +144,6 @@ def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
     return tuple(weight / sum(weights) for weight in weights)
 
 
-def _rows(part: Part) -> list[TableRow]:
-    """Return the lookup table, by growing distance."""
-    if "lookupTable" not in part.node.fields:
-        return [(0.0, 0.0, 0.0), (0.1, 1000.0, 0.0)]
-    numbers = part.node.numbers("lookupTable")
-    if numbers is None or len(numbers) % 3:
-        part.refuse("lookupTable is not rows of three numbers", "write distance, value, noise")
-        return []
-    rows = list(zip(numbers[0::3], numbers[1::3], numbers[2::3], strict=True))
-    if any(after[0] <= before[0] for before, after in pairwise(rows)):
-        part.refuse("the distances of lookupTable do not grow", "sort its rows")
-        return []
-    return rows
-
-
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
     """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
     cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
@@ -188,12 +174,11 @@ def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
 
 def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
     low, high = sensor.table.limits
-    table = [number for row in sensor.table.rows for number in row]
     return (
         ("get_min_value", "get_float", lambda _: {"value": low}),
         ("get_max_value", "get_float", lambda _: {"value": high}),
         ("get_aperture", "get_float", lambda _: {"value": sensor.aperture_rad}),
-        ("get_lookup_table", "get_float_array", lambda _: {"value": table}),
+        *table_service(sensor.table.rows),
         ("get_type", "get_int", lambda _: {"value": int(sensor.type)}),
     )
 

@@ -10,8 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from palaestra_sim.stub.physics.body import Body
+from palaestra_sim.stub.physics.geometry import Vector
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.rays import Beam
+from palaestra_sim.stub.scene.motion import Motion
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reading import Reading
@@ -66,6 +68,22 @@ class Part:
         """Return the text of a field, `default` if it has none."""
         return self.node.text(name) or default
 
+    def world_numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the numbers of a field of WorldInfo; `default` if it is absent or refused."""
+        world_info = self.reading.world_info
+        return default if world_info is None else self.reading.vector(world_info, name, default)
+
+    def world_text(self, name: str, default: str) -> str:
+        """Return the text of a field of WorldInfo, `default` if it has none."""
+        world_info = self.reading.world_info
+        return default if world_info is None else world_info.text(name) or default
+
+    def require_enu(self, name: str) -> None:
+        """Note that a device of this name needs a world whose y axis is north and whose z axis is up."""
+        system = self.world_text("coordinateSystem", "ENU")
+        if system != "ENU":
+            self.lack(f"{name} in a world with WorldInfo.coordinateSystem {system!r}")
+
     def refuse(self, fact: str, remedy: str) -> None:
         """Note a mistake in the world."""
         self.reading.refuse(self.node, fact, remedy)
@@ -100,6 +118,14 @@ class Carrier(Protocol):
 
     def touching(self, outline: Sequence[Shape]) -> int:
         """Return the parts of the body that these shapes are, as bits of `Body.touched`."""
+        ...
+
+    def motion(self, place: Place) -> Motion:
+        """Return how a place on the robot moves in the world."""
+        ...
+
+    def follow(self, place: Place) -> Callable[[], Vector]:
+        """Return a function that returns the acceleration of a place, in world axes, in m/s2."""
         ...
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.stub.scene.devices.response import discrete
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -42,9 +43,7 @@ def _sampler(sensors: Sequence[PositionSensor], robot: Carrier) -> Sample:
             angle_rad = sensor.motor.angle_rad if sensor.motor is not None else 0.0
             if sensor.noise:
                 angle_rad += sensor.noise * gauss(0.0, 1.0)
-            if sensor.resolution > 0.0:
-                angle_rad = sensor.resolution * round(angle_rad / sensor.resolution)
-            sensor.value = angle_rad
+            sensor.value = discrete(angle_rad, sensor.resolution)
 
     return sample
 

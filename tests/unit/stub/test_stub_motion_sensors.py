@@ -1,0 +1,220 @@
+"""GPS, compass, gyro and their like: what they read on a robot that stands, drives and turns."""
+
+import math
+import random
+
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.physics.motors import Motor, MotorSpec
+from palaestra_sim.stub.scene.joints import Joint, JointPlace
+from palaestra_sim.stub.scene.motion import motion_of
+from palaestra_sim.stub.scene.places import Place
+from palaestra_sim.stub.scene.simulation import Simulation
+from tests.robotino import WHEELS, wheel_speeds
+
+STEP_MS = 32
+NORTH = "rotation 0 0 1 1.5707963267948966"  # of a robot that looks along +y
+ON_A_TURNTABLE = """HingeJoint {{
+  jointParameters HingeJointParameters {{ axis 0 0 1 }}
+  device RotationalMotor {{ name "turntable" }}
+  endPoint Solid {{ children [ {} ] }} }}"""
+
+
+@pytest.fixture
+def load(world, simple_robot):
+    """`load(sensor, robot=..., info=...)`: a simulation whose robot has that sensor, with the seed 7."""
+
+    def begin(sensor, robot="", info="", objects=""):
+        text = simple_robot.replace("DEF IR", f"{sensor} DEF IR")
+        text = text.replace('name "robotino"', f'{robot} customData "7" name "robotino"', 1)
+        return Simulation.load(world(objects, robot=text, info=info))
+
+    return begin
+
+
+@pytest.fixture
+def device(start, world, simple_robot, ros):
+    """`device(sensor)`: the node of a stub whose robot has that sensor, for its services and topics."""
+
+    def begin(sensor):
+        start(world(robot=simple_robot.replace("DEF IR", f"{sensor} DEF IR")))
+        return ros.node("robotino")
+
+    return begin
+
+
+def drive(simulation, vx, vy, omega, steps=30):
+    """Drive at that velocity until it is reached."""
+    motors = simulation.robots[0].motors
+    for name, speed in zip(WHEELS, wheel_speeds(vx, vy, omega), strict=True):
+        motors[name].set_position(math.inf)
+        motors[name].set_velocity(speed)
+    for _ in range(steps):
+        simulation.step(STEP_MS)
+
+
+def value_of(simulation, name):
+    """The value of a sensor of the first robot."""
+    return simulation.robots[0].sensors[name].value
+
+
+def draws(count):
+    """The first numbers of the noise with the seed 7."""
+    noise = random.Random(7)
+    return [noise.gauss(0.0, 1.0) for _ in range(count)]
+
+
+def test_a_gps_reads_its_own_place_and_not_that_of_its_robot(load):
+    """It is 0.1 m before the middle of a robot that looks north."""
+    simulation = load(
+        "GPS { translation 0.1 0 0.3 }", f"translation 1 2 0 {NORTH}", info="gpsReference 100 200 300"
+    )
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "gps") == pytest.approx((101.0, 202.1, 300.3))
+
+
+def test_a_gps_reads_its_speed_in_the_axes_of_the_world(load):
+    """The robot drives forward, which is north."""
+    simulation = load("GPS { }", NORTH)
+
+    drive(simulation, 0.3, 0.0, 0.0)
+
+    gps = simulation.robots[0].sensors["gps"]
+    assert gps.speed.value == pytest.approx(0.3)
+    assert gps.speed_vector.value == pytest.approx((0.0, 0.3, 0.0))
+
+
+def test_a_gps_off_the_middle_moves_when_the_robot_turns(load):
+    """0.2 m to the left of the middle: it moves backward."""
+    simulation = load("GPS { translation 0 0.2 0 }")
+
+    drive(simulation, 0.0, 0.0, 0.5, steps=1)
+    heading_rad = simulation.robots[0].body.heading_rad
+    speed = abs(simulation.robots[0].body.velocity[2]) * 0.2
+
+    gps = simulation.robots[0].sensors["gps"]
+    assert gps.speed.value == pytest.approx(speed)
+    assert gps.speed_vector.value == pytest.approx(
+        (-speed * math.cos(heading_rad), -speed * math.sin(heading_rad), 0.0)
+    )
+
+
+def test_a_gps_on_a_joint_moves_with_it(load):
+    """The speed of a motor counts, not only that of the robot: 0.1 m from the axis, at 2 rad/s."""
+    simulation = load(ON_A_TURNTABLE.format("GPS { translation 0.1 0 0 }"))
+    simulation.robots[0].motors["turntable"].set_position(math.inf)
+    simulation.robots[0].motors["turntable"].set_velocity(2.0)
+
+    simulation.step(STEP_MS)
+
+    angle_rad = 2.0 * STEP_MS / 1000.0
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    assert value_of(simulation, "gps") == pytest.approx((0.1 * c, 0.1 * s, 0.0))
+    assert simulation.robots[0].sensors["gps"].speed_vector.value == pytest.approx((-0.2 * s, 0.2 * c, 0.0))
+
+
+def test_a_place_on_a_slider_moves_along_its_axis():
+    """The axis is in the frame around the joint, which is turned here."""
+    frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, math.pi / 2.0))
+    motor = Motor(MotorSpec(name="lift"))
+    motor.speed_rad_s = 0.2
+    end = JointPlace(
+        frame, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), Joint(axis=(1.0, 0.0, 0.0), slides=True, motor=motor)
+    )
+
+    motion = motion_of(Place(end, (1.0, 2.0, 3.0), (0.0, 0.0, 1.0, 0.0)), body=None)
+
+    assert motion.velocity == pytest.approx((0.0, 0.2, 0.0))
+    assert motion.turning == (0.0, 0.0, 0.0)
+
+
+def test_a_robot_that_is_placed_elsewhere_has_no_speed(load):
+    """Webots takes the speed from its physics too, not from two positions."""
+    simulation = load("GPS { }")
+    simulation.step(STEP_MS)
+
+    simulation.robots[0].place.translation = (3.0, 0.0, 0.0)
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "gps")[0] == 3.0
+    assert simulation.robots[0].sensors["gps"].speed.value == 0.0
+
+
+def test_the_noise_of_a_gps_is_in_meters_and_that_of_its_speed_a_fraction(load):
+    """The vector of the speed has none, as in Webots."""
+    simulation = load("GPS { accuracy 0.5 speedNoise 0.1 }", NORTH)
+    expected = draws(8)
+
+    drive(simulation, 0.3, 0.0, 0.0, steps=2)
+
+    gps = simulation.robots[0].sensors["gps"]
+    exact = simulation.robots[0].place.translation
+    assert gps.value == pytest.approx(
+        [at + 0.5 * noise for at, noise in zip(exact, expected[4:7], strict=True)]
+    )
+    assert gps.speed.value == pytest.approx(math.hypot(*gps.speed_vector.value) * (1.0 + 0.1 * expected[7]))
+
+
+def test_a_gps_rounds_to_its_resolution(load):
+    """Position and speed have one each."""
+    simulation = load("GPS { resolution 0.25 speedResolution 0.2 }", "translation 1.1 -0.4 0")
+
+    drive(simulation, 0.0, 0.5, 0.0, steps=1)
+
+    gps = simulation.robots[0].sensors["gps"]
+    assert gps.value == pytest.approx((1.0, -0.5, 0.0))
+    assert gps.speed.value == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "info", "fact"),
+    [
+        ("GPS { }", 'gpsCoordinateSystem "WGS84"', "a GPS with latitude and longitude"),
+        ("GPS { accuracy 1 noiseCorrelation 0.5 }", "", "a GPS whose noise is correlated"),
+        ("GPS { }", "gpsReference 1 2", "WorldInfo.gpsReference is not 3 numbers"),
+    ],
+)
+def test_what_a_gps_cannot_read_is_refused(load, sensor, info, fact):
+    """A wrong position would be worse than none."""
+    with pytest.raises(WorldError, match=fact):
+        load(sensor, info=info)
+
+
+def test_a_gps_reads_a_worldinfo_that_follows_its_robot(simple_robot):
+    """The order of nodes in a file has no meaning."""
+    robot = simple_robot.replace("DEF IR", "GPS { } DEF IR")
+
+    simulation = Simulation.load(
+        f"#VRML_SIM R2023b utf8\n{robot}\nWorldInfo {{ gpsReference 1 2 3 }}\n".encode()
+    )
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "gps") == pytest.approx((1.0, 2.0, 3.0))
+
+
+def test_a_gps_answers_its_coordinate_system_and_converts_angles(device):
+    """Each part is cut toward zero, as in the library of Webots."""
+    node = device("GPS { }")
+
+    def converted(angle):
+        return node.get("gps/decimal_degrees_to_degrees_minutes_seconds", decimalDegrees=angle)
+
+    assert node.get("gps/get_coordinate_system") == 0
+    assert converted(46.519) == "46° 31′ 8″"  # noqa: RUF001 - as Webots
+    assert converted(-6.5) == "-6° -30′ 0″"  # noqa: RUF001 - as Webots
+
+
+def test_a_gps_is_in_the_frame_of_its_name_except_for_its_speed(device):
+    """The controller leaves the frame of that one message empty."""
+    node = device("GPS { }")
+
+    node.call("gps/enable", value=STEP_MS)
+
+    frames = [
+        node.publishers(f"gps/{name}")[0].template["header"].get("frame_id")
+        for name in ("values", "speed", "speed_vector")
+    ]
+    assert frames == ["robotino/gps", None, "robotino/gps"]
