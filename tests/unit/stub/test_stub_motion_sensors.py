@@ -218,3 +218,82 @@ def test_a_gps_is_in_the_frame_of_its_name_except_for_its_speed(device):
         for name in ("values", "speed", "speed_vector")
     ]
     assert frames == ["robotino/gps", None, "robotino/gps"]
+
+
+@pytest.mark.parametrize(
+    ("robot", "mount", "north"),
+    [
+        ("", "", (0.0, 1.0, 0.0)),
+        (NORTH, "", (1.0, 0.0, 0.0)),
+        (NORTH, NORTH, (0.0, -1.0, 0.0)),
+        ("", "rotation 1 0 0 1.5707963267948966", (0.0, 0.0, -1.0)),
+    ],
+)
+def test_a_compass_shows_north_in_its_own_frame(load, robot, mount, north):
+    """North is +y of the world; robot and mount turn the sensor."""
+    simulation = load(f"Compass {{ {mount} }}", robot)
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "compass") == pytest.approx(north)
+
+
+def test_a_compass_turns_against_its_robot(load):
+    """The bearing of its documentation is atan2 of the first two."""
+    simulation = load("Compass { }")
+
+    drive(simulation, 0.0, 0.0, 0.5)
+
+    heading_rad = simulation.robots[0].body.heading_rad
+    assert heading_rad > 0.1
+    assert value_of(simulation, "compass") == pytest.approx(
+        (math.sin(heading_rad), math.cos(heading_rad), 0.0)
+    )
+
+
+def test_axes_go_through_table_and_resolution_and_one_that_is_off_is_nan(load):
+    """As in Webots, table first."""
+    simulation = load("Compass { lookupTable [ -1 -100 0, 1 100 0 ] resolution 30 zAxis FALSE }", NORTH)
+
+    simulation.step(STEP_MS)
+
+    x, y, z = value_of(simulation, "compass")
+    assert (x, y) == pytest.approx((90.0, 0.0))
+    assert math.isnan(z)
+
+
+def test_each_axis_of_a_noisy_table_draws_its_own_noise(load):
+    """In the order x, y, z."""
+    simulation = load("Compass { lookupTable [ -1 -100 0.5, 1 100 0.5 ] yAxis FALSE }", "rotation 0 0 1 0.5")
+    first, third = draws(2)
+
+    simulation.step(STEP_MS)
+
+    x, y, z = value_of(simulation, "compass")
+    assert x == pytest.approx(100.0 * math.sin(0.5) * (1.0 + 0.5 * first))
+    assert math.isnan(y)
+    assert z == pytest.approx(0.0 * third)
+
+
+def test_a_sensor_without_a_table_answers_an_empty_one(device):
+    """The default of the field has no rows."""
+    assert device("Compass { }").get("compass/get_lookup_table") == ()
+
+
+def test_a_sensor_answers_its_table(device):
+    """Row after row."""
+    node = device("Compass { lookupTable [ -1 -100 0, 1 100 0.5 ] }")
+
+    assert node.get("compass/get_lookup_table") == (-1.0, -100.0, 0.0, 1.0, 100.0, 0.5)
+
+
+def test_a_table_whose_inputs_do_not_grow_is_refused(load):
+    """Nothing could be read between its rows."""
+    with pytest.raises(WorldError, match="the inputs of lookupTable do not grow; sort its rows"):
+        load("Compass { lookupTable [ 1 1 0, 0 0 0 ] }")
+
+
+def test_a_compass_in_a_world_with_another_north_is_refused(load):
+    """There, y is up."""
+    with pytest.raises(WorldError, match=r"compass in a world with WorldInfo\.coordinateSystem 'NUE'"):
+        load("Compass { }", info='coordinateSystem "NUE"')

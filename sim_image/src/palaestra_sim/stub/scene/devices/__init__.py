@@ -6,7 +6,7 @@ follows from the topic. A new device is one file in this package and one line in
 has the steps.
 
 - `kind`: what a row is
-- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`: the rows
+- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`: the rows
 - `response`: lookup tables, resolution and axes, which several of them have
 - `pseudo`: battery, keyboard and joystick, which every robot has
 """
@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.gps import GPS
 from palaestra_sim.stub.scene.devices.kind import Kind
@@ -33,5 +34,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         POSITION_SENSOR,
         ROTATIONAL_MOTOR,
         GPS,
+        COMPASS,
     )
 }
