@@ -297,3 +297,41 @@ def test_a_compass_in_a_world_with_another_north_is_refused(load):
     """There, y is up."""
     with pytest.raises(WorldError, match=r"compass in a world with WorldInfo\.coordinateSystem 'NUE'"):
         load("Compass { }", info='coordinateSystem "NUE"')
+
+
+@pytest.mark.parametrize(
+    ("mount", "direction"),
+    [("", (0.0, 0.0, 1.0)), ("rotation 1 0 0 1.5707963267948966", (0.0, 1.0, 0.0))],
+)
+def test_a_gyro_reads_the_turning_of_its_robot_about_its_own_axes(load, mount, direction):
+    """The robot turns about the vertical; a gyro that is tipped over reads it on another axis."""
+    simulation = load(f"Gyro {{ translation 0.1 0 0 {mount} }}")
+
+    drive(simulation, 0.2, 0.0, 0.5)
+
+    assert value_of(simulation, "gyro") == pytest.approx([0.5 * part for part in direction])
+
+
+def test_a_gyro_reads_the_motor_that_carries_it_too(load):
+    """Robot and turntable turn about the same axis."""
+    simulation = load(ON_A_TURNTABLE.format("Gyro { }"))
+    simulation.robots[0].motors["turntable"].set_position(math.inf)
+    simulation.robots[0].motors["turntable"].set_velocity(2.0)
+
+    drive(simulation, 0.0, 0.0, 0.5)
+
+    assert value_of(simulation, "gyro") == pytest.approx((0.0, 0.0, 2.5))
+
+
+def test_a_gyro_marks_what_it_does_not_measure(device):
+    """-1 in a covariance is ROS's word for it; the covariance of the reading is unknown, which is 0."""
+    node = device("Gyro { }")
+    node.call("gyro/enable", value=STEP_MS)
+    inbox = node.inbox("gyro/values")
+
+    node.call("robot/time_step", value=STEP_MS)
+
+    (message,) = inbox
+    assert message["angular_velocity"] == (0.0, 0.0, 0.0)
+    assert message["orientation_covariance"][0] == message["linear_acceleration_covariance"][0] == -1.0
+    assert "angular_velocity_covariance" not in message

@@ -6,8 +6,10 @@ follows from the topic. A new device is one file in this package and one line in
 has the steps.
 
 - `kind`: what a row is
-- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`: the rows
+- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`: the
+  rows
 - `response`: lookup tables, resolution and axes, which several of them have
+- `imu`: the topic of those that send a sensor_msgs/Imu
 - `pseudo`: battery, keyboard and joystick, which every robot has
 """
 
@@ -19,6 +21,7 @@ from typing import Any, Final
 from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.gps import GPS
+from palaestra_sim.stub.scene.devices.gyro import GYRO
 from palaestra_sim.stub.scene.devices.kind import Kind
 from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
 from palaestra_sim.stub.scene.devices.rotational_motor import ROTATIONAL_MOTOR
@@ -35,5 +38,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         ROTATIONAL_MOTOR,
         GPS,
         COMPASS,
+        GYRO,
     )
 }
