@@ -335,3 +335,72 @@ def test_a_gyro_marks_what_it_does_not_measure(device):
     assert message["angular_velocity"] == (0.0, 0.0, 0.0)
     assert message["orientation_covariance"][0] == message["linear_acceleration_covariance"][0] == -1.0
     assert "angular_velocity_covariance" not in message
+
+
+@pytest.mark.parametrize(
+    ("mount", "info", "expected"),
+    [
+        ("", "", (0.0, 0.0, 9.81)),
+        ("", "gravity 1.62", (0.0, 0.0, 1.62)),
+        ("rotation 0 1 0 1.5707963267948966", "", (-9.81, 0.0, 0.0)),
+    ],
+)
+def test_an_accelerometer_at_rest_reads_the_reaction_to_gravity(load, mount, info, expected):
+    """Upward, in its own frame."""
+    simulation = load(f"Accelerometer {{ {mount} }}", info=info)
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "accelerometer") == pytest.approx(expected)
+
+
+def test_an_accelerometer_reads_a_robot_that_speeds_up_and_then_drives_on(load):
+    """10 m/s2 is the limit along x; at an even speed nothing but gravity is left."""
+    simulation = load("Accelerometer { }", NORTH)
+
+    drive(simulation, 2.0, 0.0, 0.0, steps=1)
+    speeding_up = value_of(simulation, "accelerometer")
+    drive(simulation, 2.0, 0.0, 0.0, steps=30)
+
+    assert speeding_up == pytest.approx((10.0, 0.0, 9.81))
+    assert value_of(simulation, "accelerometer") == pytest.approx((0.0, 0.0, 9.81))
+
+
+def test_an_accelerometer_reads_the_last_basic_step_of_a_long_one(load):
+    """The robot is at its speed after two of six."""
+    simulation = load("Accelerometer { }")
+    drive(simulation, 0.5, 0.0, 0.0, steps=0)
+
+    simulation.step(6 * STEP_MS)
+
+    assert value_of(simulation, "accelerometer") == pytest.approx((0.0, 0.0, 9.81))
+
+
+def test_an_accelerometer_off_the_middle_reads_the_pull_to_the_middle(load):
+    """The square of 2 rad/s by 0.3 m, against the arm; half a basic step late, it has turned a bit."""
+    simulation = load("Accelerometer { translation 0.3 0 0 }")
+
+    drive(simulation, 0.0, 0.0, 2.0)
+
+    late_rad = 2.0 * STEP_MS / 1000.0 / 2.0
+    pull = 2.0 * 2.0 * 0.3 * math.sin(late_rad) / late_rad
+    assert value_of(simulation, "accelerometer") == pytest.approx(
+        (-pull * math.cos(late_rad), pull * math.sin(late_rad), 9.81)
+    )
+
+
+def test_a_reset_is_no_acceleration(load):
+    """The robot drove before, and stands after."""
+    simulation = load("Accelerometer { }")
+    drive(simulation, 0.5, 0.0, 0.0)
+
+    simulation.reset()
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "accelerometer") == pytest.approx((0.0, 0.0, 9.81))
+
+
+def test_an_accelerometer_in_a_world_with_another_up_is_refused(load):
+    """There, gravity pulls along y."""
+    with pytest.raises(WorldError, match=r"accelerometer in a world with WorldInfo\.coordinateSystem 'NUE'"):
+        load("Accelerometer { }", info='coordinateSystem "NUE"')

@@ -6,8 +6,8 @@ follows from the topic. A new device is one file in this package and one line in
 has the steps.
 
 - `kind`: what a row is
-- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`: the
-  rows
+- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`,
+  `accelerometer`: the rows
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 - `pseudo`: battery, keyboard and joystick, which every robot has
@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from palaestra_sim.stub.scene.devices.accelerometer import ACCELEROMETER
 from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.gps import GPS
@@ -39,5 +40,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         GPS,
         COMPASS,
         GYRO,
+        ACCELEROMETER,
     )
 }
