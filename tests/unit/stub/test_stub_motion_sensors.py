@@ -404,3 +404,56 @@ def test_an_accelerometer_in_a_world_with_another_up_is_refused(load):
     """There, gravity pulls along y."""
     with pytest.raises(WorldError, match=r"accelerometer in a world with WorldInfo\.coordinateSystem 'NUE'"):
         load("Accelerometer { }", info='coordinateSystem "NUE"')
+
+
+def test_an_inertial_unit_reads_its_rotation_in_the_world(load):
+    """Robot and mount are each turned by a quarter about the vertical."""
+    simulation = load(f"InertialUnit {{ {NORTH} }}", NORTH)
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "inertial unit") == pytest.approx((0.0, 0.0, 1.0, 0.0), abs=1e-9)
+
+
+def test_an_inertial_unit_turns_with_its_robot(load):
+    """The quaternion has half of the angle."""
+    simulation = load("InertialUnit { }")
+
+    drive(simulation, 0.0, 0.0, 0.5)
+
+    half_rad = simulation.robots[0].body.heading_rad / 2.0
+    assert value_of(simulation, "inertial unit") == pytest.approx(
+        (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+    )
+
+
+def test_the_noise_of_an_inertial_unit_turns_it_about_all_axes(load):
+    """A fraction of pi: the sum of small turns is near the vector of the three."""
+    simulation = load("InertialUnit { noise 0.0001 }")
+
+    simulation.step(STEP_MS)
+
+    x, y, z, w = value_of(simulation, "inertial unit")
+    halves = [0.0001 * math.pi * noise / 2.0 for noise in draws(3)]
+    assert (x, y, z) == pytest.approx(halves, rel=1e-2)
+    assert math.hypot(x, y, z, w) == pytest.approx(1.0)
+
+
+def test_an_inertial_unit_rounds_each_number_to_its_resolution(load):
+    """As in Webots, so that the length is no longer 1."""
+    simulation = load("InertialUnit { resolution 0.5 }", "rotation 0 0 1 0.7")
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "inertial unit") == pytest.approx((0.0, 0.0, 0.5, 1.0))
+
+
+def test_an_inertial_unit_answers_its_noise(device):
+    """The field, as it is."""
+    assert device("InertialUnit { noise 0.25 }").get("inertial_unit/get_noise") == 0.25
+
+
+def test_an_inertial_unit_with_an_axis_switched_off_is_refused(load):
+    """What Webots sends then is a rotation that no robot has."""
+    with pytest.raises(WorldError, match="an inertial unit with an axis that is switched off"):
+        load("InertialUnit { yAxis FALSE }")

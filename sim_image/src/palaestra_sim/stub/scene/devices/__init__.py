@@ -7,7 +7,7 @@ has the steps.
 
 - `kind`: what a row is
 - `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`,
-  `accelerometer`: the rows
+  `accelerometer`, `inertial_unit`: the rows
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 - `pseudo`: battery, keyboard and joystick, which every robot has
@@ -23,6 +23,7 @@ from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.gps import GPS
 from palaestra_sim.stub.scene.devices.gyro import GYRO
+from palaestra_sim.stub.scene.devices.inertial_unit import INERTIAL_UNIT
 from palaestra_sim.stub.scene.devices.kind import Kind
 from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
 from palaestra_sim.stub.scene.devices.rotational_motor import ROTATIONAL_MOTOR
@@ -41,5 +42,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         COMPASS,
         GYRO,
         ACCELEROMETER,
+        INERTIAL_UNIT,
     )
 }
