@@ -457,3 +457,22 @@ def test_an_inertial_unit_with_an_axis_switched_off_is_refused(load):
     """What Webots sends then is a rotation that no robot has."""
     with pytest.raises(WorldError, match="an inertial unit with an axis that is switched off"):
         load("InertialUnit { yAxis FALSE }")
+
+
+def test_an_altimeter_reads_its_height_and_that_of_the_reference(load):
+    """The robot stands 0.5 m up, the sensor is 0.3 m higher."""
+    simulation = load("Altimeter { translation 0 0 0.3 }", "translation 0 0 0.5", info="gpsReference 1 2 400")
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "altimeter") == pytest.approx(400.8)
+
+
+def test_an_altimeter_adds_noise_and_then_rounds(load):
+    """The noise is in meters."""
+    simulation = load("Altimeter { accuracy 3 resolution 0.25 }")
+    (noise,) = draws(1)
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "altimeter") == pytest.approx(0.25 * round(3.0 * noise / 0.25))

@@ -7,7 +7,7 @@ has the steps.
 
 - `kind`: what a row is
 - `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`,
-  `accelerometer`, `inertial_unit`: the rows
+  `accelerometer`, `inertial_unit`, `altimeter`: the rows
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 - `pseudo`: battery, keyboard and joystick, which every robot has
@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from palaestra_sim.stub.scene.devices.accelerometer import ACCELEROMETER
+from palaestra_sim.stub.scene.devices.altimeter import ALTIMETER
 from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.gps import GPS
@@ -43,5 +44,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         GYRO,
         ACCELEROMETER,
         INERTIAL_UNIT,
+        ALTIMETER,
     )
 }
