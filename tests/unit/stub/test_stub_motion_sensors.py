@@ -476,3 +476,49 @@ def test_an_altimeter_adds_noise_and_then_rounds(load):
     simulation.step(STEP_MS)
 
     assert value_of(simulation, "altimeter") == pytest.approx(0.25 * round(3.0 * noise / 0.25))
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ("", 0.0),
+        ("lookupTable [ ]", 0.0),
+        ("lookupTable [ 1 4095 0, 2 0 0 ]", 4095.0),
+        ("lookupTable [ 1 4095 0, 2 0 0 ] resolution 100", 4100.0),
+    ],
+)
+def test_a_light_sensor_in_a_world_without_lights_reads_darkness(load, fields, expected):
+    """What its table has for no irradiance; that of an E-puck begins at its largest value."""
+    simulation = load(f"LightSensor {{ {fields} }}")
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "light sensor") == expected
+
+
+def test_the_table_of_a_light_sensor_adds_noise(load):
+    """A fraction of the response."""
+    simulation = load("LightSensor { lookupTable [ 1 4095 0.01, 2 0 0.01 ] }")
+    (noise,) = draws(1)
+
+    simulation.step(STEP_MS)
+
+    assert value_of(simulation, "light sensor") == pytest.approx(4095.0 * (1.0 + 0.01 * noise))
+
+
+@pytest.mark.parametrize("light", ["DirectionalLight { }", "Pose { children [ PointLight { on FALSE } ] }"])
+def test_a_light_sensor_in_a_world_with_a_light_is_refused(load, light):
+    """A client may switch it on; darkness would then be wrong."""
+    with pytest.raises(WorldError, match="a light sensor in a world with lights"):
+        load("LightSensor { }", objects=light)
+
+
+def test_a_light_on_the_robot_is_a_light_too(load):
+    """It shines on what is before the robot."""
+    with pytest.raises(WorldError, match="a light sensor in a world with lights"):
+        load("LightSensor { } SpotLight { }")
+
+
+def test_a_light_sensor_answers_its_table_or_the_default(device):
+    """The default is that of Webots."""
+    assert device("LightSensor { }").get("light_sensor/get_lookup_table") == (0, 0, 0, 1, 1000, 0)

@@ -7,7 +7,7 @@ has the steps.
 
 - `kind`: what a row is
 - `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`,
-  `accelerometer`, `inertial_unit`, `altimeter`: the rows
+  `accelerometer`, `inertial_unit`, `altimeter`, `light_sensor`: the rows
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 - `pseudo`: battery, keyboard and joystick, which every robot has
@@ -26,6 +26,7 @@ from palaestra_sim.stub.scene.devices.gps import GPS
 from palaestra_sim.stub.scene.devices.gyro import GYRO
 from palaestra_sim.stub.scene.devices.inertial_unit import INERTIAL_UNIT
 from palaestra_sim.stub.scene.devices.kind import Kind
+from palaestra_sim.stub.scene.devices.light_sensor import LIGHT_SENSOR
 from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
 from palaestra_sim.stub.scene.devices.rotational_motor import ROTATIONAL_MOTOR
 from palaestra_sim.stub.scene.devices.touch_sensor import TOUCH_SENSOR
@@ -45,5 +46,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         ACCELEROMETER,
         INERTIAL_UNIT,
         ALTIMETER,
+        LIGHT_SENSOR,
     )
 }
