@@ -6,8 +6,9 @@ follows from the topic. A new device is one file in this package and one line in
 has the steps.
 
 - `kind`: what a row is
-- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`, `gps`, `compass`, `gyro`,
-  `accelerometer`, `inertial_unit`, `altimeter`, `light_sensor`: the rows
+- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`: the rows of what wheels need
+- `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: the rows of what measures place and motion
+- `altimeter`, `light_sensor`: the rows of what measures the surroundings
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 - `pseudo`: battery, keyboard and joystick, which every robot has

@@ -20,7 +20,7 @@ class Altimeter:
     """An altimeter; `value` is in meters.
 
     Attributes:
-        reference: what is added to the height in the world.
+        reference: the offset from the height in the world.
         accuracy: standard deviation of the noise, in meters.
     """
 

@@ -33,7 +33,7 @@ class Gps:
     """A receiver; `value` is x, y, z in meters.
 
     Attributes:
-        reference: what is added to the position in the world.
+        reference: the offset from the position in the world.
         accuracy: standard deviation of the position's noise, in meters.
         speed_noise: standard deviation of the speed's noise, as a fraction of the speed.
         speed: in m/s.
@@ -122,7 +122,7 @@ def _in_degrees_minutes_seconds(request: Any) -> dict[str, Any]:
     degrees = int(angle)
     minutes = int((angle - degrees) * 60)
     seconds = int(((angle - degrees) * 60 - minutes) * 60)
-    return {"degreesMinutesSeconds": f"{degrees}° {minutes}′ {seconds}″"}  # noqa: RUF001 - as Webots
+    return {"degreesMinutesSeconds": f"{degrees}° {minutes}\u2032 {seconds}\u2033"}
 
 
 def _topics(gps: Gps) -> tuple[Topic, ...]:
