@@ -8,6 +8,7 @@ TABLE = Path(__file__).with_name("interface_r2023b.txt")
 DEVICES = {
     "<distance>": ["ir1", "ir9"],
     "<touch>": ["touch_sensor"],
+    "<position>": ["wheel1_joint_sensor"],
     "<motor>": ["wheel0_joint", "wheel2_joint"],
     "<sensor>": ["ir1", "ir9", "touch_sensor", "wheel1_joint_sensor"],
     "<dev>": ["ir1", "ir9", "touch_sensor", "wheel1_joint_sensor", "wheel0_joint", "wheel2_joint"],

@@ -2,7 +2,6 @@
 
 import pytest
 
-from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.scene.simulation import Mode
 
 
@@ -239,22 +238,13 @@ def test_pseudo_devices_can_be_enabled_and_have_nothing_to_tell(robot):
     """Every robot has them, plugged in or not."""
     keys = robot.inbox("keyboard/key")
 
-    for device in ("battery_sensor", "keyboard"):
+    for device in ("battery_sensor", "keyboard", "joystick"):
         assert robot.get(f"{device}/enable", value=64) is True
         assert robot.get(f"{device}/get_sampling_period") == 64
         robot.call("robot/time_step", value=32)
         assert robot.get(f"{device}/enable", value=0) is True
 
     assert keys == []
-
-
-def test_enabling_a_joystick_is_refused_since_its_topics_never_come(robot):
-    """A success would leave a client waiting for a topic that is never advertised."""
-    with pytest.raises(ServiceFailed, match="the stub has no joystick; use driver webots"):
-        robot.call("joystick/enable", value=64)
-
-    assert robot.get("joystick/get_sampling_period") == 0
-    assert robot.get("joystick/enable", value=0) is True
 
 
 def test_a_distance_sensor_tells_its_table(robot):

@@ -196,7 +196,7 @@ def test_what_cannot_be_simulated_is_refused(world, objects, fact):
 
 
 BAD_ROBOTS = {
-    "a camera": (("DEF IR", "Camera { } DEF IR"), "the stub simulates no Camera on a robot"),
+    "a skin": (("DEF IR", "Skin { } DEF IR"), "the stub simulates no Skin on a robot"),
     "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
     "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "no distance sensor is of type 'radar'"),
     "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable is not rows of three numbers"),
@@ -206,8 +206,6 @@ BAD_ROBOTS = {
         "a touch sensor that measures force",
     ),
     "two devices of a name": (('"ir1"', '"touch sensor"'), "a second device 'touch sensor'"),
-    "a brake": (("PositionSensor {", "Brake { } PositionSensor {"), "the stub simulates no Brake"),
-    "a battery": (("supervisor TRUE", "supervisor TRUE battery [ 9 10 1 ]"), "a Robot with a battery"),
     "an axis of no length": (
         ("DEF IR", "HingeJoint { jointParameters HingeJointParameters { axis 0 0 0 } } DEF IR"),
         "a joint with an axis of length 0",
@@ -332,8 +330,8 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
 
 def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_all_places(world):
     """A person mends a world once, not in as many rounds as it has refusals."""
-    robot = """Robot { name "r" battery [ 1 1 1 ] controller "ros"
-      children [ Camera { } Lidar { } ] }"""
+    robot = """Robot { name "r" controller "ros"
+      children [ Skin { } Track { } ] }"""
     ball = "Solid { physics Physics { }\nboundingObject Cone { } }"
     objects = f"Floor {{ }}\nTree {{ }}\nTree {{ }}\n{ball}\nTree {{ }}"
     with pytest.raises(WorldRefusedError) as caught:
@@ -348,14 +346,13 @@ def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_
             f" remove physics, {elsewhere}"
         ),
         f"my.wbt:7:16: the stub simulates no Cone as a boundingObject; {elsewhere}",
-        f"my.wbt:9:1: a Robot with a battery, which would never run down; {elsewhere}",
         "my.wbt:9:1: controllerArgs without --name=; generate the world",
         "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only when it is asked to; add it",
-        f"my.wbt:10:18: the stub simulates no Camera on a robot; {elsewhere}",
-        f"my.wbt:10:29: the stub simulates no Lidar on a robot; {elsewhere}",
+        f"my.wbt:10:18: the stub simulates no Skin on a robot; {elsewhere}",
+        f"my.wbt:10:27: the stub simulates no Track on a robot; {elsewhere}",
     ]
     assert caught.value.line == 3
-    assert len(caught.value.errors) == 11
+    assert len(caught.value.errors) == 10
 
 
 def test_a_refusal_of_several_things_survives_a_copy(world):

@@ -48,14 +48,22 @@ def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
 
 def test_all_that_the_stub_lacks_is_listed_at_once(check):
     """With exit code 2, as for a start."""
-    code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Radar { } ] }\nColosseum { }')
+    code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Skin { } ] }\nColosseum { }')
 
     assert code == 2
     assert lines[1:] == [
         "cannot be simulated; --leave-out leaves it out:",
         "my.wbt:2:1: the stub simulates no Colosseum (2 places, in lines 2, 4); left out",
-        "my.wbt:3:37: the stub simulates no Radar on a robot; left out",
+        "my.wbt:3:37: the stub simulates no Skin on a robot; left out",
     ]
+
+
+def test_devices_without_readings_are_named(check):
+    """A world with a camera starts, and a client that waits for images would wait for ever."""
+    code, lines = check('Robot { controller "ros" children [ Camera { } Radar { } LED { } ] }')
+
+    assert code == 0
+    assert lines[1:] == ["devices without readings, whose enable answers failure: 1 Camera, 1 Radar"]
 
 
 def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):

@@ -20,7 +20,7 @@ from palaestra_sim.stub.front.simulator import StubSimulator, read_world
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode
-from palaestra_sim.stub.scene.summary import summary
+from palaestra_sim.stub.scene.summary import silent_devices, summary
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
 log = logging.getLogger(__name__)
@@ -133,6 +133,9 @@ class _Process:
         self._simulator.start()
         for left_out in self._simulator.simulation.scene.left_out:
             log.warning("%s", left_out)
+        silent = silent_devices(self._simulator.simulation)
+        if silent:
+            log.warning("devices without readings, whose enable answers failure: %s", silent)
         log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
         self._loop.later(_CHECK_MASTER_S, self._check_master)
 

@@ -21,14 +21,14 @@ from typing import Any
 from palaestra_sim.errors import SimError
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
-from palaestra_sim.stub.front.services.devices import Outlet, device_services
+from palaestra_sim.stub.front.inputs import inputs
+from palaestra_sim.stub.front.services.devices import Outlet, device_services, services_below
 from palaestra_sim.stub.front.services.robot import RobotServices
 from palaestra_sim.stub.front.services.scene_fields import FieldServices
 from palaestra_sim.stub.front.services.scene_nodes import NodeServices
 from palaestra_sim.stub.front.services.supervisor import SupervisorServices
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
 from palaestra_sim.stub.scene.arguments import Arguments
-from palaestra_sim.stub.scene.devices.pseudo import PSEUDO_DEVICES
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
@@ -61,8 +61,8 @@ class Controller:
             for name, (kind, device) in robot.parts.devices.rows.items()
             if (topics := kind.topics(device))
         }
-        self._pseudo_outlets = [Outlet(node, it.name, it.topics, it.enable) for it in PSEUDO_DEVICES]
-        outlets = (*self._outlets.values(), *self._pseudo_outlets)
+        self._inputs = {it: Outlet(node, it.name, it.topics, it.enable) for it in inputs(robot)}
+        outlets = (*self._outlets.values(), *self._inputs.values())
         self._feeds = tuple(feed for outlet in outlets for feed in outlet.feeds)
         self._clock: Publisher | None = None
         self._basic_ms = self.simulation.basic_step_ms
@@ -129,11 +129,13 @@ class Controller:
 
     def _serve_devices(self) -> None:
         for name, (kind, device) in self.robot.parts.devices.rows.items():
-            self._serve(*device_services(kind, device))
+            self._serve(*device_services(kind, device, self.robot.parts.devices.shafts.get(name)))
             if name in self._outlets:
                 self._serve_outlet(self._outlets[name])
-        for outlet in self._pseudo_outlets:
+        for it, outlet in self._inputs.items():
             self._serve_outlet(outlet)
+            self._serve(*services_below(it.name, it.rows))
+            self._serve(*services_below(f"palaestra/{it.name}", it.own_rows))
 
     def _serve_outlet(self, outlet: Outlet) -> None:
         self._serve(*outlet.services(lambda: self._step_ms))

@@ -45,7 +45,7 @@ class Motor:
         speed_rad_s: of the shaft.
         angle_rad: of the shaft, since the start or the last reset.
         changed: whether a command came since the physics looked; the physics sets it back.
-        position_sensor: the name of the first PositionSensor of its joint, "" if there is none.
+        damping: of the joint, in N m s/rad, set by its brake; 0 without one.
     """
 
     __slots__ = (
@@ -53,7 +53,7 @@ class Motor:
         "angle_rad",
         "available_torque_nm",
         "changed",
-        "position_sensor",
+        "damping",
         "spec",
         "speed_rad_s",
         "target_rad",
@@ -62,7 +62,6 @@ class Motor:
 
     def __init__(self, spec: MotorSpec) -> None:
         self.spec = spec
-        self.position_sensor = ""
         self.reset()
 
     @property
@@ -86,6 +85,7 @@ class Motor:
         self.velocity_rad_s = self.spec.max_velocity_rad_s
         self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
         self.available_torque_nm = self.spec.max_torque_nm
+        self.damping = 0.0
         self.speed_rad_s = 0.0
         self.angle_rad = self.spec.start_rad
         self.changed = True
@@ -124,6 +124,12 @@ class Motor:
         if abs(torque_nm) <= self.spec.max_torque_nm:
             self.available_torque_nm = torque_nm
 
+    def set_damping(self, constant: float) -> None:
+        """Set the damping of the joint. NaN and negative values are ignored."""
+        if constant >= 0.0:
+            self.damping = constant
+            self.changed = True
+
     def demand(self, step_s: float) -> float:
         """Return the speed in rad/s that the motor demands in the next `step_s` seconds."""
         if math.isinf(self.target_rad):
@@ -132,6 +138,9 @@ class Motor:
             limit = abs(self.velocity_rad_s)
             wanted = POSITION_GAIN * (self.target_rad - self.angle_rad)
             wanted = max(-limit, min(limit, wanted))
+        if self.damping:
+            reachable = abs(self.available_torque_nm) / self.damping
+            wanted = max(-reachable, min(reachable, wanted))
         if self.acceleration_rad_s2 < 0.0:
             return wanted
         change = self.acceleration_rad_s2 * step_s

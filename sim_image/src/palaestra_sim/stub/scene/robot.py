@@ -18,6 +18,7 @@ from palaestra_sim.stub.physics.geometry import Vector
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.obstacles import Neighborhood
 from palaestra_sim.stub.physics.rays import Beam, Fan, SlopedBeams, Upright
+from palaestra_sim.stub.scene.battery import Battery
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.devices.kind import Sample, Source
 from palaestra_sim.stub.scene.motion import Motion, Trail, motion_of
@@ -38,6 +39,7 @@ class Robot:
         gauss: returns the next number of the robot's noise, from mean and deviation.
         place: its frame.
         body: None for a robot that only watches.
+        battery: without energy if the robot has none.
     """
 
     def __init__(self, parts: RobotParts, random_seed: int) -> None:
@@ -47,6 +49,8 @@ class Robot:
         self.sensors: Mapping[str, Source] = parts.devices.sensors
         self.place: Place = parts.place
         self.body: Body | None = parts.body
+        self.battery = Battery(parts.node)
+        self._has_battery = self.battery.value >= 0.0
         self.seed = random_seed
         self._random = random.Random()  # noqa: S311 - noise, not secrets
         self.gauss = self._random.gauss
@@ -124,7 +128,10 @@ class Robot:
         return trail.acceleration
 
     def advance(self, step_s: float) -> None:
-        """Move on by one basic step."""
+        """Move on by one basic step; with an empty battery, stand still."""
+        if self._has_battery and self._exhausted(step_s):
+            self.halt()
+            return
         for trail in self._trails:
             trail.begin(step_s)
         if self.body is not None:
@@ -132,8 +139,13 @@ class Robot:
         for motor in self._stray_motors:
             motor.advance(step_s)
 
+    def _exhausted(self, step_s: float) -> bool:
+        self.battery.drain(step_s)
+        return self.battery.empty
+
     def reset(self) -> None:
-        """Return to the start of the world file: pose, rest, motors, noise. customData stays."""
+        """Return to the start of the world file: pose, rest, motors, battery, noise. customData stays."""
+        self.battery.reset()
         self.place.return_to_start()
         for motor in self.motors.values():
             motor.reset()

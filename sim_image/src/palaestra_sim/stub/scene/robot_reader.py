@@ -20,7 +20,7 @@ from palaestra_sim.stub.physics.obstacles import Disc
 from palaestra_sim.stub.physics.outline import RoundPart, discs_of_box
 from palaestra_sim.stub.scene.arguments import Arguments, read_arguments
 from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.stub.scene.devices.kind import Devices, Kind, Part
+from palaestra_sim.stub.scene.devices.kind import Devices, Kind, Part, Shaft
 from palaestra_sim.stub.scene.joints import Joint, JointPlace, unit
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place, RobotPlace
@@ -30,7 +30,6 @@ from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
 _INERT: Final = frozenset(("Shape", "CadShape", "DirectionalLight", "PointLight", "SpotLight", "Slot"))
 _MOUNTED: Final = {name: kind for name, kind in DEVICES.items() if not kind.on_joint}
 _ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joint}
-_MOTORS: Final = frozenset(("RotationalMotor", "LinearMotor"))
 _FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid"}
 _JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
 _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
@@ -121,8 +120,6 @@ class _RobotReader:
     def read(self) -> RobotParts:
         """Return the robot."""
         reading, node = self._reading, self._node
-        if node.numbers("battery"):
-            self._lacks(node, "a Robot with a battery, which would never run down")
         self._outline += bounding_shapes(reading, node, self._frame)
         self._read_children(node, self._frame)
         wheels = self._wheels()
@@ -302,21 +299,20 @@ class _RobotReader:
         self, node: SceneNode, parameters: SceneNode, place: Place, joint: Joint
     ) -> Motor | None:
         stops = [self._reading.number(parameters, name, 0.0) for name in ("minStop", "maxStop")]
-        motor: Motor | None = None
-        # Motors first: a sensor belongs to the motor of its joint, wherever that is in the list.
-        for device in sorted(node.nodes("device"), key=lambda device: device.type_name not in _MOTORS):
+        shaft = Shaft(slides=joint.slides)
+        for device in node.nodes("device"):
             kind = _ON_JOINTS.get(device.type_name)
             if kind is None:
                 self._lacks(device, f"the stub simulates no {device.type_name}")
                 continue
-            found = self._read_device(kind, device, place, motor)
-            if isinstance(found, Motor) and motor is None:
-                motor = found
-                motor.join(joint.start, (stops[0], stops[1]))
-        return motor
+            found = self._read_device(kind, device, place, shaft)
+            if isinstance(found, Motor) and shaft.motor is None:
+                shaft.motor = found
+                found.join(joint.start, (stops[0], stops[1]))
+        return shaft.motor
 
     def _read_device(
-        self, kind: Kind[Any], node: SceneNode, place: Place, motor: Motor | None = None
+        self, kind: Kind[Any], node: SceneNode, place: Place, shaft: Shaft | None = None
     ) -> object:
         """Return the device at `node`, now one of the robot's."""
         name = node.text("name") or kind.name
@@ -326,7 +322,7 @@ class _RobotReader:
             node=node,
             name=name,
             place=place,
-            motor=motor,
+            shaft=shaft,
             outline=self._outline,
         )
         device: object = kind.read(part)
@@ -336,6 +332,9 @@ class _RobotReader:
             self._reading.refuse(node, f"a second device {name!r}", "give it its own name")
         self._devices.rows[name] = kind, device
         self._devices.nodes[name] = node
+        if shaft is not None:
+            self._devices.shafts[name] = shaft
+            shaft.names.setdefault(kind.role, name)
         return device
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from palaestra_sim.errors import refusal
+from palaestra_sim.stub.scene.devices.kind import never
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Simulation
 
@@ -23,10 +24,26 @@ def summary(simulation: Simulation) -> Iterator[str]:
     stand_ins = Counter(node.proto_name for node in simulation.tree.nodes if node.stand_in)
     if stand_ins:
         yield f"stand-ins, which stand still: {_counted(stand_ins)}"
+    silent = silent_devices(simulation)
+    if silent:
+        yield f"devices without readings, whose enable answers failure: {silent}"
     error = refusal(simulation.scene.left_out)
     if error is not None:
         yield "cannot be simulated; --leave-out leaves it out:"
         yield from str(error).splitlines()
+
+
+def silent_devices(simulation: Simulation) -> str:
+    """Return how many devices have no readings here, by type; "" if all have."""
+    return _counted(
+        Counter(
+            kind.node
+            for robot in simulation.robots
+            if robot.parts.arguments is not None
+            for kind, _ in robot.parts.devices.rows.values()
+            if kind.enable is never
+        )
+    )
 
 
 def _of_robot(robot: Robot) -> Iterator[str]:

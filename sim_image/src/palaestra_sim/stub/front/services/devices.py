@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from palaestra_sim.stub.scene.devices.kind import Device, Enable, Kind, Source, Topic
+from palaestra_sim.stub.scene.devices.kind import ROLES, Device, Enable, Kind, Shaft, Source, Topic
 from palaestra_sim.stub.scene.nodes.types import type_number
 from palaestra_sim.stub.seam import Fields, Node, Publisher, Row, Service, topic_name
 
@@ -20,6 +20,7 @@ class Feed:
 
     Attributes:
         reading: the field of the value; "" is the last one.
+        many: whether the value is a sequence, with a message for each of its items.
         publishers: by period in ms.
     """
 
@@ -28,6 +29,7 @@ class Feed:
     template: Fields
     source: Source | None
     reading: str = ""
+    many: bool = False
     publishers: dict[int, Publisher] = field(default_factory=dict)
 
     def begin(self, node: Node, period_ms: int) -> None:
@@ -50,7 +52,10 @@ class Feed:
             return
         for period_ms, publisher in self.publishers.items():
             if elapsed_ms % period_ms == 0:
-                if self.reading:
+                if self.many:
+                    for value in source.value:
+                        publisher.send_value(value)
+                elif self.reading:
                     publisher.send_stamped({self.reading: source.value})
                 else:
                     publisher.send_value(source.value)
@@ -67,7 +72,9 @@ class Outlet:
         path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
         self.feeds = tuple(
-            Feed(f"{path}/{it.name}", it.type_name, {**header, **it.constants}, it.source, it.reading)
+            Feed(
+                f"{path}/{it.name}", it.type_name, {**header, **it.constants}, it.source, it.reading, it.many
+            )
             for it in topics
         )
         self._node = node
@@ -108,15 +115,30 @@ class Outlet:
         )
 
 
-def device_services(kind: Kind[Any], device: Device) -> tuple[Service, ...]:
-    """Return the services of a device beside `enable` and `get_sampling_period`."""
+def device_services(kind: Kind[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:
+    """Return the services of a device beside `enable` and `get_sampling_period`; `shaft` is its joint."""
     rows: tuple[Row, ...] = (
         ("get_model", "get_string", lambda _: {"value": device.model}),
         ("get_name", "get_string", lambda _: {"value": device.name}),
         ("get_node_type", "get_int", lambda _: {"value": type_number(kind.node)}),
     )
-    path = topic_name(device.name)
+    return services_below(topic_name(device.name), (*rows, *kind.services(device), *_neighbors(kind, shaft)))
+
+
+def services_below(path: str, rows: Iterable[Row]) -> tuple[Service, ...]:
+    """Return the services of a table, with their paths below `path`."""
     return tuple(
-        Service(f"{path}/{name}", f"webots_ros/{type_name}", handler)
-        for name, type_name, handler in (*rows, *kind.services(device))
+        Service(f"{path}/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
+    )
+
+
+def _neighbors(kind: Kind[Any], shaft: Shaft | None) -> tuple[Row, ...]:
+    """Return the services that answer the names of the other devices of a joint."""
+    if shaft is None:
+        return ()
+    names = shaft.names
+    return tuple(
+        (f"get_{role}_name", "get_string", lambda _, role=role: {"value": names.get(role, "")})
+        for role in ROLES
+        if role != kind.role
     )

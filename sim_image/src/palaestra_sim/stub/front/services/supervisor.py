@@ -6,7 +6,7 @@ There is no rendering here, so pictures, movies and animations fail, as in Webot
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
@@ -16,6 +16,8 @@ from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.stub.seam import Service
 
 Fields = dict[str, Any]
+
+_HEADSET: Final = "virtual_reality_headset"
 
 
 class SupervisorServices:
@@ -51,6 +53,9 @@ class SupervisorServices:
                 ("movie_failed", "node_get_status", self._movie_failed),
                 ("movie_is_ready", "node_get_status", _movie_is_ready),
                 ("set_label", "supervisor_set_label", _accept),
+                (f"{_HEADSET}_is_used", "get_bool", _refuse_get),
+                (f"{_HEADSET}_get_position", f"supervisor_{_HEADSET}_get_position", _no_headset),
+                (f"{_HEADSET}_get_orientation", f"supervisor_{_HEADSET}_get_orientation", _no_headset),
                 ("get_root", "get_uint64", self._get_root),
                 ("get_self", "get_uint64", self._get_self),
                 ("get_selected", "get_uint64", _nothing_selected),
@@ -125,6 +130,10 @@ def _refuse(_request: Any) -> Fields:
 
 def _refuse_get(_request: Any) -> Fields:
     return {"value": False}
+
+
+def _no_headset(_request: Any) -> Fields:
+    raise ServiceFailed("no virtual-reality headset is used; virtual_reality_headset_is_used answers so")
 
 
 def _movie_is_ready(_request: Any) -> Fields:

@@ -6,12 +6,14 @@ follows from the topic. A new device is one file in this package and one line in
 has the steps.
 
 - `kind`: what a row is
-- `distance_sensor`, `touch_sensor`, `position_sensor`, `rotational_motor`: the rows of what wheels need
+- `distance_sensor`, `touch_sensor`: the rows of what feels obstacles
+- `motors`, `brake`, `position_sensor`: the rows of joints
 - `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: the rows of what measures place and motion
 - `altimeter`, `light_sensor`: the rows of what measures the surroundings
+- `led`: a row that only keeps what a program sets
+- `camera`, `range_finder`, `radar`: rows that answer their settings, and that nothing enables
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
-- `pseudo`: battery, keyboard and joystick, which every robot has
 """
 
 from __future__ import annotations
@@ -21,15 +23,20 @@ from typing import Any, Final
 
 from palaestra_sim.stub.scene.devices.accelerometer import ACCELEROMETER
 from palaestra_sim.stub.scene.devices.altimeter import ALTIMETER
+from palaestra_sim.stub.scene.devices.brake import BRAKE
+from palaestra_sim.stub.scene.devices.camera import CAMERA
 from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.gps import GPS
 from palaestra_sim.stub.scene.devices.gyro import GYRO
 from palaestra_sim.stub.scene.devices.inertial_unit import INERTIAL_UNIT
 from palaestra_sim.stub.scene.devices.kind import Kind
+from palaestra_sim.stub.scene.devices.led import LED
 from palaestra_sim.stub.scene.devices.light_sensor import LIGHT_SENSOR
+from palaestra_sim.stub.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
 from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
-from palaestra_sim.stub.scene.devices.rotational_motor import ROTATIONAL_MOTOR
+from palaestra_sim.stub.scene.devices.radar import RADAR
+from palaestra_sim.stub.scene.devices.range_finder import RANGE_FINDER
 from palaestra_sim.stub.scene.devices.touch_sensor import TOUCH_SENSOR
 
 # By the type of the node. Robots sample in this order, so a new row goes to the end: a row in between would
@@ -48,5 +55,11 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         INERTIAL_UNIT,
         ALTIMETER,
         LIGHT_SENSOR,
+        LED,
+        LINEAR_MOTOR,
+        BRAKE,
+        CAMERA,
+        RANGE_FINDER,
+        RADAR,
     )
 }

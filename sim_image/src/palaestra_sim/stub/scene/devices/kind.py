@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 from palaestra_sim.stub.physics.body import Body
 from palaestra_sim.stub.physics.geometry import Vector
@@ -38,6 +38,29 @@ class Device(Protocol):
 DeviceT = TypeVar("DeviceT", bound=Device)
 
 
+ROLES: Final = ("motor", "brake", "position_sensor")  # of the devices of a joint
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Shaft:
+    """A joint, for the devices on it.
+
+    Attributes:
+        slides: whether it is a slider, not a hinge.
+        motor: the first motor on it.
+        names: of the first device of each role.
+    """
+
+    slides: bool = False
+    motor: Motor | None = None
+    names: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def type_number(self) -> int:
+        """What `get_type` of its devices answers: 0 for a hinge, 1 for a slider."""
+        return int(self.slides)
+
+
 @dataclass(slots=True, kw_only=True)
 class Part:
     """The node of a device, while its robot is read.
@@ -48,7 +71,7 @@ class Part:
         node: of the device.
         name: as the world file has it, else the default of its type.
         place: its frame in the robot's; of a device on a joint, the frame of the joint.
-        motor: of the joint that it is on.
+        shaft: the joint that it is a device of.
         outline: the shapes with which the robot runs into things.
     """
 
@@ -57,7 +80,7 @@ class Part:
     lacks: Callable[[SceneNode, str], None]
     name: str
     place: Place
-    motor: Motor | None
+    shaft: Shaft | None
     outline: list[Shape]
 
     def number(self, name: str, default: float) -> float:
@@ -67,6 +90,10 @@ class Part:
     def text(self, name: str, default: str = "") -> str:
         """Return the text of a field, `default` if it has none."""
         return self.node.text(name) or default
+
+    def inner(self, name: str) -> SceneNode | None:
+        """Return the node in a field; None if it is NULL."""
+        return next(iter(self.node.nodes(name)), None)
 
     def world_numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
         """Return the numbers of a field of WorldInfo; `default` if it is absent or refused."""
@@ -130,13 +157,12 @@ class Carrier(Protocol):
 
 
 class Source(Protocol):
-    """Holds a value that a topic publishes: a sensor, or a part of one.
+    """Holds a value that a topic publishes: a sensor, or a part of one."""
 
-    Attributes:
-        value: of the last step; a number, or as many as the last field of the message has.
-    """
-
-    value: Any
+    @property
+    def value(self) -> Any:
+        """Of the last step: a number, or as many as the last field of the message has."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,6 +175,7 @@ class Topic:
         source: of the reading; None if it never has one.
         constants: the other fields.
         reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
+        many: whether `value` is a sequence, with a message for each of its items.
     """
 
     name: str
@@ -156,6 +183,7 @@ class Topic:
     source: Source | None
     constants: Fields = field(default_factory=dict)
     reading: str = ""
+    many: bool = False
 
 
 Sample = Callable[[], None]
@@ -167,6 +195,11 @@ def whole_steps(period_ms: int, step_ms: int) -> bool:
     return period_ms % step_ms == 0
 
 
+def never(_period_ms: int, _step_ms: int) -> bool:
+    """Accept no period: Webots publishes readings of this device, and the stub has none."""
+    return False
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind(Generic[DeviceT]):
     """A row of the table: one type of device.
@@ -175,11 +208,11 @@ class Kind(Generic[DeviceT]):
         node: the type of its node.
         name: of a device whose node has none.
         fields: of the node, written as in `catalogue`, beside `name` and, off joints, those of a Solid.
-        on_joint: whether it is a device of a joint; otherwise it has a frame of its own on the robot.
+        role: one of `ROLES` for a device of a joint; "" for one with a frame of its own on the robot.
         read: returns the device of a node.
         sampler: returns a function that gives devices of one robot their values; None: they have none.
-        services: returns those beside `get_model`, `get_name`, `get_node_type` and, with topics, `enable` and
-            `get_sampling_period`.
+        services: returns those beside `get_model`, `get_name`, `get_node_type`; on joints, the names of the
+            others of the joint; and, with topics, `enable` and `get_sampling_period`.
         topics: returns those that `enable` begins to publish.
         enable: whether a period is accepted; 0, which ends publishing, always is.
     """
@@ -187,12 +220,17 @@ class Kind(Generic[DeviceT]):
     node: str
     name: str
     fields: str
-    on_joint: bool = False
+    role: str = ""
     read: Callable[[Part], DeviceT]
     sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
     services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
     topics: Callable[[DeviceT], tuple[Topic, ...]] = lambda _: ()
     enable: Enable = whole_steps
+
+    @property
+    def on_joint(self) -> bool:
+        """Whether it is a device of a joint."""
+        return bool(self.role)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -202,10 +240,12 @@ class Devices:
     Attributes:
         rows: each with its row of the table.
         nodes: their nodes.
+        shafts: of those on joints.
     """
 
     rows: dict[str, tuple[Kind[Any], Any]] = field(default_factory=dict)
     nodes: dict[str, SceneNode] = field(default_factory=dict)
+    shafts: dict[str, Shaft] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:

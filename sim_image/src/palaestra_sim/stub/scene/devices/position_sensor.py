@@ -1,4 +1,4 @@
-"""PositionSensor: the angle of a joint's shaft."""
+"""PositionSensor: the angle of a hinge, or the length of a slider."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.stub.physics.motors import Motor
-from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Shaft, Topic
 from palaestra_sim.stub.scene.devices.response import discrete
+from palaestra_sim.stub.seam import Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class PositionSensor:
-    """The angle in radians of a motor's shaft; a joint without a motor stays at 0."""
+    """The position of a joint in rad, of a slider in m; a joint without a motor stays at 0."""
 
     name: str
-    motor: Motor | None
+    shaft: Shaft
     resolution: float
     noise: float
     model: str = ""
@@ -25,11 +25,9 @@ class PositionSensor:
 
 
 def _read(part: Part) -> PositionSensor:
-    if part.motor is not None and not part.motor.position_sensor:
-        part.motor.position_sensor = part.name
     return PositionSensor(
         name=part.name,
-        motor=part.motor,
+        shaft=part.shaft or Shaft(),
         resolution=part.number("resolution", -1.0),
         noise=part.number("noise", 0.0),
     )
@@ -40,12 +38,17 @@ def _sampler(sensors: Sequence[PositionSensor], robot: Carrier) -> Sample:
 
     def sample() -> None:
         for sensor in sensors:
-            angle_rad = sensor.motor.angle_rad if sensor.motor is not None else 0.0
+            motor = sensor.shaft.motor
+            angle_rad = motor.angle_rad if motor is not None else 0.0
             if sensor.noise:
                 angle_rad += sensor.noise * gauss(0.0, 1.0)
             sensor.value = discrete(angle_rad, sensor.resolution)
 
     return sample
+
+
+def _services(sensor: PositionSensor) -> tuple[Row, ...]:
+    return (("get_type", "get_int", lambda _: {"value": sensor.shaft.type_number}),)
 
 
 def _topics(sensor: PositionSensor) -> tuple[Topic, ...]:
@@ -56,8 +59,9 @@ POSITION_SENSOR: Final = Kind(
     node="PositionSensor",
     name="position sensor",
     fields="noise SFFloat 0; resolution SFFloat -1",
-    on_joint=True,
+    role="position_sensor",
     read=_read,
     sampler=_sampler,
+    services=_services,
     topics=_topics,
 )

@@ -67,7 +67,7 @@ def _is_drawn_only(node: SceneNode, field: str) -> bool:
 
 
 def _reaches_robot(node: SceneNode, field: str) -> bool:
-    return node.type_name == "Robot" and field == "customData"
+    return node.type_name == "Robot" and field in {"battery", "customData"}
 
 
 def _moves(node: SceneNode, field: str) -> bool:

@@ -133,6 +133,8 @@ class Field:
                 return [place.rotation]
             if self.name == "customData":
                 return [self.node.text("customData") or ""]
+            if self.name == "battery":
+                return list(self.node.numbers("battery") or ())
         return self._values
 
     def _take_effect(self) -> None:

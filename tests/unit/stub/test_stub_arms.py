@@ -1,0 +1,177 @@
+"""Joints with motors, brakes and sensors, and the devices that only keep what a program sets."""
+
+import math
+
+import pytest
+
+from palaestra_sim.stub.scene.simulation import Simulation
+
+STEP_MS = 32
+LIFT = """SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop 0 maxStop 0.2 }
+  device [ PositionSensor { name "height" } Brake { name "grip" } LinearMotor { name "lift" maxForce 20 } ]
+  endPoint Solid { children [ GPS { name "top" } ] } }"""
+WRIST = """HingeJoint { device [
+  RotationalMotor { name "wrist" maxTorque 6 } Brake { name "band" } PositionSensor { name "turn" } ]
+  endPoint Solid { } }"""
+CAMERA = """Camera { name "eye" width 320 height 200 focus Focus { focalDistance 1 maxFocalDistance 2 }
+  zoom Zoom { minFieldOfView 0.2 maxFieldOfView 1.2 } recognition Recognition { segmentation TRUE } }"""
+
+
+@pytest.fixture
+def load(world, simple_robot):
+    """`load(part)`: a simulation whose robot has that part."""
+    return lambda part: Simulation.load(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
+
+
+@pytest.fixture
+def robot_with(start, world, simple_robot, ros):
+    """`robot_with(part)`: the node of a robot that has that part."""
+
+    def begin(part):
+        start(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
+        return ros.node("robotino")
+
+    return begin
+
+
+def test_a_linear_motor_lifts_what_is_on_its_slider_as_far_as_the_stop(load):
+    """Lengths are in meters: 0.1 m/s for 0.32 s, then on to the stop at 0.2 m."""
+    simulation = load(LIFT)
+    (robot,) = simulation.robots
+    start = robot.sensors["top"]
+    simulation.step(STEP_MS)
+    low = start.value[2]
+    robot.motors["lift"].set_position(math.inf)
+    robot.motors["lift"].set_velocity(0.1)
+
+    simulation.step(10 * STEP_MS)
+    assert robot.sensors["height"].value == pytest.approx(0.032)
+    assert robot.sensors["top"].value[2] - low == pytest.approx(0.032)
+    simulation.step(100 * STEP_MS)
+    assert robot.sensors["height"].value == pytest.approx(0.2)
+
+
+def test_a_linear_motor_has_services_for_force_and_none_for_torque(robot_with):
+    """The advertised set depends on the kind of motor; `get_type` answers 1."""
+    robot = robot_with(LIFT)
+
+    assert robot.get("lift/get_type") == 1
+    assert robot.get("lift/get_max_force") == 20.0
+    assert robot.get("lift/force_feedback_sensor/get_sampling_period") == 0
+    assert robot.get("lift/force_feedback_sensor/enable", value=32) is False
+    assert "lift/set_torque" not in robot.services
+
+
+def test_the_devices_of_a_joint_know_each_other_by_name(robot_with):
+    """In whatever order the world has them; "" for one that a joint lacks."""
+    robot = robot_with(LIFT)
+
+    assert robot.get("lift/get_brake_name") == "grip"
+    assert robot.get("lift/get_position_sensor_name") == "height"
+    assert robot.get("grip/get_motor_name") == "lift"
+    assert robot.get("grip/get_position_sensor_name") == "height"
+    assert robot.get("height/get_motor_name") == "lift"
+    assert robot.get("height/get_brake_name") == "grip"
+    assert robot.get("grip/get_type") == robot.get("height/get_type") == 1
+    assert robot.get("wheel0_joint/get_brake_name") == ""
+    assert robot.get("wheel0_joint_sensor/get_type") == 0
+
+
+def test_a_brake_limits_the_speed_that_a_motor_reaches(robot_with):
+    """6 N m against 3 N m s/rad are 2 rad/s; without the brake it turns at 5 rad/s again."""
+    robot = robot_with(WRIST)
+    angles = robot.inbox("turn/value")
+    robot.call("turn/enable", value=STEP_MS)
+    robot.call("wrist/set_position", value=math.inf)
+    robot.call("wrist/set_velocity", value=5.0)
+
+    robot.call("robot/time_step", value=STEP_MS)
+    for constant in (3.0, 0.0, -1.0):
+        assert robot.get("band/set_damping_constant", value=constant) is True
+        robot.call("robot/time_step", value=STEP_MS)
+
+    speeds = [(after - before) / 0.032 for before, after in zip([0.0, *angles], angles, strict=False)]
+    assert speeds == pytest.approx([5.0, 2.0, 5.0, 5.0])
+
+
+def test_a_brake_slows_a_driven_wheel(load):
+    """The motors of wheels turn with the body, and the rule is the same."""
+    simulation = load("")
+    (robot,) = simulation.robots
+    for motor in robot.motors.values():
+        motor.set_position(math.inf)
+        motor.set_velocity(5.0)
+        motor.set_damping(motor.available_torque_nm)
+
+    simulation.step(50 * STEP_MS)
+
+    assert [motor.speed_rad_s for motor in robot.motors.values()] == pytest.approx([1.0] * 3)
+
+
+def test_an_led_keeps_its_state(robot_with):
+    """Nobody sees it, but a program reads it back."""
+    robot = robot_with('LED { name "lamp" color [ 1 0 0, 0 1 0 ] }')
+
+    assert robot.get("lamp/get_led") == 0
+    assert robot.get("lamp/set_led", value=2) is True
+    assert robot.get("lamp/get_led") == 2
+    assert "lamp/enable" not in robot.services
+
+
+def test_a_camera_answers_its_settings_and_fails_to_see(robot_with):
+    """A success of `enable` would leave a client waiting for images."""
+    robot = robot_with(CAMERA)
+
+    info = robot.call("eye/get_info")
+    assert (info.width, info.height, info.Fov) == (320, 200, 0.7854)
+    assert robot.get("eye/enable", value=32) is False
+    assert robot.get("eye/enable", value=0) is True
+    assert robot.get("eye/get_sampling_period") == 0
+    assert robot.get("eye/save_image", filename="eye.png", quality=90) == 0
+    assert robot.get("eye/has_recognition") is True
+    assert robot.get("eye/recognition_has_segmentation") is True
+    assert robot.get("eye/recognition_enable", value=32) is False
+
+
+def test_a_camera_zooms_and_focuses_within_its_limits(robot_with):
+    """The answer is success for every value, as in the controller; one beyond the limits changes nothing."""
+    robot = robot_with(CAMERA)
+
+    for fov in (1.0, 1.3):
+        assert robot.get("eye/set_fov", value=fov) is True
+    for distance in (1.5, 2.5):
+        assert robot.get("eye/set_focal_distance", value=distance) is True
+    assert robot.get("eye/set_exposure", value=2.0) is True
+
+    assert robot.call("eye/get_info").Fov == 1.0
+    assert robot.call("eye/get_zoom_info").maxFov == 1.2
+    assert robot.call("eye/get_focus_info").focalDistance == 1.5
+    assert robot.get("eye/get_exposure") == 2.0
+
+
+def test_a_camera_without_zoom_and_focus_stays_as_it_is(robot_with):
+    """And it has no services for recognition."""
+    robot = robot_with('Camera { name "eye" }')
+
+    robot.call("eye/set_fov", value=1.0)
+    robot.call("eye/set_focal_distance", value=1.0)
+
+    assert robot.call("eye/get_info").Fov == robot.call("eye/get_zoom_info").minFov == 0.7854
+    assert robot.call("eye/get_focus_info").focalDistance == 0.0
+    assert "eye/recognition_enable" not in robot.services
+
+
+@pytest.mark.parametrize(
+    ("part", "service", "expected"),
+    [
+        ('RangeFinder { name "it" maxRange 3 }', "get_info", {"maxRange": 3.0, "width": 64}),
+        ('Radar { name "it" }', "get_max_range", {"value": 50.0}),
+    ],
+)
+def test_a_range_finder_and_a_radar_answer_their_settings_alone(robot_with, part, service, expected):
+    """Like a camera."""
+    robot = robot_with(part)
+    answer = robot.call(f"it/{service}")
+
+    assert {name: getattr(answer, name) for name in expected} == expected
+    assert robot.get("it/enable", value=32) is False
