@@ -11,6 +11,7 @@ from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_protocol.ros.tcpros import FrameReader, decode_header, encode_header, frame
 from palaestra_sim.stub.ros import LATER
 from palaestra_trainer.ros import Master
+from tests.waiting import eventually
 
 ASK = b"\x01"
 
@@ -114,6 +115,18 @@ def test_a_wrong_header_is_answered_with_an_error(dial, header, fact):
 
     assert answer["error"] == fact
     assert connection.recv(1) == b""
+
+
+def test_rosnode_info_lists_what_a_node_publishes_and_to_whom(peer, dial):
+    """`getPublications` and `getBusInfo`, as every roscpp node answers them."""
+    topic = f"/{peer.name}/ir1/value"
+    connection, _ = dial(topic=topic, md5sum="*")
+    with slave_api(peer) as node:
+        assert node.getPublications("/raw")[2] == [[topic, "sensor_msgs/Range"]]
+        assert node.getBusInfo("/raw")[2] == [[1, "/raw", "o", "TCPROS", topic, True]]
+
+        connection.close()
+        eventually(lambda: node.getBusInfo("/raw")[2] == [])
 
 
 def test_noise_on_the_port_disturbs_nobody(peer, dial):

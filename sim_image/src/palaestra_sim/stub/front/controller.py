@@ -18,21 +18,21 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from palaestra_sim.errors import SimError
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.front.inputs import inputs
 from palaestra_sim.stub.front.services.devices import Outlet, device_services, services_below
+from palaestra_sim.stub.front.services.logs import NodeLog
 from palaestra_sim.stub.front.services.robot import RobotServices
 from palaestra_sim.stub.front.services.scene_fields import FieldServices
 from palaestra_sim.stub.front.services.scene_nodes import NodeServices
 from palaestra_sim.stub.front.services.supervisor import SupervisorServices
-from palaestra_sim.stub.ros.node import LATER, ServiceFailed
+from palaestra_sim.stub.ros.node import LATER
 from palaestra_sim.stub.scene.arguments import Arguments
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
-from palaestra_sim.stub.seam import Handler, Node, Publisher, Service
+from palaestra_sim.stub.seam import Node, Publisher, Service
 
 _MODEL_NAME = "/model_name"
 _CLOCK = "/clock"
@@ -64,6 +64,7 @@ class Controller:
         self._inputs = {it: Outlet(node, it.name, it.topics, it.enable) for it in inputs(robot)}
         outlets = (*self._outlets.values(), *self._inputs.values())
         self._feeds = tuple(feed for outlet in outlets for feed in outlet.feeds)
+        self._log = NodeLog(node)
         self._clock: Publisher | None = None
         self._basic_ms = self.simulation.basic_step_ms
         self._step_ms = self._basic_ms  # of the last accepted time_step
@@ -82,6 +83,8 @@ class Controller:
         """Advertise everything, `robot/get_device_list` last."""
         node = self.node
         node.blocked = lambda: self.blocked
+        self._log.open()
+        self._serve(*self._log.table())
         model_name = node.advertise(_MODEL_NAME, "std_msgs/String", latched=True)
         model_name.send({"data": node.name})
         if self._arguments.clock:
@@ -125,7 +128,7 @@ class Controller:
 
     def _serve(self, *services: Service) -> None:
         for path, type_name, handler in services:
-            self.node.serve(path, type_name, _reporting_errors(handler))
+            self.node.serve(path, type_name, self._log.reporting(path, handler))
 
     def _serve_devices(self) -> None:
         for name, (kind, device) in self.robot.parts.devices.rows.items():
@@ -191,15 +194,3 @@ class Controller:
             self._paced_until_s = max(self._paced_until_s, owed_s) + self._asked_ms / 1000.0
             delay_s = max(delay_s, self._paced_until_s - now_s)
         return delay_s
-
-
-def _reporting_errors(handler: Handler) -> Handler:
-    """Return the handler with our errors turned into failures that the client receives."""
-
-    def handle(request: Any) -> Any:
-        try:
-            return handler(request)
-        except SimError as error:
-            raise ServiceFailed(str(error)) from error
-
-    return handle

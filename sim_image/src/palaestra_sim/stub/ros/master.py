@@ -13,7 +13,7 @@ import threading
 import xmlrpc.client
 from collections.abc import Callable
 from socketserver import ThreadingMixIn
-from typing import Any
+from typing import Any, Protocol
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 _OK = 1
@@ -84,12 +84,24 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
     daemon_threads = True
 
 
+class Bus(Protocol):
+    """What a node publishes, and to whom; asked in another thread."""
+
+    def publications(self) -> list[list[str]]:
+        """Return name and type of each topic."""
+        ...
+
+    def connections(self) -> list[list[Any]]:
+        """Return an entry of `getBusInfo` for each subscriber that is connected."""
+        ...
+
+
 class SlaveApi:
     """Answers the master, subscribers and tools on behalf of one node.
 
     Args:
         host: the name under which others reach this machine.
-        has_topic: whether the node publishes a topic of that full name.
+        bus: the topics that the node publishes, and their subscribers.
         tcpros_port: where the node's TCPROS listener is.
         on_shutdown: called in another thread when the master asks the node to end.
     """
@@ -99,13 +111,13 @@ class SlaveApi:
         host: str,
         master_uri: str,
         tcpros_port: int,
-        has_topic: Callable[[str], bool],
+        bus: Bus,
         on_shutdown: Callable[[str], None],
     ) -> None:
         self._host = host
         self._master_uri = master_uri
         self._port = tcpros_port
-        self._has_topic = has_topic
+        self._bus = bus
         self._on_shutdown = on_shutdown
         self._server = _Server((bind_address(host), 0), _RequestHandler, logRequests=False, allow_none=True)
         for name, answer in self._answers().items():
@@ -126,16 +138,16 @@ class SlaveApi:
             "getPid": lambda _caller: [_OK, "", os.getpid()],
             "getMasterUri": lambda _caller: [_OK, "", self._master_uri],
             "getBusStats": lambda _caller: [_OK, "", [[], [], []]],
-            "getBusInfo": lambda _caller: [_OK, "", []],
+            "getBusInfo": lambda _caller: [_OK, "", self._bus.connections()],
             "getSubscriptions": lambda _caller: [_OK, "", []],
-            "getPublications": lambda _caller: [_OK, "", []],
+            "getPublications": lambda _caller: [_OK, "", self._bus.publications()],
             "publisherUpdate": lambda _caller, _topic, _publishers: [_OK, "", 0],
             "paramUpdate": lambda _caller, _key, _value: [_OK, "", 0],
             "shutdown": self._shutdown,
         }
 
     def _request_topic(self, _caller: str, topic: str, _protocols: list[Any]) -> list[Any]:
-        if not self._has_topic(topic):
+        if all(topic != name for name, _ in self._bus.publications()):
             return [_FAILED, f"this node does not publish {topic}", 0]
         return [_OK, "", ["TCPROS", self._host, self._port]]
 

@@ -49,13 +49,15 @@ class RosNode:
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, Topic] = {}
         self._links: set[Connection] = set()
+        self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
+        self._connected = 0
         self._waiting: deque[tuple[ServiceEnd, bytes]] = deque()
         host = host_name()
         self._listener = socket.create_server((bind_address(host), 0), backlog=_BACKLOG)
         self._listener.setblocking(False)
         port = self._listener.getsockname()[1]
         self._rosrpc = f"rosrpc://{host}:{port}"
-        self._slave = SlaveApi(host, master_uri, port, self._topics.__contains__, self._asked_to_end)
+        self._slave = SlaveApi(host, master_uri, port, self, self._asked_to_end)
         loop.watch(self._listener, self._accept)
 
     def resolve(self, path: str) -> str:
@@ -164,6 +166,14 @@ class RosNode:
         """
         self._master.call("getPid")
 
+    def publications(self) -> list[list[str]]:
+        """Return name and type of each topic, for `getPublications`."""
+        return [[topic.name, topic.type.name] for topic in tuple(self._topics.values())]
+
+    def connections(self) -> list[list[Any]]:
+        """Return number, subscriber, direction, transport and topic of each, for `getBusInfo`."""
+        return list(self._subscribers.values())
+
     def on_end(self, callback: Callable[[str], None]) -> None:
         """Set the function to call with the reason when this node is asked to end.
 
@@ -222,11 +232,15 @@ class RosNode:
                 }
             )
         )
+        self._connected += 1
+        caller = header.get("callerid", "")
+        self._subscribers[link] = [self._connected, caller, "o", "TCPROS", topic.name, True]
         return topic.connect(link, self.dropped)
 
     def dropped(self, link: Connection) -> None:
         """Forget a connection that is closed."""
         self._links.discard(link)
+        self._subscribers.pop(link, None)
 
 
 def _check_md5(header: Mapping[str, str], type_name: str, md5: str) -> None:

@@ -1,0 +1,35 @@
+"""The log of a controller: `/rosout` and the level, as every roscpp node has them."""
+
+import pytest
+
+from palaestra_sim.stub.ros.node import ServiceFailed
+
+
+def test_a_refusal_is_logged(robot):
+    """A person who runs `rqt_console` sees what a client did wrong."""
+    inbox = robot.inbox("/rosout")
+    with pytest.raises(ServiceFailed):
+        robot.call("wheel0_joint/set_torque", value=1.0)
+
+    (message,) = inbox
+    assert message["name"] == "/robotino"
+    assert message["level"] == 8
+    assert message["msg"].startswith("wheel0_joint/set_torque: the stub simulates no torques")
+    assert message["header"]["stamp"]["secs"] > 0
+
+
+def test_a_higher_level_silences_it(robot):
+    """`rosservice call /robotino/set_logger_level ros fatal`."""
+    inbox = robot.inbox("/rosout")
+    robot.call("set_logger_level", logger="ros", level="FATAL")
+    with pytest.raises(ServiceFailed):
+        robot.call("wheel0_joint/set_torque", value=1.0)
+
+    assert inbox == []
+    assert ("ros", "fatal") in [tuple(it) for it in robot.get("get_loggers")]
+
+
+def test_an_unknown_level_is_refused(robot):
+    """With those that there are."""
+    with pytest.raises(ServiceFailed, match="no level 'loud'; use debug, info, warn, error, fatal"):
+        robot.call("set_logger_level", logger="ros", level="loud")
