@@ -144,6 +144,21 @@ def test_a_mistake_is_refused_even_if_everything_may_be_left_out():
         load_world("Solid { translation 1 2 }", leave_out=LeaveOut(everything=True))
 
 
+def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
+    """People save worlds in which crates have tumbled by a few degrees; the shape is simple anyway."""
+    (shape,) = load_world("CardboardBox { size 0.6 0.4 0.5 rotation 1 0 0 0.1 }").scene.solids
+    outline = shape.obstacle()
+
+    assert (2.0 * outline.half_x, 2.0 * outline.half_y) == pytest.approx((0.6, 0.4))
+
+
+def test_a_ceiling_is_in_nobody_s_way():
+    """A Plane that looks down stands nowhere."""
+    roof = "Solid { translation 0 0 2.4 rotation 1 0 0 3.14 boundingObject Plane { } }"
+
+    assert load_world(roof).scene.solids == []
+
+
 def test_a_loose_crate_that_is_left_out_is_nowhere():
     """It would be pushed in Webots, so it may not stand in the way here."""
     crate = 'Solid { name "crate" physics Physics { } boundingObject Box { } }'

@@ -17,6 +17,8 @@ from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reading import Reading
 
+_Z: Final = 2
+_FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
 _ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
 
 
@@ -37,9 +39,17 @@ class Shape:
 
     @property
     def upright(self) -> bool:
-        """Whether one of its axes is vertical, so that it has one outline from below to above."""
+        """Whether one of its axes is vertical, so that it has one outline from below to above.
+
+        A stand-in always has one: its shapes are simple anyway, so one that leans has the outline of one that
+        does not.
+        """
         rotation = self.pose.rotation
-        return self.kind == "ball" or any(abs(rotation[6 + axis]) > _ALONG for axis in range(3))
+        return (
+            self.kind == "ball"
+            or any(abs(rotation[6 + axis]) > _ALONG for axis in range(3))
+            or any(around.stand_in for around in self.node.ancestors())
+        )
 
     def heights(self) -> tuple[float, float]:
         """Return z of its lower and its upper end."""
@@ -58,14 +68,14 @@ class Shape:
         """Return its outline, where it is now."""
         pose = self.pose
         x, y, _ = pose.position
-        if self.kind == "ball" or (self.kind == "cylinder" and abs(pose.rotation[8]) > _ALONG):
+        vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
+        if self.kind == "ball" or (self.kind == "cylinder" and vertical == _Z):
             return Disc(x, y, self.size[0] / 2.0)
-        heading_rad, length, width = self._footprint(pose)
+        heading_rad, length, width = self._footprint(pose, vertical)
         return Block(x, y, heading_rad, (length, width))
 
-    def _footprint(self, pose: Pose) -> tuple[float, float, float]:
+    def _footprint(self, pose: Pose, vertical: int) -> tuple[float, float, float]:
         """Return the heading of one of its level axes, its extent along this one, and that across."""
-        vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
         along, across = (axis for axis in range(3) if axis != vertical)
         heading_rad = math.atan2(pose.rotation[3 + along], pose.rotation[along])
         return heading_rad, self.size[along], self.size[across]
@@ -87,8 +97,9 @@ def _shapes(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Ite
             for inner in node.nodes():
                 yield from _shapes(reading, inner, place, inside)
         case "Plane":
-            if not place.world_pose.after(frame).upright:
-                reading.lacks(node, "a Plane that is no floor")
+            # A ceiling is out of the way of everything that stands on the floor.
+            if abs(place.world_pose.after(frame).rotation[8]) < _FLAT:
+                reading.lacks(node, "a Plane that is no floor and no ceiling")
         case "IndexedFaceSet":
             yield from _mesh(reading, node, place, frame)
         case _:
