@@ -152,6 +152,15 @@ def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
     assert (2.0 * outline.half_x, 2.0 * outline.half_y) == pytest.approx((0.6, 0.4))
 
 
+def test_a_robot_of_webots_stands_still_unless_a_client_drives_it():
+    """Its own controller does not run here; with the controller "ros" a client would wait for its motors."""
+    (shape,) = load_world('Nao { translation 1 0 0.3 controller "soccer" }').scene.solids
+    assert shape.pose.position[:2] == (1.0, 0.0)
+
+    with pytest.raises(WorldError, match="the stub simulates no Nao"):
+        load_world('Nao { controller "ros" controllerArgs [ "--name=nao" "--synchronize" ] }')
+
+
 def test_a_ceiling_is_in_nobody_s_way():
     """A Plane that looks down stands nowhere."""
     roof = "Solid { translation 0 0 2.4 rotation 1 0 0 3.14 boundingObject Plane { } }"
