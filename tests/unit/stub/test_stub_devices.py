@@ -67,7 +67,8 @@ def test_a_device_is_listed_and_serves_what_its_row_has(device, name):
 
     served = {path.partition("/")[2] for path in node.services if path.startswith("device/")}
 
-    publishing = PUBLISHING if kind.topics(found) else set()
+    below = f"{kind.sensor}/" if kind.sensor else ""
+    publishing = {f"{below}{name}" for name in PUBLISHING} if kind.topics(found) else set()
     neighbors = NAMES_ON_JOINT - {f"get_{kind.role}_name"} if kind.on_joint else set()
     assert served == COMMON | publishing | neighbors | {path for path, _, _ in kind.services(found)}
     assert node.get("robot/get_device_list") == ["device"]
@@ -81,7 +82,7 @@ def test_its_node_has_the_fields_of_webots(name):
     kinds = field_kinds(name)
 
     assert kinds["name"].default == DEVICES[name].name
-    assert len(kinds) > 1 or name == "Brake", "a Brake has a name alone"
+    assert len(kinds) > 1 or name == "Brake", "a Brake has no field of its own"
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -16,6 +16,7 @@ but its messages never come. Without it, the messages of the one before go out f
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 from palaestra_sim.stub.front.handles import Handles
@@ -57,7 +58,7 @@ class Controller:
         self._host_clock = host.clock
         self._stepping = stepping
         self._outlets = {
-            name: Outlet(node, name, topics, kind.enable)
+            name: Outlet(node, name, topics, kind.enable, partial(kind.enabled, device), kind.sensor)
             for name, (kind, device) in robot.parts.devices.rows.items()
             if (topics := kind.topics(device))
         }

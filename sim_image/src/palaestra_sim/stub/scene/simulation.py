@@ -16,6 +16,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 
+from palaestra_sim.stub.scene.air import Air
+from palaestra_sim.stub.scene.devices.connector import Connector
 from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
@@ -55,6 +57,11 @@ class Simulation:
         self.quit_status: int | None = None
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
+        devices = [it for robot in self.robots for _, it in robot.parts.devices.rows.values()]
+        self._air = Air(devices)
+        connectors = tuple(it for it in devices if isinstance(it, Connector))
+        for connector in connectors:
+            connector.others = connectors
         self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
         self._step_s = scene.basic_step_ms / 1000.0
         self._solids_moved = False
@@ -196,6 +203,7 @@ class Simulation:
                 change()
         for robot in self.robots:
             robot.advance(self._step_s)
+        self._air.deliver()
         if self._reset_asked:
             self._restore()
         self.time_ms += self.scene.basic_step_ms
@@ -206,6 +214,7 @@ class Simulation:
         for node in self.tree.nodes:
             if node.place is not None:
                 node.place.return_to_start()
+        self._air.clear()
         for robot in self.robots:
             robot.reset()
         if self._solids_moved:

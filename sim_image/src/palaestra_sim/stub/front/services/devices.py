@@ -64,11 +64,27 @@ class Feed:
 class Outlet:
     """All topics of one device, which its `enable` begins and ends together.
 
+    Args:
+        node: that publishes.
+        device_name: as in the world.
+        topics: of the device.
+        accepts: whether it accepts a period.
+        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+        sensor: the path of `enable` below the device; "" for the device itself.
+
     Attributes:
         feeds: one for each topic.
     """
 
-    def __init__(self, node: Node, device_name: str, topics: Iterable[Topic], accepts: Enable) -> None:
+    def __init__(
+        self,
+        node: Node,
+        device_name: str,
+        topics: Iterable[Topic],
+        accepts: Enable,
+        enabled: Callable[[int], None] = lambda _period_ms: None,
+        sensor: str = "",
+    ) -> None:
         path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
         self.feeds = tuple(
@@ -78,7 +94,8 @@ class Outlet:
             for it in topics
         )
         self._node = node
-        self._path = path
+        self._path = f"{path}/{sensor}" if sensor else path
+        self._enabled = enabled
         self._accepts = accepts
         self._periods_ms: set[int] = set()
 
@@ -92,12 +109,14 @@ class Outlet:
             self._periods_ms.clear()
             for feed in self.feeds:
                 feed.end(self._node)
+            self._enabled(0)
             return True
         if not self._accepts(period_ms, step_ms):
             return False
         self._periods_ms.add(period_ms)
         for feed in self.feeds:
             feed.begin(self._node, period_ms)
+        self._enabled(min(self._periods_ms))
         return True
 
     def services(self, step_ms: Callable[[], int]) -> tuple[Service, ...]:

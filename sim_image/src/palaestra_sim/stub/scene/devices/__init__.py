@@ -10,8 +10,10 @@ has the steps.
 - `motors`, `brake`, `position_sensor`: the rows of joints
 - `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: the rows of what measures place and motion
 - `altimeter`, `light_sensor`: the rows of what measures the surroundings
-- `led`: a row that only keeps what a program sets
-- `camera`, `range_finder`, `radar`: rows that answer their settings, and that nothing enables
+- `emitter`, `receiver`: the rows of radio
+- `connector`: the row of what feels another of its kind
+- `led`, `speaker`, `pen`: rows that only keep what a program sets
+- `camera`, `range_finder`, `radar`, `vacuum_gripper`: rows that nothing enables
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 """
@@ -26,7 +28,9 @@ from palaestra_sim.stub.scene.devices.altimeter import ALTIMETER
 from palaestra_sim.stub.scene.devices.brake import BRAKE
 from palaestra_sim.stub.scene.devices.camera import CAMERA
 from palaestra_sim.stub.scene.devices.compass import COMPASS
+from palaestra_sim.stub.scene.devices.connector import CONNECTOR
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
+from palaestra_sim.stub.scene.devices.emitter import EMITTER
 from palaestra_sim.stub.scene.devices.gps import GPS
 from palaestra_sim.stub.scene.devices.gyro import GYRO
 from palaestra_sim.stub.scene.devices.inertial_unit import INERTIAL_UNIT
@@ -34,10 +38,14 @@ from palaestra_sim.stub.scene.devices.kind import Kind
 from palaestra_sim.stub.scene.devices.led import LED
 from palaestra_sim.stub.scene.devices.light_sensor import LIGHT_SENSOR
 from palaestra_sim.stub.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
+from palaestra_sim.stub.scene.devices.pen import PEN
 from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
 from palaestra_sim.stub.scene.devices.radar import RADAR
 from palaestra_sim.stub.scene.devices.range_finder import RANGE_FINDER
+from palaestra_sim.stub.scene.devices.receiver import RECEIVER
+from palaestra_sim.stub.scene.devices.speaker import SPEAKER
 from palaestra_sim.stub.scene.devices.touch_sensor import TOUCH_SENSOR
+from palaestra_sim.stub.scene.devices.vacuum_gripper import VACUUM_GRIPPER
 
 # By the type of the node. Robots sample in this order, so a new row goes to the end: a row in between would
 # change the noise of the sensors behind it.
@@ -61,5 +69,11 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         CAMERA,
         RANGE_FINDER,
         RADAR,
+        EMITTER,
+        RECEIVER,
+        SPEAKER,
+        PEN,
+        CONNECTOR,
+        VACUUM_GRIPPER,
     )
 }

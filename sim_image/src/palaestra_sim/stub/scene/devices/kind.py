@@ -215,6 +215,8 @@ class Kind(Generic[DeviceT]):
             others of the joint; and, with topics, `enable` and `get_sampling_period`.
         topics: returns those that `enable` begins to publish.
         enable: whether a period is accepted; 0, which ends publishing, always is.
+        enabled: called with a device and its sampling period in ms, 0 for none, after that has changed.
+        sensor: the path of `enable` below the name of the device, "" for the name itself.
     """
 
     node: str
@@ -226,6 +228,8 @@ class Kind(Generic[DeviceT]):
     services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
     topics: Callable[[DeviceT], tuple[Topic, ...]] = lambda _: ()
     enable: Enable = whole_steps
+    enabled: Callable[[DeviceT, int], None] = lambda _device, _period_ms: None
+    sensor: str = ""
 
     @property
     def on_joint(self) -> bool:
