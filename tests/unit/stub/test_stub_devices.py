@@ -1,6 +1,8 @@
 """Every row of the table of devices: read, sampled, served, enabled, published and damaged."""
 
 import math
+import struct
+from array import array
 from types import SimpleNamespace
 
 import pytest
@@ -32,9 +34,25 @@ def written(kind):
 
 def numbers(topic, data):
     """The numbers of the reading in a framed message."""
-    layout, behind = reading_field(topic.type_name, topic.reading)
+    reading = reading_field(topic.type_name, topic.reading)
+    if reading is None:
+        message = message_type(topic.type_name).codec.decode(data[LENGTH.size :])
+        return flat(getattr(message, topic.reading))
+    layout, behind = reading
     end = len(data) - behind
     return layout.unpack(data[end - layout.size : end])
+
+
+def flat(value):
+    """The numbers of a reading: of an image or a cloud, its words as float32."""
+    if isinstance(value, bytes):
+        return struct.unpack(f"<{len(value) // 4}f", value)
+    return tuple(value) if isinstance(value, tuple | list | array) else (value,)
+
+
+def value_of(topic):
+    """The reading that a topic publishes now; of several, the first."""
+    return topic.source.value[0] if topic.many else topic.source.value
 
 
 @pytest.fixture
@@ -55,7 +73,10 @@ def device(stub, ros):
 
     def begin(name):
         (robot,) = stub(name).simulation.robots
-        return *robot.parts.devices.rows["device"], ros.node("robotino")
+        kind, found = robot.parts.devices.rows["device"]
+        if name == "Lidar":
+            found.clouded = True  # as enable_point_cloud does; else one of its topics has no messages
+        return kind, found, ros.node("robotino")
 
     return begin
 
@@ -107,7 +128,7 @@ def test_a_sensor_has_a_value_after_a_step_and_publishes_all_its_topics(device, 
     assert inboxes
     for topic, (sent,) in zip(kind.topics(found), inboxes, strict=True):
         value = sent[topic.reading] if topic.reading else sent
-        assert all(math.isfinite(it) for it in (value if isinstance(value, tuple) else [value]))
+        assert not any(map(math.isnan, flat(value)))
 
 
 @pytest.mark.parametrize("name", SENSORS)
@@ -136,14 +157,14 @@ def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, na
         wire = Topic("/device", type_, latched=False)
         wire.links.append(link)
         publisher = Publisher(wire, dict(topic.constants))
-        value = topic.source.value
+        value = value_of(topic)
         if topic.reading:
             publisher.send_stamped({topic.reading: value})
         else:
             publisher.send_value(value)
         (data,) = link.sent
 
-        assert numbers(topic, data) == pytest.approx(value if isinstance(value, tuple) else (value,))
+        assert numbers(topic, data) == pytest.approx(flat(value))
         type_.codec.decode(data[LENGTH.size :])
 
 
@@ -153,7 +174,10 @@ def test_a_wrong_value_reaches_each_fraction_of_a_reading(device, name):
     kind, found, _ = device(name)
 
     for topic in kind.topics(found):
-        sound = message_type(topic.type_name).codec.frame(dict(topic.constants))
+        shape = dict(topic.constants)
+        if reading_field(topic.type_name, topic.reading) is None:
+            shape[topic.reading] = value_of(topic)
+        sound = message_type(topic.type_name).codec.frame(shape)
         wrong = damaged_message(topic.type_name, sound, parse("wrong_value", "test"), topic.reading)
 
         fractions = [it for it in numbers(topic, wrong) if isinstance(it, float)]

@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from palaestra_protocol.ros.rostypes import Codec, reading_field
+from palaestra_protocol.ros.rostypes import Codec, message_type, reading_field
 from palaestra_protocol.ros.tcpros import LENGTH, frame
 from palaestra_sim.stub.faults.course import Damage
 from palaestra_sim.stub.faults.kinds import WrongValue
 
 _FRACTIONS = frozenset("fd")  # the codes of `struct`
+_FLOAT32 = struct.Struct("<f")
 
 
 def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], field: str = "") -> bytes:
@@ -25,9 +26,28 @@ def damaged_message(type_name: str, data: bytes, damages: Sequence[Damage], fiel
     for damage in damages:
         if not isinstance(damage, WrongValue):
             payload = payload[: len(payload) // 2]
-        elif reading is not None and len(payload) >= reading[0].size + reading[1]:
+        elif reading is None:
+            payload = _with_reading_of_any_size(payload, type_name, field, damage.value)
+        elif len(payload) >= reading[0].size + reading[1]:
             payload = _with_reading(payload, *reading, damage.value)
     return frame(payload)
+
+
+def _with_reading_of_any_size(payload: bytes, type_name: str, field: str, value: float) -> bytes:
+    """Return a message with `value` in place of each float of a list, or of each float32 of an image."""
+    if not type_name or not field:
+        return payload
+    codec = message_type(type_name).codec
+    try:
+        fields = codec.decode(payload)._asdict()
+    except ValueError:  # another damage may have cut it short
+        return payload
+    found = fields[field]
+    if isinstance(found, bytes):
+        fields[field] = _FLOAT32.pack(value) * (len(found) // _FLOAT32.size)
+    else:
+        fields[field] = _with_floats(found, value)
+    return codec.encode(fields)
 
 
 def _with_reading(payload: bytes, reading: struct.Struct, behind: int, value: float) -> bytes:

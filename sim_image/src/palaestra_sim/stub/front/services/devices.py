@@ -19,6 +19,7 @@ class Feed:
     the messages of the two are mixed.
 
     Attributes:
+        constants: the other fields, as they are when the topic begins.
         reading: the field of the value; "" is the last one.
         many: whether the value is a sequence, with a message for each of its items.
         publishers: by period in ms.
@@ -27,6 +28,7 @@ class Feed:
     path: str
     type_name: str
     template: Fields
+    constants: Fields
     source: Source | None
     reading: str = ""
     many: bool = False
@@ -35,8 +37,9 @@ class Feed:
     def begin(self, node: Node, period_ms: int) -> None:
         """Publish every `period_ms` too."""
         if period_ms not in self.publishers:
+            template = {**self.template, **self.constants}
             self.publishers[period_ms] = node.advertise(
-                self.path, self.type_name, template=self.template, reading=self.reading
+                self.path, self.type_name, template=template, reading=self.reading
             )
 
     def end(self, node: Node) -> None:
@@ -52,13 +55,11 @@ class Feed:
             return
         for period_ms, publisher in self.publishers.items():
             if elapsed_ms % period_ms == 0:
-                if self.many:
-                    for value in source.value:
+                for value in source.value if self.many else (source.value,):
+                    if self.reading:
+                        publisher.send_stamped({self.reading: value})
+                    else:
                         publisher.send_value(value)
-                elif self.reading:
-                    publisher.send_stamped({self.reading: source.value})
-                else:
-                    publisher.send_value(source.value)
 
 
 class Outlet:
@@ -88,9 +89,7 @@ class Outlet:
         path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
         self.feeds = tuple(
-            Feed(
-                f"{path}/{it.name}", it.type_name, {**header, **it.constants}, it.source, it.reading, it.many
-            )
+            Feed(f"{path}/{it.name}", it.type_name, header, it.constants, it.source, it.reading, it.many)
             for it in topics
         )
         self._node = node
@@ -114,9 +113,9 @@ class Outlet:
         if not self._accepts(period_ms, step_ms):
             return False
         self._periods_ms.add(period_ms)
+        self._enabled(min(self._periods_ms))
         for feed in self.feeds:
             feed.begin(self._node, period_ms)
-        self._enabled(min(self._periods_ms))
         return True
 
     def services(self, step_ms: Callable[[], int]) -> tuple[Service, ...]:

@@ -8,6 +8,7 @@ has the steps.
 - `kind`: what a row is
 - `distance_sensor`, `touch_sensor`: the rows of what feels obstacles
 - `motors`, `brake`, `position_sensor`: the rows of joints
+- `lidar`: the row of many rays
 - `gps`, `compass`, `gyro`, `accelerometer`, `inertial_unit`: the rows of what measures place and motion
 - `altimeter`, `light_sensor`: the rows of what measures the surroundings
 - `emitter`, `receiver`: the rows of radio
@@ -36,6 +37,7 @@ from palaestra_sim.stub.scene.devices.gyro import GYRO
 from palaestra_sim.stub.scene.devices.inertial_unit import INERTIAL_UNIT
 from palaestra_sim.stub.scene.devices.kind import Kind
 from palaestra_sim.stub.scene.devices.led import LED
+from palaestra_sim.stub.scene.devices.lidar import LIDAR
 from palaestra_sim.stub.scene.devices.light_sensor import LIGHT_SENSOR
 from palaestra_sim.stub.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
 from palaestra_sim.stub.scene.devices.pen import PEN
@@ -75,5 +77,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         PEN,
         CONNECTOR,
         VACUUM_GRIPPER,
+        LIDAR,
     )
 }
