@@ -13,7 +13,7 @@ has the steps.
 - `altimeter`, `light_sensor`: the rows of what measures the surroundings
 - `emitter`, `receiver`: the rows of radio
 - `connector`: the row of what feels another of its kind
-- `led`, `speaker`, `pen`: rows that only keep what a program sets
+- `led`, `speaker`, `pen`, `display`: rows that only keep what a program sets
 - `camera`, `range_finder`, `radar`, `vacuum_gripper`: rows that nothing enables
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
@@ -30,6 +30,7 @@ from palaestra_sim.stub.scene.devices.brake import BRAKE
 from palaestra_sim.stub.scene.devices.camera import CAMERA
 from palaestra_sim.stub.scene.devices.compass import COMPASS
 from palaestra_sim.stub.scene.devices.connector import CONNECTOR
+from palaestra_sim.stub.scene.devices.display import DISPLAY
 from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
 from palaestra_sim.stub.scene.devices.emitter import EMITTER
 from palaestra_sim.stub.scene.devices.gps import GPS
@@ -78,5 +79,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         CONNECTOR,
         VACUUM_GRIPPER,
         LIDAR,
+        DISPLAY,
     )
 }

@@ -1,0 +1,133 @@
+"""Display: what a program draws is there when it is copied and pasted."""
+
+import pytest
+
+from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.stub.scene import raster
+from palaestra_sim.stub.scene.raster import Raster
+
+RED = (0, 0, 255, 255)
+ROBOT = """Robot { supervisor TRUE controller "ros" controllerArgs [ "--name=painter" "--synchronize" ]
+  children [ Display { name "screen" width 8 height 6 } ] }"""
+
+
+@pytest.fixture
+def painter(start, world, ros):
+    """The node of a robot with a display, and its picture."""
+    simulation = start(world(robot=ROBOT)).simulation
+    return ros.node("painter"), simulation.robots[0].parts.devices.rows["screen"][1].picture
+
+
+def lit(picture):
+    """The rows of a picture, with # for each pixel that has been drawn."""
+    return [
+        "".join("#" if picture.at(x, y)[3] else "." for x in range(picture.width))
+        for y in range(picture.height)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("points", "rows"),
+    [
+        (raster.line(0, 0, 4, 2), ["##...", "..#..", "...##", ".....", "....."]),
+        (raster.rectangle(1, 1, 3, 3), [".....", ".###.", ".#.#.", ".###.", "....."]),
+        (raster.filled_rectangle(3, 3, 5, 5), [".....", ".....", ".....", "...##", "...##"]),
+        (raster.oval(2, 2, 2, 2), [".###.", "##.##", "#...#", "##.##", ".###."]),
+        (raster.filled_oval(2, 2, 2, 1), [".....", "..#..", "#####", "..#..", "....."]),
+        (raster.outline([(0, 0), (4, 0), (0, 4)]), ["#####", "#..#.", "#.#..", "##...", "#...."]),
+        (raster.filled_polygon([(0, 0), (4, 0), (0, 4)]), ["#####", "####.", "###..", "##...", "#...."]),
+    ],
+    ids=["line", "rectangle", "filled rectangle", "oval", "filled oval", "polygon", "filled polygon"],
+)
+def test_a_shape_is_drawn_as_far_as_it_is_on_the_picture(points, rows):
+    """Pixel by pixel."""
+    picture = Raster(width=5, height=5)
+    picture.draw(points, RED)
+
+    assert lit(picture) == rows
+
+
+def test_every_drawing_service_draws(painter):
+    """In the color, alpha and opacity that were set last."""
+    robot, picture = painter
+    assert robot.get("screen/set_color", value=0xFF8000) is True
+    assert robot.get("screen/draw_pixel", x1=1, y1=2) == 1
+    assert picture.at(1, 2) == (0, 128, 255, 255)
+    robot.call("screen/set_alpha", value=0.5)
+    robot.call("screen/set_opacity", value=0.5)
+    robot.call("screen/set_color", value=0)
+    robot.call("screen/draw_pixel", x1=1, y1=2)
+    assert picture.at(1, 2) == (0, 64, 128, 192)
+
+    robot.call("screen/set_alpha", value=1.0)
+    robot.call("screen/set_opacity", value=1.0)
+    square = {"x": [0, 2, 2, 0], "y": [3, 3, 5, 5], "size": 4}
+    assert robot.get("screen/draw_line", x1=0, y1=0, x2=7, y2=0) == 1
+    assert robot.get("screen/draw_rectangle", x=5, y=1, width=3, height=5) == 1
+    assert robot.get("screen/fill_polygon", **square) == 1
+    assert robot.get("screen/draw_polygon", **square) == 1
+    assert robot.get("screen/draw_text", text="no pixels", x=0, y=1) == 1
+    assert lit(picture) == ["########", ".....###", ".#...#.#", "###..#.#", "###..#.#", "###..###"]
+
+
+def test_what_was_copied_can_be_pasted(painter):
+    """A handle is valid until it is deleted; Webots would crash after that."""
+    robot, picture = painter
+    robot.call("screen/fill_rectangle", x=0, y=0, width=2, height=2)
+    image = robot.get("screen/image_copy", x=1, y=1, width=2, height=2)
+    assert robot.get("screen/image_paste", ir=image, x=6, y=4, blend=1) == 1
+    assert lit(picture)[4:] == ["......#.", "........"]
+
+    assert robot.get("screen/image_delete", ir=image) == 1
+    with pytest.raises(ServiceFailed, match=f"no image {image}; make one with image_new or image_copy"):
+        robot.call("screen/image_paste", ir=image, x=0, y=0, blend=1)
+
+
+@pytest.mark.parametrize(
+    ("format_", "pixel"),
+    [
+        (3, [255, 128, 0]),
+        (4, [255, 128, 0, 255]),
+        (5, [255, 255, 128, 0]),
+        (6, [0, 128, 255, 255]),
+        (7, [255, 0, 128, 255]),
+    ],
+    ids=["RGB", "RGBA", "ARGB", "BGRA", "ABGR"],
+)
+def test_an_image_comes_in_any_format(painter, format_, pixel):
+    """Orange in each of them."""
+    robot, picture = painter
+    image = robot.get("screen/image_new", width=1, height=1, data=pixel, format=format_)
+    robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
+
+    assert picture.at(0, 0) == (0, 128, 255, 255)
+
+
+@pytest.mark.parametrize(
+    ("service", "request_", "fact"),
+    [
+        ("image_new", {"width": 2, "height": 1, "data": [0], "format": 3}, "1 bytes for 2 by 1 pixels"),
+        ("image_new", {"width": 1, "height": 1, "data": [0], "format": 9}, "no image format 9"),
+        ("fill_oval", {"cx": 0, "cy": 0, "a": 1 << 30, "b": 1}, "a is beyond 4096"),
+        ("draw_polygon", {"x": [0, 5000], "y": [0, 0], "size": 2}, "x is beyond 4096"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
+    """Before anything is drawn."""
+    robot, picture = painter
+    with pytest.raises(ServiceFailed, match=fact):
+        robot.call(f"screen/{service}", **request_)
+
+    assert not any(picture.pixels)
+
+
+def test_nothing_is_loaded_saved_or_attached(painter):
+    """There are neither files nor cameras here; the answers are those of a failure."""
+    robot, _ = painter
+
+    assert tuple(robot.call("screen/get_info")) == (8, 6)
+    assert robot.get("screen/image_load", filename="logo.png") == 0
+    assert robot.get("screen/image_save", filename="screen.png", ir=0) == 0
+    assert robot.get("screen/attach_camera", value="camera") is False
+    assert robot.get("screen/detach_camera") is True
+    assert robot.get("screen/set_font", font="Arial", size=12, antiAliasing=1) == 1
