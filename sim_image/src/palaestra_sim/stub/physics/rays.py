@@ -11,11 +11,16 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
+from palaestra_sim.stub.physics.geometry import Pose, Vector, turn
 from palaestra_sim.stub.physics.obstacles import Neighborhood, Obstacle, Ray
 
 Row = tuple[float, float, float]  # distance in meters, response, noise as a fraction of the response
+
+
+_LEVEL: Final = 1e-3  # a smaller slope counts as none
+_STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
 
 
 class LookupTable:
@@ -133,6 +138,15 @@ class Beam(NamedTuple):
     def level(self) -> bool:
         """Whether it stays at its height."""
         return self.slope == 0.0
+
+
+def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
+    """Return the beam that leaves a frame in a direction of this frame."""
+    dx, dy, dz = turn(pose.rotation, direction)
+    along = max(math.hypot(dx, dy), _STEEPEST)
+    slope = dz / along
+    ray = pose.position[0], pose.position[1], dx / along, dy / along
+    return Beam(ray, pose.position[2], slope if abs(slope) > _LEVEL else 0.0, reach_m)
 
 
 class Upright(NamedTuple):

@@ -15,15 +15,13 @@ from enum import IntEnum
 from itertools import islice
 from typing import Final
 
-from palaestra_sim.stub.physics.geometry import Pose, Vector, turn
-from palaestra_sim.stub.physics.rays import Beam, LookupTable, lookup_table
+from palaestra_sim.stub.physics.geometry import Vector
+from palaestra_sim.stub.physics.rays import Beam, LookupTable, beam_along, lookup_table
 from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.stub.scene.devices.response import table_rows, table_service
 from palaestra_sim.stub.seam import Row
 
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
-_LEVEL: Final = 1e-3  # a smaller slope counts as none
-_STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
 # aperture.
 _RINGS: Final = (
@@ -83,21 +81,12 @@ def _read(part: Part) -> DistanceSensor:
     return DistanceSensor(
         name=part.name,
         model=part.text("model"),
-        beams=tuple(_beam(part.place.world_pose, direction, table.reach_m) for direction in cone),
+        beams=tuple(beam_along(part.place.world_pose, direction, table.reach_m) for direction in cone),
         weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
         table=table,
         type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
         aperture_rad=aperture_rad,
     )
-
-
-def _beam(pose: Pose, direction: Vector, reach_m: float) -> Beam:
-    """Return the beam that leaves a frame in a direction of this frame."""
-    dx, dy, dz = turn(pose.rotation, direction)
-    along = max(math.hypot(dx, dy), _STEEPEST)
-    slope = dz / along
-    ray = pose.position[0], pose.position[1], dx / along, dy / along
-    return Beam(ray, pose.position[2], slope if abs(slope) > _LEVEL else 0.0, reach_m)
 
 
 def _cone(count: int, aperture_rad: float) -> list[Vector]:

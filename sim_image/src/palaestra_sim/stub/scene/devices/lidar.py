@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.stub.physics.geometry import Vector, turn
-from palaestra_sim.stub.physics.rays import Beam
+from palaestra_sim.stub.physics.geometry import Vector
+from palaestra_sim.stub.physics.rays import Beam, beam_along
 from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
 from palaestra_sim.stub.scene.devices.response import discrete
 from palaestra_sim.stub.seam import Fields, Row, UnsimulatedError
@@ -34,8 +34,6 @@ _POINT_FIELDS: Final = [
         ("time", 16, _FLOAT32),
     )
 ]
-_LEVEL: Final = 1e-3  # a smaller slope counts as none
-_STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -147,7 +145,8 @@ def _read(part: Part) -> Lidar:
         resolution=number("resolution", -1.0),
         directions=directions,
         beams=tuple(
-            tuple(_beam(part, direction, info["maxRange"]) for direction in row) for row in directions
+            tuple(beam_along(part.place.world_pose, direction, info["maxRange"]) for direction in row)
+            for row in directions
         ),
         layers=[_blank(len(row)) for row in directions],
     )
@@ -164,15 +163,6 @@ def _layers(info: dict[str, Any]) -> Iterator[tuple[Vector, ...]]:
         up = info["verticalFov"] * (0.5 - layer / (layers - 1)) if layers > 1 else 0.0
         left = (info["fov"] * (0.5 - (column + 0.5) / columns) for column in range(columns))
         yield tuple((math.cos(up) * math.cos(it), math.cos(up) * math.sin(it), math.sin(up)) for it in left)
-
-
-def _beam(part: Part, direction: Vector, reach_m: float) -> Beam:
-    pose = part.place.world_pose
-    dx, dy, dz = turn(pose.rotation, direction)
-    along = max(math.hypot(dx, dy), _STEEPEST)
-    slope = dz / along
-    ray = pose.position[0], pose.position[1], dx / along, dy / along
-    return Beam(ray, pose.position[2], slope if abs(slope) > _LEVEL else 0.0, reach_m)
 
 
 def _sampler(lidars: Sequence[Lidar], robot: Carrier) -> Sample:
