@@ -255,6 +255,15 @@ ARM = """Robot { name "arm" children [ HingeJoint {
     SliderJoint { endPoint DEF TIP Solid { translation 1 0 0 } } ] } } ] }"""
 
 
+def test_a_lidar_of_webots_can_be_mounted_on_any_robot():
+    """Its PROTO is a part that ships, with the rays of the real one."""
+    robot = 'Robot { controller "ros" controllerArgs [ "--name=r" "--synchronize" ] children [ Sick { } ] }'
+    (found,) = load_world(robot.replace("Sick", "SickLms291")).robots
+
+    (lidar,) = found.parts.devices.rows.values()
+    assert lidar[1].info["horizontalResolution"] == 180
+
+
 def test_a_joint_begins_at_its_position_and_ends_at_its_stop():
     """The place in the file holds at the position in the file."""
     simulation = load_world(ARM)

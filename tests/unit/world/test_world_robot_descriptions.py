@@ -16,7 +16,13 @@ from palaestra_sim.world import Node, World, builtin, parse
 
 PROTOS = Path(palaestra_sim.world.__file__).parent / "protos"
 ROBOTS = ("E-puck", "Pioneer3at", "Pioneer3dx", "Robotino3", "TurtleBot3Burger")
-PARTS = ("E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01")
+LIDARS = {
+    "HokuyoUrg04lx": (240, 667, 0.06, 4.095),
+    "HokuyoUrg04lxug01": (240, 667, 0.2, 5.6),
+    "HokuyoUtm30lx": (270, 1080, 0.1, 30),
+    "SickLms291": (180, 180, None, 80),
+}
+PARTS = ("E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS)
 
 COMMON = "translation rotation name controller controllerArgs customData supervisor synchronization"
 FIELDS = {
@@ -177,7 +183,8 @@ def test_a_world_can_set_every_documented_field(name: str) -> None:
 def test_a_field_without_effect_is_one_that_chooses_a_variant(name: str) -> None:
     """All others are used in the body, so setting them has the effect that it has in Webots."""
     description = described(name)
-    without = {"enablePhysics"} if name == "RobotisLds01" else WITHOUT_EFFECT.get(name, set())
+    is_lidar = name == "RobotisLds01" or name.startswith("Hokuyo")
+    without = {"enablePhysics"} if is_lidar else WITHOUT_EFFECT.get(name, set())
 
     assert set(description.defaults) - description.used == without
 
@@ -211,6 +218,18 @@ def test_the_lidar_of_the_turtlebot_is_described_beside_it() -> None:
     assert (lidar.type_name, lidar.text("name")) == ("Lidar", "LDS-01")
     assert numbers(lidar, "horizontalResolution") == (360,)
     assert numbers(lidar, "minRange") + numbers(lidar, "maxRange") == (0.12, 3.5)
+
+
+@pytest.mark.parametrize("name", LIDARS)
+def test_a_lidar_has_the_documented_rays(name: str) -> None:
+    """Field of view in degrees, rays, least and greatest range."""
+    (lidar,) = described(name).body.nodes
+    degrees, rays, nearest, farthest = LIDARS[name]
+
+    assert numbers(lidar, "fieldOfView") == pytest.approx((math.radians(degrees),), abs=1e-4)
+    assert numbers(lidar, "horizontalResolution") == (rays,)
+    assert lidar.numbers("minRange") == (None if nearest is None else (nearest,))
+    assert numbers(lidar, "maxRange") == (farthest,)
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -28,7 +28,7 @@ CitroenCZeroSimple LincolnMKZSimple SpeedLimitSign GenericTrafficLight Cabinet T
 Door PottedTree Sofa Window Forest Sink SolidBox Desk Fridge CeilingLight Carpet Chair HotPlate Oven
 Worktop Armchair BunchOfSunFlowers Can LandscapePainting halfTile worldTile SpeedLimitPanel
 HazardMap Victim FireSmoke SmallResidentialTower Keyboard Monitor TexturedBackground
-TexturedBackgroundLight
+TexturedBackgroundLight LegoWall MazeBlock TinkerbotsBase SumoInterface Pedestrian
 """
 
 
