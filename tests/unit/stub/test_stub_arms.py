@@ -4,6 +4,8 @@ import math
 
 import pytest
 
+from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.scene.simulation import Simulation
 
 STEP_MS = 32
@@ -175,3 +177,61 @@ def test_a_range_finder_and_a_radar_answer_their_settings_alone(robot_with, part
 
     assert {name: getattr(answer, name) for name in expected} == expected
     assert robot.get("it/enable", value=32) is False
+
+
+def test_a_skin_has_no_bones_and_whatever_needs_one_fails(robot_with):
+    """The stub loads no meshes; Webots itself crashes for the name of a bone that does not exist."""
+    robot = robot_with('Skin { name "anna" }')
+
+    assert robot.get("anna/get_bone_count") == 0
+    assert robot.call("anna/set_bone_position", index=0).success == 0
+    assert robot.call("anna/set_bone_orientation", index=0).success == 0
+    with pytest.raises(ServiceFailed, match="anna has no bone 3: the stub loads no meshes"):
+        robot.call("anna/get_bone_name", index=3)
+
+
+TANK = """Robot { name "tank" controller "ros" controllerArgs [ "--name=tank" "--synchronize" ] children [
+  Track { translation 0 0.2 0.05 device [ LinearMotor { name "left" } PositionSensor { name "run" } ]
+    children [ TrackWheel { position -0.1 0 radius 0.05 } Shape { } ]
+    boundingObject Box { size 0.3 0.05 0.1 } }
+  Track { translation 0 -0.2 0.05 device [ LinearMotor { name "right" } ]
+    boundingObject Box { size 0.3 0.05 0.1 } } ] boundingObject Box { size 0.3 0.3 0.05 } }"""
+
+
+def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
+    """A belt moves the robot by as many meters as its motor turns; there is no slip."""
+    (robot,) = (simulation := Simulation.load(world(robot=TANK))).robots
+    for name, speed in (("left", 0.1), ("right", 0.2)):
+        robot.motors[name].set_position(math.inf)
+        robot.motors[name].set_velocity(speed)
+    simulation.step(31 * STEP_MS)
+
+    elapsed = 31 * STEP_MS / 1000.0
+    assert robot.body.heading_rad == pytest.approx(0.1 / 0.4 * elapsed, rel=0.05)
+    assert math.hypot(robot.body.x, robot.body.y) == pytest.approx(0.15 * elapsed, rel=0.05)
+    assert robot.sensors["run"].value == pytest.approx(0.1 * elapsed, rel=0.05)
+
+
+def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
+    """Its boundingObject counts; its wheels and its belt are only drawn."""
+    (robot,) = Simulation.load(world(robot=TANK.replace("LinearMotor", "Brake"))).robots
+
+    assert robot.body.drive is None
+    assert robot.body.radius > 0.2
+
+
+def test_what_is_at_the_end_of_a_joint_is_refused_if_it_is_unknown(load):
+    """A gripper of an unknown type would be missing without a word."""
+    with pytest.raises(WorldError, match="the stub simulates no Minotaur on a robot"):
+        load("HingeJoint { endPoint Minotaur { } }")
+    with pytest.raises(WorldError, match="the stub simulates no Minotaur on a robot"):
+        load("BallJoint { endPoint Minotaur { } }")
+
+    load("HingeJoint { endPoint SolidReference { } }")
+
+
+def test_a_sensor_on_a_caster_is_one_of_the_robot_s(load):
+    """A joint without motors is fixed, and everything on it is there."""
+    (robot,) = load('BallJoint { endPoint Solid { children [ GPS { name "low" } ] } }').robots
+
+    assert "low" in robot.sensors

@@ -196,7 +196,7 @@ def test_what_cannot_be_simulated_is_refused(world, objects, fact):
 
 
 BAD_ROBOTS = {
-    "a skin": (("DEF IR", "Skin { } DEF IR"), "the stub simulates no Skin on a robot"),
+    "an unknown part": (("DEF IR", "Minotaur { } DEF IR"), "the stub simulates no Minotaur on a robot"),
     "a leaning robot": (("Robot {", "Robot { rotation 1 0 0 0.3"), "does not stand upright"),
     "an odd type": (('name "ir1"', 'name "ir1" type "radar"'), "no distance sensor is of type 'radar'"),
     "a broken table": (("[ 0 1 0,", "[ 0 1,"), "lookupTable is not rows of three numbers"),
@@ -331,7 +331,7 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
 def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_all_places(world):
     """A person mends a world once, not in as many rounds as it has refusals."""
     robot = """Robot { name "r" controller "ros"
-      children [ Skin { } Track { } ] }"""
+      children [ Theseus { } Minotaur { } ] }"""
     ball = "Solid { physics Physics { }\nboundingObject Cone { } }"
     objects = f"Floor {{ }}\nTree {{ }}\nTree {{ }}\n{ball}\nTree {{ }}"
     with pytest.raises(WorldRefusedError) as caught:
@@ -348,8 +348,8 @@ def test_all_that_is_refused_comes_in_one_message_with_a_line_for_each_kind_and_
         f"my.wbt:7:16: the stub simulates no Cone as a boundingObject; {elsewhere}",
         "my.wbt:9:1: controllerArgs without --name=; generate the world",
         "my.wbt:9:1: controllerArgs without --synchronize: the stub steps only when it is asked to; add it",
-        f"my.wbt:10:18: the stub simulates no Skin on a robot; {elsewhere}",
-        f"my.wbt:10:27: the stub simulates no Track on a robot; {elsewhere}",
+        f"my.wbt:10:18: the stub simulates no Theseus on a robot; {elsewhere}",
+        f"my.wbt:10:30: the stub simulates no Minotaur on a robot; {elsewhere}",
     ]
     assert caught.value.line == 3
     assert len(caught.value.errors) == 10

@@ -48,13 +48,13 @@ def test_stand_ins_and_controllers_that_do_not_run_are_named(check):
 
 def test_all_that_the_stub_lacks_is_listed_at_once(check):
     """With exit code 2, as for a start."""
-    code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Skin { } ] }\nColosseum { }')
+    code, lines = check('Colosseum { }\nRobot { controller "ros" children [ Minotaur { } ] }\nColosseum { }')
 
     assert code == 2
     assert lines[1:] == [
         "cannot be simulated; --leave-out leaves it out:",
         "my.wbt:2:1: the stub simulates no Colosseum (2 places, in lines 2, 4); left out",
-        "my.wbt:3:37: the stub simulates no Skin on a robot; left out",
+        "my.wbt:3:37: the stub simulates no Minotaur on a robot; left out",
     ]
 
 

@@ -175,6 +175,19 @@ def test_a_loose_crate_that_is_left_out_is_nowhere():
     assert load_world(crate, leave_out=LeaveOut(types=frozenset({"Solid"}))).scene.solids == []
 
 
+def test_a_device_without_a_robot_is_a_solid():
+    """People leave cameras on tripods in their worlds; nobody reads them, but one can run into them."""
+    tripod = "Pose { translation 1 0 0 children [ Camera { boundingObject Box { size 0.1 0.1 1 } } ] }"
+
+    assert obstacles(load_world(tripod)) == [("box", 1.0, 0.0, (0.1, 0.1, 1.0))]
+
+
+def test_a_conveyor_belt_is_refused():
+    """It would carry away what stands on it."""
+    with pytest.raises(WorldError, match="a Track with devices moves what stands on it"):
+        load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
+
+
 def drive(simulation, seconds, **speeds):
     """Turn the motors of the one robot at these speeds in rad/s, and return where it is then."""
     (robot,) = simulation.robots

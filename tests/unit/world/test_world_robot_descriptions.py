@@ -22,7 +22,7 @@ LIDARS = {
     "HokuyoUtm30lx": (270, 1080, 0.1, 30),
     "SickLms291": (180, 180, None, 80),
 }
-PARTS = ("E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS)
+PARTS = ("CharacterSkin", "E-puckGroundSensors", "Robotino3Webcam", "RobotisLds01", *LIDARS)
 
 COMMON = "translation rotation name controller controllerArgs customData supervisor synchronization"
 FIELDS = {
@@ -43,7 +43,11 @@ NAMES = {
     "TurtleBot3Burger": "TurtleBot3Burger",
 }
 # Fields that choose among variants, of which the default one is described.
-WITHOUT_EFFECT = {"E-puck": {"version", "kinematic"}, "Robotino3": {"infraredSensorModel"}}
+WITHOUT_EFFECT = {
+    "E-puck": {"version", "kinematic"},
+    "Robotino3": {"infraredSensorModel"},
+    "CharacterSkin": {"model"},
+}
 
 TWO = ("left wheel", "right wheel")
 FOUR = ("back left wheel", "back right wheel", "front left wheel", "front right wheel")
@@ -65,7 +69,7 @@ DEVICES = {
 }
 TYPES_OF_DEVICES = {
     "Accelerometer", "Camera", "Compass", "DistanceSensor", "Emitter", "Gyro", "InertialUnit", "LED", "Lidar",
-    "LightSensor", "PositionSensor", "Receiver", "RotationalMotor", "Speaker", "TouchSensor",
+    "LightSensor", "PositionSensor", "Receiver", "RotationalMotor", "Skin", "Speaker", "TouchSensor",
 }  # fmt: skip
 # Nodes that need no PROTO of Webots and no file of its installation.
 PLAIN = TYPES_OF_DEVICES | {

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reading import ELSEWHERE, LeaveOut, Reading
@@ -35,7 +36,9 @@ DRAWN_ONLY: Final = frozenset(
         "WorldInfo",
     )
 )
-_FRAMES: Final = frozenset(("Pose", "Transform", "Solid"))
+# A device without a robot is a thing like others.
+_SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
+_FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
 
 
 @dataclass(slots=True, kw_only=True)
@@ -99,7 +102,7 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
     elif kind in _FRAMES:
         place = Place(parent, reading.translation(node), reading.rotation(node))
         node.place = place
-        if kind == "Solid":
+        if kind in _SOLIDS:
             _read_solid(reading, node, place, scene)
         _read_children(reading, node, place, scene)
     else:
@@ -113,8 +116,10 @@ def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scen
 
 def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -> None:
     if node.nodes("physics"):
-        fact = "a Solid with physics moves when it is pushed, which the stub does not simulate"
+        fact = f"a {node.type_name} with physics moves when it is pushed, which the stub does not simulate"
         reading.lacks(node, fact, f"remove physics, {ELSEWHERE}")
+    if node.type_name == "Track" and node.nodes("device"):
+        reading.lacks(node, "a Track with devices moves what stands on it, which the stub does not simulate")
     shapes = list(bounding_shapes(reading, node, place))
     if not node.left_out:
         _stand(reading, shapes, scene)

@@ -1,8 +1,8 @@
 """Read a Robot node: its outline, its joints, its wheels, and its devices.
 
-A wheel is found by its geometry: a driven hinge with a level axle, whose round end has its center on the
-axle and reaches the floor. The wheels together are the drive (`physics.drive`). Everything else on a joint
-moves with it, but touches nothing. A robot without an outline and without wheels only watches.
+Hinges and tracks with motors may be wheels (`wheels`). The wheels together are the drive (`physics.drive`).
+Everything else on a joint moves with it, but touches nothing. A robot without an outline and without wheels
+only watches.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from palaestra_sim.stub.physics.body import Body
-from palaestra_sim.stub.physics.drive import Wheel, find_drive
+from palaestra_sim.stub.physics.drive import find_drive
 from palaestra_sim.stub.physics.geometry import Vector, turn
 from palaestra_sim.stub.physics.motors import Motor
 from palaestra_sim.stub.physics.obstacles import Disc
@@ -26,16 +26,27 @@ from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place, RobotPlace
 from palaestra_sim.stub.scene.reading import Reading
 from palaestra_sim.stub.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.stub.scene.wheels import Driven, wheels_among
 
-_INERT: Final = frozenset(("Shape", "CadShape", "DirectionalLight", "PointLight", "SpotLight", "Slot"))
+# A SolidReference closes a loop of joints; the solid is read where it is written.
+_INERT: Final = frozenset(
+    (
+        "Shape",
+        "CadShape",
+        "DirectionalLight",
+        "PointLight",
+        "SpotLight",
+        "Slot",
+        "SolidReference",
+        "TrackWheel",
+    )
+)
 _MOUNTED: Final = {name: kind for name, kind in DEVICES.items() if not kind.on_joint}
 _ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joint}
-_FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid"}
+_FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid", "Track"}
 _JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
 _LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
 
-_LEVEL: Final = 1e-3  # sine of the largest angle of a level axle to the floor
-_OFF_CENTER: Final = 0.2  # of a wheel's radius: how far its center may be off the axle, its rim off the floor
 _STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
 
 
@@ -67,42 +78,6 @@ def read_robot(reading: Reading, node: SceneNode, parent: Place | None) -> Robot
     return _RobotReader(reading, node, parent).read()
 
 
-@dataclass(slots=True, kw_only=True)
-class _Driven:
-    """A hinge with a motor, which may be a wheel: the round end, in the robot's frame."""
-
-    motor: Motor
-    axle: Vector
-    anchor: Vector
-    shape: Shape
-    roller: Vector | None
-
-    @property
-    def bottom(self) -> float:
-        return self.shape.pose.position[2] - self.radius
-
-    @property
-    def radius(self) -> float:
-        return self.shape.size[0] / 2.0
-
-    def turns_about_its_center(self) -> bool:
-        center = self.shape.pose.position
-        offset = (center[0] - self.anchor[0], center[1] - self.anchor[1], center[2] - self.anchor[2])
-        along = sum(a * b for a, b in zip(offset, self.axle, strict=True))
-        square = sum(part * part for part in offset) - along * along
-        return math.sqrt(max(0.0, square)) <= _OFF_CENTER * self.radius
-
-    def wheel(self) -> Wheel:
-        x, y, _ = self.shape.pose.position
-        return Wheel(
-            x_m=x,
-            y_m=y,
-            axle=_level(self.axle),
-            radius_m=self.radius,
-            roller=None if self.roller is None else _level(self.roller),
-        )
-
-
 class _RobotReader:
     def __init__(self, reading: Reading, node: SceneNode, parent: Place | None) -> None:
         self._reading = reading
@@ -114,7 +89,7 @@ class _RobotReader:
         self._frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
         self._outline: list[Shape] = []  # of what is fixed to the robot
         self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
-        self._driven: list[_Driven] = []
+        self._driven: list[Driven] = []
         self._parts: list[tuple[SceneNode, Place]] = []
 
     def read(self) -> RobotParts:
@@ -122,7 +97,7 @@ class _RobotReader:
         reading, node = self._reading, self._node
         self._outline += bounding_shapes(reading, node, self._frame)
         self._read_children(node, self._frame)
-        wheels = self._wheels()
+        wheels = wheels_among(self._driven)
         drive = find_drive([found.wheel() for found in wheels])
         shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
         moves = drive is not None or self._stands_free(shapes)
@@ -147,23 +122,10 @@ class _RobotReader:
         upright = self._reading.pose(self._node).upright
         return bool(shapes) and self._parent is None and upright
 
-    def _wheels(self) -> list[_Driven]:
-        """Return the driven hinges that are wheels: round about a level axle, and down to the floor."""
-        round_ones = [
-            found
-            for found in self._driven
-            if abs(found.axle[2]) < _LEVEL
-            and found.radius > 0.0
-            and found.motor.spec.stops[0] == found.motor.spec.stops[1]
-            and found.turns_about_its_center()
-        ]
-        floor = min((found.bottom for found in round_ones), default=0.0)
-        return [found for found in round_ones if found.bottom <= floor + _OFF_CENTER * found.radius]
-
-    def _heights(self, wheels: Sequence[_Driven]) -> tuple[float, float]:
+    def _heights(self, wheels: Sequence[Driven]) -> tuple[float, float]:
         ends = [z for shape in self._outline for z in shape.heights()]
         if not ends:
-            return 0.0, max((found.bottom + 2.0 * found.radius for found in wheels), default=0.0)
+            return 0.0, max((found.top for found in wheels), default=0.0)
         floor = min((found.bottom for found in wheels), default=min(ends) - _STEP_M)
         return max(min(ends), floor + _STEP_M), max(ends)
 
@@ -218,7 +180,24 @@ class _RobotReader:
             self._read_device(_MOUNTED[node.type_name], node, place)
         elif node.type_name == "Solid" and not _moves(place):
             self._outline += bounding_shapes(self._reading, node, place)
+        elif node.type_name == "Track":
+            self._read_track(node, place)
         self._read_children(node, place)
+
+    def _read_track(self, node: SceneNode, place: Place) -> None:
+        """Take a track as fixed, with a belt that may drive the robot."""
+        shapes = list(bounding_shapes(self._reading, node, place))
+        motor = self._read_devices_of(node, node, place, Joint(axis=(1.0, 0.0, 0.0), slides=True))
+        if _moves(place):
+            return
+        self._outline += shapes
+        if motor is not None and shapes:
+            frame = place.world_pose
+            lowest = min(shapes, key=lambda shape: shape.heights()[0])
+            axle = turn(frame.rotation, (0.0, 1.0, 0.0))
+            self._driven.append(
+                Driven(motor=motor, axle=axle, anchor=frame.position, shape=lowest, belt=True)
+            )
 
     def _read_joint(self, node: SceneNode, place: Place) -> None:
         """Take the motor and the sensor of a joint, and what is on it."""
@@ -243,6 +222,8 @@ class _RobotReader:
                 self._read_children(end, place)
             elif end.type_name in _FRAMES:
                 self._read_end(end, place, joint)
+            else:
+                self._read_part(end, place)
 
     def _read_end(self, end: SceneNode, place: Place, joint: Joint) -> None:
         reading = self._reading
@@ -258,12 +239,12 @@ class _RobotReader:
 
     def _as_driven(
         self, joint: Joint, place: Place, shapes: Sequence[Shape], end: SceneNode
-    ) -> _Driven | None:
+    ) -> Driven | None:
         round_ones = [shape for shape in shapes if shape.kind != "box"]
         if joint.motor is None or joint.slides or not round_ones or _moves(place):
             return None
         frame = place.world_pose
-        return _Driven(
+        return Driven(
             motor=joint.motor,
             axle=turn(frame.rotation, joint.axis),
             anchor=frame.carry(joint.anchor),
@@ -286,14 +267,17 @@ class _RobotReader:
         return None if lowest is None else lowest[1]
 
     def _read_loose_joint(self, node: SceneNode, place: Place) -> None:
-        """Take a joint without motors, such as a caster, as fixed."""
+        """Take a joint without motors, such as a caster, as fixed, with all that is on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
             self._lacks(node, f"the stub simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):
-            if end.type_name in _FRAMES:
+            if end.type_name == "Solid":
                 inner = Place(place, *_where(self._reading, end))
                 self._on_joints += bounding_shapes(self._reading, end, inner)
                 self._parts.append((end, inner))
+                self._read_children(end, inner)
+            else:
+                self._read_part(end, place)
 
     def _read_devices_of(
         self, node: SceneNode, parameters: SceneNode, place: Place, joint: Joint
@@ -375,9 +359,3 @@ def _where(reading: Reading, node: SceneNode) -> tuple[Vector, tuple[float, floa
 
 def _triple(numbers: tuple[float, ...]) -> Vector:
     return numbers[0], numbers[1], numbers[2]
-
-
-def _level(vector: Vector) -> tuple[float, float]:
-    """Return the direction of a vector on the floor."""
-    length = math.hypot(vector[0], vector[1]) or 1.0
-    return vector[0] / length, vector[1] / length

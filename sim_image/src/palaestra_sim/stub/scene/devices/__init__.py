@@ -15,6 +15,7 @@ has the steps.
 - `connector`: the row of what feels another of its kind
 - `led`, `speaker`, `pen`, `display`: rows that only keep what a program sets
 - `camera`, `range_finder`, `radar`, `vacuum_gripper`: rows that nothing enables
+- `skin`: the row of meshes that move, of which there are none
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu
 """
@@ -46,6 +47,7 @@ from palaestra_sim.stub.scene.devices.position_sensor import POSITION_SENSOR
 from palaestra_sim.stub.scene.devices.radar import RADAR
 from palaestra_sim.stub.scene.devices.range_finder import RANGE_FINDER
 from palaestra_sim.stub.scene.devices.receiver import RECEIVER
+from palaestra_sim.stub.scene.devices.skin import SKIN
 from palaestra_sim.stub.scene.devices.speaker import SPEAKER
 from palaestra_sim.stub.scene.devices.touch_sensor import TOUCH_SENSOR
 from palaestra_sim.stub.scene.devices.vacuum_gripper import VACUUM_GRIPPER
@@ -80,5 +82,6 @@ DEVICES: Final[Mapping[str, Kind[Any]]] = {
         VACUUM_GRIPPER,
         LIDAR,
         DISPLAY,
+        SKIN,
     )
 }

@@ -207,7 +207,8 @@ class Kind(Generic[DeviceT]):
     Attributes:
         node: the type of its node.
         name: of a device whose node has none.
-        fields: of the node, written as in `catalogue`, beside `name` and, off joints, those of a Solid.
+        fields: of the node, written as in `catalogue`, beside `name` and, if it is one, those of a Solid.
+        solid: whether a node off joints is a Solid.
         role: one of `ROLES` for a device of a joint; "" for one with a frame of its own on the robot.
         read: returns the device of a node.
         sampler: returns a function that gives devices of one robot their values; None: they have none.
@@ -222,6 +223,7 @@ class Kind(Generic[DeviceT]):
     node: str
     name: str
     fields: str
+    solid: bool = True
     role: str = ""
     read: Callable[[Part], DeviceT]
     sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
@@ -235,6 +237,11 @@ class Kind(Generic[DeviceT]):
     def on_joint(self) -> bool:
         """Whether it is a device of a joint."""
         return bool(self.role)
+
+    @property
+    def body(self) -> bool:
+        """Whether its node is a Solid, which others may run into."""
+        return self.solid and not self.on_joint
 
 
 @dataclass(slots=True, kw_only=True, eq=False)

@@ -152,7 +152,7 @@ def _declared(type_name: str) -> str:
     if kind is None:
         return _FIELDS.get(type_name, "")
     own = f"name SFString {kind.name}; {kind.fields}"
-    return own if kind.on_joint else f"{_SOLID}; {own}"
+    return f"{_SOLID}; {own}" if kind.body else own
 
 
 def kinds_of(node: SceneNode) -> dict[str, FieldKind]:
