@@ -188,6 +188,39 @@ def test_a_conveyor_belt_is_refused():
         load_world("Track { device [ LinearMotor { } ] boundingObject Box { } }")
 
 
+@pytest.mark.parametrize(
+    ("header", "system", "fact"),
+    [
+        ("R2023b", 'coordinateSystem "NUE"', 'a world with coordinateSystem "NUE", whose y axis points up'),
+        ("R2021b", "", "a world of R2021b: before R2022a, robots, devices and shapes had other axes"),
+        ("V8.6.2", "", "a world of V8.6.2: before R2022a, robots, devices and shapes had other axes"),
+    ],
+)
+def test_a_world_with_other_axes_is_refused_unless_the_user_leaves_them_out(header, system, fact):
+    """Read as it stands, its walls would float and its robots lie."""
+    world = parse(f"#VRML_SIM {header} utf8\nViewpoint {{ }}\nWorldInfo {{ {system} }}".encode(), "my.wbt")
+
+    with pytest.raises(WorldError) as caught:
+        Simulation.of(world, "my.wbt")
+    assert str(caught.value).startswith(f"my.wbt:3:1: {fact}; convert it")
+
+    simulation = Simulation.of(world, "my.wbt", leave_out=LeaveOut(types=frozenset({"WorldInfo"})))
+    assert len(simulation.scene.left_out) == 1
+
+
+def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
+    """Webots turns them when it loads the file; a box and a stand-in have no such axis."""
+    post = "PROTO Post [ ] { Solid { boundingObject Cylinder { radius 0.1 height 2 } } }"
+    old = parse_proto(f"#VRML_SIM R2021b utf8\n{post}".encode(), "Post.proto")
+    simulation = Simulation.of(
+        parse(f"{HEAD}Post {{ }}".encode()), descriptions=Descriptions(protos={"Post": old})
+    )
+    (shape,) = simulation.scene.solids
+
+    assert shape.heights() == pytest.approx((-0.1, 0.1))
+    assert shape.obstacle().half_y == pytest.approx(1.0)
+
+
 def drive(simulation, seconds, **speeds):
     """Turn the motors of the one robot at these speeds in rad/s, and return where it is then."""
     (robot,) = simulation.robots

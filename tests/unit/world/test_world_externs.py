@@ -191,3 +191,29 @@ def test_files_are_read_from_the_disk(tmp_path: Path) -> None:
 
     assert list(result.local) == ["Stool"]
     assert "embedded null byte" in refusals(result)["a\0b"]
+
+
+def test_files_from_before_r2022b_find_the_protos_of_their_project_by_name(tmp_path: Path) -> None:
+    """They have no EXTERNPROTO lines, neither the world nor its PROTOs; folders below protos/ count too."""
+    (tmp_path / "worlds").mkdir()
+    (tmp_path / "protos" / "parts").mkdir(parents=True)
+    old = "#VRML_SIM R2022a utf8\n"
+    (tmp_path / "protos" / "Stool.proto").write_text(
+        f"{old}PROTO Stool [ field SFNode seat Seat {{ }} ] {{ Solid {{ children [ Leg {{ }} ] }} }}"
+    )
+    for name in ("Leg", "Seat", "Unused"):
+        (tmp_path / "protos" / "parts" / f"{name}.proto").write_text(old + proto(name))
+    (tmp_path / "protos" / "Torn.proto").write_text(f"{old}PROTO Torn [")
+    world = tmp_path / "worlds" / "room.wbt"
+
+    result = local_protos(world, parse(f"{old}Group {{ children [ Stool {{ }} Torn {{ }} ] }}".encode()))
+    assert list(result.local) == ["Stool", "Leg", "Seat"]
+    assert list(result.refused) == ["Torn"]
+
+    result = local_protos(world, parse(f"{HEADER}Stool {{ }}".encode()))
+    assert result == Protos()
+
+
+def test_a_world_without_a_file_has_no_project() -> None:
+    """So nothing is looked for beside it."""
+    assert local_protos(None, parse(b"#VRML_SIM R2021b utf8\nStool { }")) == Protos()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from palaestra_sim.errors import WorldError
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors begin a file in UTF-8 with it
+_RELEASE = re.compile(rb"#VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
 _HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
 
 
@@ -43,6 +44,11 @@ class Source:
             fact = f"the first line is not the header of a Webots {self.kind}"
             raise self.error(0, fact, "make it #VRML_SIM R2023b utf8")
         return match.group().decode()
+
+    def older_than(self, year: int, letter: str) -> bool:
+        """Return whether the file is of a release before R`year``letter`, such as R2022a."""
+        match = _RELEASE.match(self.data, self.begin)
+        return match is None or (int(match["year"]), match["letter"].decode()) < (year, letter)
 
     def error(self, offset: int, fact: str, remedy: str) -> WorldError:
         """Return an error at byte `offset`, for the caller to raise."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.scene.axes import check_axes
 from palaestra_sim.stub.scene.devices import DEVICES
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
@@ -73,6 +74,9 @@ def read_scene(tree: SceneTree, leave_out: LeaveOut | None = None) -> Scene:
         if node.type_name == "WorldInfo":
             reading.world_info = node
             _read_world_info(reading, node, scene)
+    first = reading.world_info or next(iter(tree.root.nodes()), None)
+    if first is not None:
+        check_axes(reading, first)
     for node in tree.root.nodes():
         _read(reading, node, None, scene)
     reading.conclude()

@@ -13,11 +13,13 @@ from typing import Final, Literal
 
 from palaestra_sim.stub.physics.geometry import Pose, Vector
 from palaestra_sim.stub.physics.obstacles import Block, Disc
+from palaestra_sim.stub.scene.axes import standing
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
 from palaestra_sim.stub.scene.reading import Reading
 
 _Z: Final = 2
+_ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
 _FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
 _ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
 
@@ -98,7 +100,7 @@ def _shapes(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Ite
                 yield from _shapes(reading, inner, place, inside)
         case "Plane":
             # A ceiling is out of the way of everything that stands on the floor.
-            if abs(place.world_pose.after(frame).rotation[8]) < _FLAT:
+            if abs(place.world_pose.after(standing(node, frame)).rotation[8]) < _FLAT:
                 reading.lacks(node, "a Plane that is no floor and no ceiling")
         case "IndexedFaceSet":
             yield from _mesh(reading, node, place, frame)
@@ -109,6 +111,7 @@ def _shapes(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Ite
 def _solid(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
     """Yield the shape of a Box, Cylinder, Capsule or Sphere."""
     kind: Literal["box", "cylinder", "ball"] = "cylinder"
+    local = standing(node, frame) if node.type_name in _ALONG_AN_AXIS else frame
     if node.type_name == "Box":
         kind = "box"
         x, y, z = reading.vector(node, "size", (0.1, 0.1, 0.1))
@@ -124,7 +127,7 @@ def _solid(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iter
     else:
         reading.lacks(node, f"the stub simulates no {node.type_name} as a boundingObject")
         return
-    yield Shape(kind=kind, size=(x, y, z), local=frame, place=place, node=node)
+    yield Shape(kind=kind, size=(x, y, z), local=local, place=place, node=node)
 
 
 def _mesh(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
