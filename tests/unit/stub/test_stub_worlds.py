@@ -221,6 +221,79 @@ def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
     assert shape.obstacle().half_y == pytest.approx(1.0)
 
 
+STRETCHED = """Solid { boundingObject Transform { translation 1 0 0 scale 3 2 1 children [
+  Transform { translation 1 0 0 children [ Box { size 1 1 1 } ] } ] } }"""
+STRETCHED_MESH = """Solid { boundingObject Transform { scale 1 2 1 children [
+  IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 1 1 ] } } ] } }"""
+BOX = "Solid { translation 1 0 0 boundingObject Box { size 1 2 3 } }"
+
+
+@pytest.mark.parametrize(
+    ("world", "found"),
+    [
+        (f"Transform {{ scale 2 2 2 children [ {BOX} ] }}", ("box", 2.0, 0.0, (2.0, 4.0, 6.0))),
+        (
+            STRETCHED,
+            ("box", 4.0, 0.0, (3.0, 2.0, 1.0)),
+        ),
+        (
+            "Solid { scale 2 2 2 boundingObject Cylinder { radius 1 height 1 } }",
+            ("cylinder", 0.0, 0.0, (4.0, 4.0, 2.0)),
+        ),
+        (
+            STRETCHED_MESH,
+            ("box", 0.5, 1.0, (1.0, 2.0, 1.0)),
+        ),
+    ],
+)
+def test_a_scale_makes_what_is_in_a_transform_larger(world, found):
+    """Places and sizes, also of a Solid from before R2023a."""
+    assert obstacles(load_world(world)) == [found]
+
+
+@pytest.mark.parametrize(
+    ("world", "fact"),
+    [
+        (f"Transform {{ scale 1 2 1 children [ {BOX} ] }}", "a Transform with a scale that distorts"),
+        (
+            "Solid { boundingObject Transform { scale 1 2 1 children [ Sphere { } ] } }",
+            "a Sphere that a scale",
+        ),
+        (
+            "Solid { boundingObject Transform { scale 1 2 1 children [ Pose { rotation 0 0 1 1 } ] } }",
+            "a Pose with a scale that distorts",
+        ),
+        ('Robot { scale 2 2 2 controller "ros" }', "a robot with a scale"),
+        (
+            'Robot { controller "ros" children [ Transform { scale 2 2 2 children [ HingeJoint { } ] } ] }',
+            "a HingeJoint in a Transform with a scale",
+        ),
+    ],
+)
+def test_a_scale_that_the_stub_cannot_follow_is_refused(world, fact):
+    """It can be left out, and then nothing of it is there."""
+    with pytest.raises(WorldError, match=fact):
+        load_world(world, leave_out=LeaveOut(names=True))
+
+    assert load_world(world, leave_out=LeaveOut(everything=True, names=True)).scene.solids == []
+
+
+def test_the_scale_of_a_stand_in_is_a_field_of_its_own():
+    """Some PROTOs have one number of that name."""
+    own = load("[Bush]\nfields = 'SFFloat scale 1'\nbox = ['scale', 1, 1]", "mine.toml")
+
+    assert obstacles(load_world("Bush { scale 3 }", stand_ins=own)) == [("box", 0.0, 0.0, (3.0, 1.0, 1.0))]
+
+
+def test_a_mesh_as_a_bounding_object_is_refused_by_name_and_can_be_left_out():
+    """The file that it names is never read."""
+    world = 'Solid { boundingObject Mesh { url "gone.dae" } } Solid { boundingObject Box { } }'
+    with pytest.raises(WorldError, match="the stub simulates no Mesh as a boundingObject"):
+        load_world(world)
+
+    assert len(load_world(world, leave_out=LeaveOut(types=frozenset({"Mesh"}))).scene.solids) == 1
+
+
 def drive(simulation, seconds, **speeds):
     """Turn the motors of the one robot at these speeds in rad/s, and return where it is then."""
     (robot,) = simulation.robots

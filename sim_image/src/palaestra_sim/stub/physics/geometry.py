@@ -36,6 +36,11 @@ class Pose(NamedTuple):
             self.position[2] + turned[2],
         )
 
+    def scaled(self, factor: float) -> Pose:
+        """Return the pose with a position that is `factor` times as far."""
+        x, y, z = self.position
+        return Pose((x * factor, y * factor, z * factor), self.rotation)
+
     @property
     def heading_rad(self) -> float:
         """The direction of the x axis, seen from above, in (-pi, pi]."""

@@ -19,10 +19,14 @@ class Place:
         parent: the place of the node around it; None at the top of the world.
         translation: x, y, z in meters, in the parent's frame.
         rotation: axis and angle in radians, in the parent's frame.
+        scale: meters of the world in a meter of this frame.
     """
 
-    def __init__(self, parent: Place | None, translation: Vector, rotation: AxisAngle) -> None:
+    def __init__(
+        self, parent: Place | None, translation: Vector, rotation: AxisAngle, size: float = 1.0
+    ) -> None:
         self.parent = parent
+        self.scale: float = size if parent is None else size * parent.scale
         self._translation = translation
         self._rotation = rotation
         self._start = (translation, rotation)
@@ -53,7 +57,10 @@ class Place:
     @property
     def world_pose(self) -> Pose:
         """The frame, in the world's."""
-        return self.pose if self.parent is None else self.parent.world_pose.after(self.pose)
+        parent, pose = self.parent, self.pose
+        if parent is None:
+            return pose
+        return parent.world_pose.after(pose if parent.scale == 1.0 else pose.scaled(parent.scale))
 
     @property
     def world_position(self) -> Vector:

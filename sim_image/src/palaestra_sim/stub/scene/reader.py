@@ -104,8 +104,10 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
         scene.robots.append(robot)
         _stand(reading, robot.standing, scene)
     elif kind in _FRAMES:
-        place = Place(parent, reading.translation(node), reading.rotation(node))
+        place = Place(parent, reading.translation(node), reading.rotation(node), reading.size(node))
         node.place = place
+        if node.left_out:
+            return
         if kind in _SOLIDS:
             _read_solid(reading, node, place, scene)
         _read_children(reading, node, place, scene)

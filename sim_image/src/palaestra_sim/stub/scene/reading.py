@@ -17,6 +17,7 @@ from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.stub.physics.geometry import AxisAngle, Pose, Vector, from_axis_angle
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 
+_DRAWN: Final = frozenset(("CadShape", "Shape"))
 ELSEWHERE: Final = "leave it out (--leave-out), or run this world with driver webots"
 
 
@@ -105,6 +106,23 @@ class Reading:
         """Return `rotation`, axis and angle."""
         x, y, z, angle_rad = self.vector(node, "rotation", (0.0, 0.0, 1.0, 0.0))
         return x, y, z, angle_rad
+
+    def scale(self, node: SceneNode) -> Vector:
+        """Return `scale`, which only a Transform has, and before R2023a a Solid; 1 1 1 if it has none."""
+        if node.stand_in:  # a field of its PROTO, whose shapes have taken it
+            return 1.0, 1.0, 1.0
+        x, y, z = self.vector(node, "scale", (1.0, 1.0, 1.0))
+        return x, y, z
+
+    def size(self, node: SceneNode) -> float:
+        """Return by how much a frame makes everything in it larger; note a scale that distorts solids."""
+        x, y, z = self.scale(node)
+        if x == y == z > 0.0:
+            return x
+        inside = any(child.type_name not in _DRAWN for child in node.nodes())
+        if inside or node.nodes("boundingObject"):
+            self.lacks(node, f"a {node.type_name} with a scale that distorts what is in it")
+        return 1.0
 
     def pose(self, node: SceneNode) -> Pose:
         """Return the frame of a node in the frame around it."""

@@ -95,6 +95,8 @@ class _RobotReader:
     def read(self) -> RobotParts:
         """Return the robot."""
         reading, node = self._reading, self._node
+        if reading.size(node) != 1.0 or (self._parent is not None and self._parent.scale != 1.0):
+            self._lacks(node, "a robot with a scale")
         self._outline += bounding_shapes(reading, node, self._frame)
         self._read_children(node, self._frame)
         wheels = wheels_among(self._driven)
@@ -168,9 +170,7 @@ class _RobotReader:
         elif kind in {"Group", "Slot"}:
             self._read_children(node, place)
         elif kind in _FRAMES:
-            self._read_frame(
-                node, Place(place, self._reading.translation(node), self._reading.rotation(node))
-            )
+            self._read_frame(node, Place(place, *_where(self._reading, node), self._reading.size(node)))
         elif kind not in _INERT:
             self._lacks(node, node.unusable or f"the stub simulates no {kind} on a robot")
 
@@ -202,6 +202,8 @@ class _RobotReader:
     def _read_joint(self, node: SceneNode, place: Place) -> None:
         """Take the motor and the sensor of a joint, and what is on it."""
         reading = self._reading
+        if place.scale != 1.0:
+            self._lacks(node, f"a {node.type_name} in a Transform with a scale")
         slides = node.type_name == "SliderJoint"
         parameters = next(iter(node.nodes("jointParameters")), node)
         axis = unit(

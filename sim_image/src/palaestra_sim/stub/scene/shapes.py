@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
-from palaestra_sim.stub.physics.geometry import Pose, Vector
+from palaestra_sim.stub.physics.geometry import IDENTITY, Pose, Vector
 from palaestra_sim.stub.physics.obstacles import Block, Disc
 from palaestra_sim.stub.scene.axes import standing
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
@@ -85,33 +85,60 @@ class Shape:
 
 def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
     """Yield the shapes of a node's boundingObject that the stub can simulate; the others are refused."""
+    grown = _Grown(Pose(), (place.scale, place.scale, place.scale))
     for node in owner.nodes("boundingObject"):
-        yield from _shapes(reading, node, place, Pose())
+        yield from _shapes(reading, node, place, grown)
 
 
-def _shapes(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
+class _Grown(NamedTuple):
+    """A frame inside a boundingObject, and by how much it makes what is in it larger, along its axes."""
+
+    frame: Pose
+    scale: Vector
+
+    def at(self, position: Vector) -> Pose:
+        """Return the frame around a position in this one."""
+        x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
+        return self.frame.after(Pose((x, y, z)))
+
+    def inside(self, pose: Pose, scale: Vector) -> _Grown:
+        """Return the frame of a node in this one; turned in a distorted frame, it would be none."""
+        x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
+        return _Grown(self.at(pose.position).after(Pose(rotation=pose.rotation)), (x, y, z))
+
+    @property
+    def even(self) -> bool:
+        """Whether it keeps angles."""
+        return self.scale[0] == self.scale[1] == self.scale[2]
+
+
+def _shapes(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
     match node.type_name:
         case "Shape":
             for inner in node.nodes("geometry"):
-                yield from _shapes(reading, inner, place, frame)
+                yield from _shapes(reading, inner, place, grown)
         case "Group" | "Pose" | "Transform":
-            inside = frame.after(reading.pose(node))
+            pose, scale = reading.pose(node), reading.scale(node)
+            if min(scale) <= 0.0 or not (grown.even or pose.rotation == IDENTITY):
+                reading.lacks(node, f"a {node.type_name} with a scale that distorts what is in it")
+                return
             for inner in node.nodes():
-                yield from _shapes(reading, inner, place, inside)
+                yield from _shapes(reading, inner, place, grown.inside(pose, scale))
         case "Plane":
             # A ceiling is out of the way of everything that stands on the floor.
-            if abs(place.world_pose.after(standing(node, frame)).rotation[8]) < _FLAT:
+            normal = place.world_pose.after(standing(node, grown.frame)).rotation[8]
+            if abs(normal) < _FLAT:
                 reading.lacks(node, "a Plane that is no floor and no ceiling")
         case "IndexedFaceSet":
-            yield from _mesh(reading, node, place, frame)
+            yield from _mesh(reading, node, place, grown)
         case _:
-            yield from _solid(reading, node, place, frame)
+            yield from _solid(reading, node, place, grown)
 
 
-def _solid(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
+def _solid(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
     """Yield the shape of a Box, Cylinder, Capsule or Sphere."""
     kind: Literal["box", "cylinder", "ball"] = "cylinder"
-    local = standing(node, frame) if node.type_name in _ALONG_AN_AXIS else frame
+    local = standing(node, grown.frame) if node.type_name in _ALONG_AN_AXIS else grown.frame
     if node.type_name == "Box":
         kind = "box"
         x, y, z = reading.vector(node, "size", (0.1, 0.1, 0.1))
@@ -127,10 +154,15 @@ def _solid(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iter
     else:
         reading.lacks(node, f"the stub simulates no {node.type_name} as a boundingObject")
         return
-    yield Shape(kind=kind, size=(x, y, z), local=local, place=place, node=node)
+    if kind != "box" and not grown.even:
+        reading.lacks(node, f"a {node.type_name} that a scale distorts")
+        return
+    along, across, up = grown.scale
+    size = (x * along, y * across, z * up)
+    yield Shape(kind=kind, size=size, local=local, place=place, node=node)
 
 
-def _mesh(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Iterator[Shape]:
+def _mesh(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
     """Yield the box around the points of a mesh."""
     points = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
     if not points or len(points) % 3:
@@ -139,5 +171,5 @@ def _mesh(reading: Reading, node: SceneNode, place: Place, frame: Pose) -> Itera
     low = [min(points[axis::3]) for axis in range(3)]
     high = [max(points[axis::3]) for axis in range(3)]
     middle = ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, (low[2] + high[2]) / 2.0)
-    size = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
-    yield Shape(kind="box", size=size, local=frame.after(Pose(middle)), place=place, node=node)
+    x, y, z = ((high[axis] - low[axis]) * grown.scale[axis] for axis in range(3))
+    yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)

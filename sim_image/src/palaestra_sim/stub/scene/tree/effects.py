@@ -24,6 +24,7 @@ _ACTING: Final = DEVICES.keys() | frozenset(
         "Pose",
         "Robot",
         "Solid",
+        "Track",
         "Transform",
         "WorldInfo",
     )
