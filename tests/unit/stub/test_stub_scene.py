@@ -181,6 +181,10 @@ BAD = {
     "a slope": ("Solid { rotation 1 0 0 0.5 boundingObject Plane { } }", "a Plane that is no floor"),
     "a dangling USE": ("Solid { boundingObject USE NOTHING }", "USE NOTHING has no DEF before it"),
     "a malformed translation": ("Pose { translation 1 2 }", "Pose.translation is not 3 numbers"),
+    "a place beyond all floats": (
+        "Solid { translation 1e200 0 0 boundingObject Box { } }",
+        r"Solid.translation has a number above 1e\+100",
+    ),
     "a malformed radius": (
         'Solid { boundingObject Cylinder { radius "1" } }',
         "Cylinder.radius is not a number",

@@ -7,6 +7,7 @@ import pytest
 from palaestra_sim.errors import WorldError
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.front.simulator import StubSimulator
+from palaestra_sim.stub.scene.nodes import growing
 from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.reading import LeaveOut
 from palaestra_sim.stub.scene.simulation import Mode, Simulation
@@ -82,6 +83,27 @@ def test_a_proto_inside_itself_ends():
     """The files were refused before; a table of descriptions may still have one."""
     with pytest.raises(WorldError, match="PROTOs are nested more than 20 deep"):
         load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } ] } }")
+
+
+def test_protos_that_double_at_each_level_end(monkeypatch):
+    """Twenty levels would be a million nodes; the world is refused instead."""
+    monkeypatch.setattr(growing, "MAX_NODES", 1000)
+
+    with pytest.raises(WorldError, match="the world has more than 1000 nodes"):
+        load_world("Loop { }", "PROTO Loop [ ] { Group { children [ Loop { } Loop { } ] } }")
+
+
+@pytest.mark.parametrize(
+    ("sensor", "fact"),
+    [
+        ("DistanceSensor { numberOfRays 1000000 }", "a distance sensor with 1000000 rays; use 1 to 10000"),
+        ("Lidar { numberOfLayers 20000 }", "a lidar with 10240000 rays; use 1000000 at most"),
+    ],
+)
+def test_a_number_of_rays_that_is_a_slip_is_refused(sensor, fact):
+    """Otherwise the start would take minutes, without a word."""
+    with pytest.raises(WorldError, match=fact):
+        load_world(f'Robot {{ controller "ros" children [ {sensor} ] }}', leave_out=LeaveOut(names=True))
 
 
 def test_a_stand_in_has_the_size_of_its_instance_and_can_be_moved():

@@ -18,6 +18,7 @@ from palaestra_sim.stub.physics.geometry import AxisAngle, Pose, Vector, from_ax
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 
 _DRAWN: Final = frozenset(("CadShape", "Shape"))
+_LARGEST: Final = 1e100  # squares of larger ones would overflow
 ELSEWHERE: Final = "leave it out (--leave-out), or run this world with driver webots"
 
 
@@ -90,6 +91,11 @@ class Reading:
         if numbers is None or len(numbers) != len(default) or not all(map(math.isfinite, numbers)):
             wanted = "a number" if len(default) == 1 else f"{len(default)} numbers"
             self.refuse(node, f"{node.type_name}.{field} is not {wanted}", f"write {wanted}")
+            return default
+        if max(map(abs, numbers)) > _LARGEST:
+            self.refuse(
+                node, f"{node.type_name}.{field} has a number above {_LARGEST:g}", "write a smaller one"
+            )
             return default
         return numbers
 

@@ -21,6 +21,7 @@ from palaestra_sim.stub.scene.devices.kind import Carrier, Kind, Part, Sample, T
 from palaestra_sim.stub.scene.devices.response import table_rows, table_service
 from palaestra_sim.stub.seam import Row
 
+_MOST_RAYS: Final = 10_000  # each is cast at every step
 _TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
 # For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
 # aperture.
@@ -77,7 +78,11 @@ def _read(part: Part) -> DistanceSensor:
         part.lack("a distance sensor with a resolution")
     table = lookup_table(*table_rows(part, _TABLE, "distances"))
     aperture_rad = part.number("aperture", 1.5708)
-    cone = _cone(int(part.number("numberOfRays", 1.0)), aperture_rad)
+    rays = int(part.number("numberOfRays", 1.0))
+    if rays > _MOST_RAYS:
+        part.refuse(f"a distance sensor with {rays} rays", f"use 1 to {_MOST_RAYS}")
+        rays = 1
+    cone = _cone(rays, aperture_rad)
     return DistanceSensor(
         name=part.name,
         model=part.text("model"),
@@ -130,7 +135,8 @@ def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
     if len(cone) == 1:
         return (1.0,)
     weights = [math.exp(-((math.acos(min(1.0, x)) / width_rad) ** 2)) for x, _, _ in cone]
-    return tuple(weight / sum(weights) for weight in weights)
+    total = sum(weights)
+    return tuple(weight / total for weight in weights)
 
 
 def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:

@@ -22,6 +22,7 @@ from palaestra_sim.stub.scene.devices.response import discrete
 from palaestra_sim.stub.seam import Fields, Row, UnsimulatedError
 
 _FLOAT_BYTES: Final = 4
+_MOST_RAYS: Final = 1_000_000
 _POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
 _FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
 _POINT_FIELDS: Final = [
@@ -131,6 +132,9 @@ def _read(part: Part) -> Lidar:
         "minRange": number("minRange", 0.01),
         "maxRange": number("maxRange", 1.0),
     }
+    if (rays := info["horizontalResolution"] * info["numberOfLayers"]) > _MOST_RAYS:
+        part.refuse(f"a lidar with {rays} rays", f"use {_MOST_RAYS} at most")
+        info.update(horizontalResolution=1, numberOfLayers=1)
     directions = tuple(_layers(info))
     return Lidar(
         name=part.name,

@@ -26,6 +26,7 @@ _SHAPES: Final = {
     "plane": ("Plane", ("size",)),
 }
 MAX_DEPTH: Final = 20  # of PROTOs inside PROTOs; Webots' own robots have three
+MAX_NODES: Final = 250_000  # PROTOs with two of each other grow to a million in 20 steps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +113,10 @@ class Grower:
         if scope.depth >= MAX_DEPTH:
             fact = f"PROTOs are nested more than {MAX_DEPTH} deep"
             self.refused.append(scope.error(source, fact, "break the circle"))
+            return None
+        if len(self.nodes) > MAX_NODES:
+            fact = f"the world has more than {MAX_NODES} nodes"
+            self.refused.append(scope.error(source, fact, "break a circle of PROTOs, or use fewer"))
             return None
         unknown = [name for name in source.fields if name not in proto.fields and " " not in name]
         for name in unknown:
