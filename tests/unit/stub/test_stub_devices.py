@@ -110,7 +110,7 @@ def test_its_node_has_the_fields_of_webots(name):
 def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
     """A success without effect would leave a client with a world that is not the one it wrote."""
     tree = stub(name).simulation.tree
-    node = next(it for it in tree.nodes if it.type_name == name)
+    node = next(it for it in tree.nodes.values() if it.type_name == name)
 
     with pytest.raises(UnsimulatedError, match=f"the stub cannot change {name}.name"):
         require_effect(node, "name")

@@ -25,7 +25,7 @@ from palaestra_sim.world.generate import generate, rename
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.parts import Part
 from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
-from palaestra_sim.world.reader import parse
+from palaestra_sim.world.reader import parse, parse_nodes
 from palaestra_sim.world.robots import WorldRobot, own_controllers, robots
 from palaestra_sim.world.stand_ins import StandIn, expand, load_stand_ins
 from palaestra_sim.world.stand_ins import shipped as shipped_stand_ins
@@ -58,6 +58,7 @@ __all__ = [
     "name_prefix",
     "own_controllers",
     "parse",
+    "parse_nodes",
     "parse_proto",
     "rename",
     "robots",

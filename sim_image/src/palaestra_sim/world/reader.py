@@ -34,6 +34,16 @@ def parse(source: bytes, name: str = "world") -> World:
     return Reader(text, tokenize(text)).world(header)
 
 
+def parse_nodes(text: str, name: str) -> World:
+    """Return the nodes of a text that has no header, as a program gives them; `name` is for errors.
+
+    Raises:
+        WorldError: the text describes no nodes; the message has the place, the fact and the remedy.
+    """
+    source = Source(data=text.encode(), name=name, headless=True)
+    return Reader(source, tokenize(source)).world("")
+
+
 class Reader:
     """A position in a sequence of tokens, and the rules that move it."""
 

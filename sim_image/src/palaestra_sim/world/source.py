@@ -16,11 +16,15 @@ _HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """The bytes of a file, and its name in errors; `kind` is "world" or "PROTO"."""
+    """The bytes of a file, and its name in errors; `kind` is "world" or "PROTO".
+
+    A `headless` one is no file: a program gave it, without a first line, in the syntax of today.
+    """
 
     data: bytes
     name: str
     kind: str = "world"
+    headless: bool = False
 
     @property
     def begin(self) -> int:
@@ -48,7 +52,9 @@ class Source:
     def older_than(self, year: int, letter: str) -> bool:
         """Return whether the file is of a release before R`year``letter`, such as R2022a."""
         match = _RELEASE.match(self.data, self.begin)
-        return match is None or (int(match["year"]), match["letter"].decode()) < (year, letter)
+        if match is None:
+            return not self.headless
+        return (int(match["year"]), match["letter"].decode()) < (year, letter)
 
     def error(self, offset: int, fact: str, remedy: str) -> WorldError:
         """Return an error at byte `offset`, for the caller to raise."""

@@ -53,10 +53,10 @@ class Handles:
         """Return the node of a handle.
 
         Raises:
-            NoSuchHandleError: it is 0, of another load, or never was one of a node.
+            NoSuchHandleError: it is 0, of another load, of a removed node, or never was one of a node.
         """
         held = self._held.get(handle)
-        if not isinstance(held, SceneNode):
+        if not isinstance(held, SceneNode) or self._is_gone(held):
             raise NoSuchHandleError(f"node {handle:#x} does not exist; get a new handle")
         return held
 
@@ -64,12 +64,15 @@ class Handles:
         """Return the field of a handle.
 
         Raises:
-            NoSuchHandleError: it is 0, of another load, or never was one of a field.
+            NoSuchHandleError: it is 0, of another load, of a removed node, or never was one of a field.
         """
         held = self._held.get(handle)
-        if not isinstance(held, Field):
+        if not isinstance(held, Field) or self._is_gone(held.node):
             raise NoSuchHandleError(f"field {handle:#x} does not exist; get a new handle")
         return held
+
+    def _is_gone(self, node: SceneNode) -> bool:
+        return self.tree.of_number(node.number) is not node
 
     def field_of(self, node: SceneNode, name: str) -> Field | None:
         """Return a node's field; None if a node of this type has none of that name."""

@@ -90,6 +90,14 @@ class Motor:
         self.angle_rad = self.spec.start_rad
         self.changed = True
 
+    def put(self, angle_rad: float) -> None:
+        """Put the shaft to an angle within the stops, which becomes the target."""
+        low, high = self.spec.stops
+        self.angle_rad = angle_rad if low == high else max(low, min(high, angle_rad))
+        self.target_rad = self.angle_rad
+        self.speed_rad_s = 0.0
+        self.changed = True
+
     def set_position(self, target_rad: float) -> None:
         """Turn to `target_rad`, or with infinity at the commanded velocity. NaN is ignored."""
         if math.isnan(target_rad):

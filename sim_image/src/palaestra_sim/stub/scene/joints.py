@@ -7,7 +7,7 @@ world file holds at the joint's `position` in the file.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from palaestra_sim.stub.physics.geometry import AxisAngle, Pose, Vector, from_axis_angle, to_axis_angle, turn
 from palaestra_sim.stub.physics.motors import Motor
@@ -23,7 +23,8 @@ class Joint:
         anchor: a point on the axis of a hinge, in meters.
         slides: whether it is a slider.
         start: the position in the file, in rad or m.
-        motor: that moves it; None: it stays.
+        motor: that moves it; None: it stays where it is put.
+        position: where a joint without a motor is, in rad or m.
     """
 
     axis: Vector
@@ -31,10 +32,26 @@ class Joint:
     slides: bool = False
     start: float = 0.0
     motor: Motor | None = None
+    position: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.position = self.start
+
+    @property
+    def now(self) -> float:
+        """Its position, in rad or m."""
+        return self.position if self.motor is None else self.motor.angle_rad
+
+    def put(self, position: float) -> None:
+        """Put it to a position, at rest there; a motor holds it, as in Webots."""
+        if self.motor is None:
+            self.position = position
+        else:
+            self.motor.put(position)
 
     def carry(self, pose: Pose) -> Pose:
         """Return where a frame is now that is at `pose` in the world file."""
-        moved = 0.0 if self.motor is None else self.motor.angle_rad - self.start
+        moved = self.now - self.start
         if moved == 0.0:
             return pose
         x, y, z = self.axis
@@ -77,7 +94,9 @@ class JointPlace(Place):
         self._rotation = value
 
     def return_to_start(self) -> None:
-        """Do nothing: the joint's motor returns to its start."""
+        """Put the joint back; its motor returns to its start by itself."""
+        if self.joint.motor is None:
+            self.joint.put(self.joint.start)
 
 
 def unit(vector: Vector) -> Vector | None:

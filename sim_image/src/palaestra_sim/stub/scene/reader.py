@@ -52,6 +52,7 @@ class Scene:
         solids: the obstacles.
         robots: in the order of the world file.
         left_out: what the stub lacks and the user left out, each with its place.
+        leave_out: what the user leaves out.
     """
 
     basic_step_ms: int = 32
@@ -59,6 +60,7 @@ class Scene:
     solids: list[Shape] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
     left_out: tuple[WorldError, ...] = ()
+    leave_out: LeaveOut = field(default_factory=LeaveOut)
 
 
 def read_scene(tree: SceneTree, leave_out: LeaveOut | None = None) -> Scene:
@@ -81,6 +83,23 @@ def read_scene(tree: SceneTree, leave_out: LeaveOut | None = None) -> Scene:
         _read(reading, node, None, scene)
     reading.conclude()
     scene.left_out = tuple(reading.left_out)
+    scene.leave_out = reading.leave_out
+    return scene
+
+
+def read_added(tree: SceneTree, nodes: Iterable[SceneNode], leave_out: LeaveOut) -> Scene:
+    """Return what nodes add to a world, all inside one parent, and give them their places.
+
+    Raises:
+        WorldError: they have things that the stub cannot simulate.
+    """
+    reading = Reading((), leave_out)
+    reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
+    scene = Scene()
+    for node in nodes:
+        places = (around.place for around in node.ancestors() if around.place is not None)
+        _read(reading, node, next(places, None), scene)
+    reading.conclude()
     return scene
 
 

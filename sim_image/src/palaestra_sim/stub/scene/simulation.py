@@ -13,18 +13,23 @@ read.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import IntEnum
 
+from palaestra_sim.errors import SimError
 from palaestra_sim.stub.scene.air import Air
 from palaestra_sim.stub.scene.devices.connector import Connector
 from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
-from palaestra_sim.stub.scene.reader import Scene, read_scene
+from palaestra_sim.stub.scene.reader import Scene, read_added, read_scene
 from palaestra_sim.stub.scene.reading import LeaveOut, Reading
 from palaestra_sim.stub.scene.robot import Robot
 from palaestra_sim.stub.scene.shapes import bounding_shapes
+from palaestra_sim.stub.scene.states import States, require_joint
+from palaestra_sim.stub.scene.tree.effects import require_removable, require_room
+from palaestra_sim.stub.scene.tree.fields import Field
 from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world import World, parse
 
@@ -57,12 +62,9 @@ class Simulation:
         self.quit_status: int | None = None
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
-        devices = [it for robot in self.robots for _, it in robot.parts.devices.rows.values()]
-        self._air = Air(devices)
-        connectors = tuple(it for it in devices if isinstance(it, Connector))
-        for connector in connectors:
-            connector.others = connectors
-        self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
+        self._added: list[SceneNode] = []
+        self._states = States(tree.nodes.values())
+        self._assemble()
         self._step_s = scene.basic_step_ms / 1000.0
         self._solids_moved = False
         self._arrange()
@@ -174,6 +176,86 @@ class Simulation:
             node.place.rotation = (x, y, z, angle_rad)
         self._moved(node.place)
 
+    def add(self, text: str, field: Field, index: int) -> bool:
+        """Insert the nodes of `text` into a field, at once; False if the field has no place at `index`.
+
+        A reset removes them again. `index` counts from 0, or from the end: -1 is after the last one.
+
+        Raises:
+            WorldError: the text is wrong, or has something that the stub cannot simulate.
+            UnsimulatedError: the field takes no such nodes while the simulation runs.
+        """
+        at = field.room(index)
+        if at is None:
+            return False
+        added = self.tree.grow(text, field.node)
+        try:
+            require_room(field.node, field.name, added)
+            read = field.name == "children"  # other fields hold what is drawn
+            fresh = read_added(self.tree, added, self.scene.leave_out) if read else Scene()
+        except SimError:
+            self.tree.forget(added)
+            raise
+        self.tree.attach(added, field.name, at)
+        self._added += added
+        self._states.begin(inside for node in added for inside in (node, *node.descendants()))
+        self.scene.solids += fresh.solids
+        self.scene.robots += fresh.robots
+        self.robots += tuple(Robot(parts, self.scene.random_seed) for parts in fresh.robots)
+        self._assemble()
+        self._arrange()
+        return True
+
+    def remove(self, node: SceneNode) -> None:
+        """Remove a node and all inside it, at once; a reset does not bring it back.
+
+        Raises:
+            UnsimulatedError: the simulation cannot go on without it.
+        """
+        require_removable(node)
+        gone = {node, *node.descendants()}
+        self.tree.remove(node)
+        self.scene.solids = [shape for shape in self.scene.solids if shape.node not in gone]
+        self.scene.robots = [parts for parts in self.scene.robots if parts.node not in gone]
+        self.robots = tuple(robot for robot in self.robots if robot.parts.node not in gone)
+        self._assemble()
+        self._arrange()
+
+    def save_state(self, node: SceneNode, name: str) -> None:
+        """Save the places and joints of a node, and of all inside it, under a name."""
+        self._states.save(node, name)
+
+    def load_state(self, node: SceneNode, name: str) -> None:
+        """Return a node to a saved state, at rest; "__init__" is that of the world file.
+
+        Raises:
+            UnsimulatedError: no state of that name was saved.
+        """
+        self._states.load(node, name)
+        for robot in self.robots:
+            if robot.parts.node in {node, *node.descendants(), *node.ancestors()}:
+                robot.halt()
+        self._solids_moved = True
+        self._arrange()
+
+    def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
+        """Put a joint to a position, in rad or m; its motor holds it there.
+
+        Raises:
+            UnsimulatedError: the node is no joint with an axis `index`, counted from 1.
+        """
+        if math.isfinite(position):
+            require_joint(node, index).joint.put(position)
+
+    def _assemble(self) -> None:
+        """Connect the devices of all robots."""
+        devices = [it for robot in self.robots for _, it in robot.parts.devices.rows.values()]
+        self._air = Air(devices)
+        connectors = tuple(it for it in devices if isinstance(it, Connector))
+        for connector in connectors:
+            connector.others = connectors
+        self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
+
     def _resize(self, node: SceneNode) -> None:
         """Read the outline of an obstacle anew, of which a part has another size."""
         owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
@@ -211,7 +293,11 @@ class Simulation:
     def _restore(self) -> None:
         self._reset_asked = False
         self.time_ms = 0
-        for node in self.tree.nodes:
+        added, self._added = self._added, []
+        for node in added:
+            if self.tree.of_number(node.number) is node:
+                self.remove(node)
+        for node in self.tree.nodes.values():
             if node.place is not None:
                 node.place.return_to_start()
         self._air.clear()

@@ -21,7 +21,7 @@ def summary(simulation: Simulation) -> Iterator[str]:
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
-    stand_ins = Counter(node.proto_name for node in simulation.tree.nodes if node.stand_in)
+    stand_ins = Counter(node.proto_name for node in simulation.tree.nodes.values() if node.stand_in)
     if stand_ins:
         yield f"stand-ins, which stand still: {_counted(stand_ins)}"
     silent = silent_devices(simulation)

@@ -71,8 +71,8 @@ class FieldServices:
             ("get_count", "field_get_count", self._get_count),
             ("get_node", "field_get_node", self._get_node),
             ("remove", "field_remove", self._remove),
-            ("import_node_from_string", "field_import_node_from_string", self._refuse_node),
-            ("remove_node", "field_remove_node", self._refuse_node),
+            ("import_node_from_string", "field_import_node_from_string", self._import_node),
+            ("remove_node", "field_remove_node", self._remove_node),
             ("enable_sf_tracking", "field_enable_sf_tracking", self._accept),
             ("disable_sf_tracking", "field_disable_sf_tracking", self._accept),
         ]
@@ -125,12 +125,26 @@ class FieldServices:
         return {"node": self._handles.of(node)}
 
     def _remove(self, request: Any) -> Fields:
-        return {"success": int(self._field(request).remove(request.index))}
+        field = self._field(request)
+        if field.kind.type is FieldType.NODE:
+            return self._remove_node_at(field, request.index)
+        return {"success": int(field.remove(request.index))}
 
-    def _refuse_node(self, request: Any) -> Fields:
-        """Add and remove no nodes: the stub simulates what the world file has."""
-        self._field(request)
-        return {"success": 0}
+    def _import_node(self, request: Any) -> Fields:
+        field = self._field(request)
+        return {"success": int(self._handles.simulation.add(request.nodeString, field, request.position))}
+
+    def _remove_node(self, request: Any) -> Fields:
+        return self._remove_node_at(self._field(request), request.position)
+
+    def _remove_node_at(self, field: Field, index: int) -> Fields:
+        try:
+            node = field.get(FieldType.NODE, index)
+        except NoValueError:
+            node = None
+        if node is not None:
+            self._handles.simulation.remove(node)
+        return {"success": int(node is not None)}
 
     def _accept(self, request: Any) -> Fields:
         self._field(request)

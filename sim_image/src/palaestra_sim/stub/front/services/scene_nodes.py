@@ -1,6 +1,6 @@
 """Services under `supervisor/node/`: a node's type, its place, and changes to it.
 
-A request for something that the stub lacks (forces, saved states, new nodes) fails with a sentence that says
+A request for something that the stub lacks (forces, contact points) fails with a sentence that says
 so, instead of a success that did nothing.
 """
 
@@ -75,12 +75,12 @@ class NodeServices:
             ("add_torque", "node_add_force_or_torque", _unable("torques")),
             ("move_viewpoint", "node_move_viewpoint", self._accept),
             ("set_visibility", "node_set_visibility", self._accept),
-            ("remove", "node_remove", _unable("removal of nodes")),
+            ("remove", "node_remove", self._remove),
             ("reset_physics", "node_reset_functions", self._reset_physics),
             ("restart_controller", "node_reset_functions", self._restart_controller),
-            ("save_state", "node_set_string", _unable("saved states")),
-            ("load_state", "node_set_string", _unable("saved states")),
-            ("set_joint_position", "node_set_joint_position", _unable("joints set by hand")),
+            ("save_state", "node_set_string", self._save_state),
+            ("load_state", "node_set_string", self._load_state),
+            ("set_joint_position", "node_set_joint_position", self._set_joint_position),
         )
 
     def _node(self, request: Any) -> SceneNode:
@@ -179,6 +179,23 @@ class NodeServices:
             return {"value": self._handles.tree.source.decode()}
         start, end = origin.node.span
         return {"value": origin.source.data[start:end].decode()}
+
+    def _remove(self, request: Any) -> Fields:
+        self._handles.simulation.remove(self._node(request))
+        return {"success": 1}
+
+    def _save_state(self, request: Any) -> Fields:
+        self._handles.simulation.save_state(self._node(request), request.state_name)
+        return {"success": 1}
+
+    def _load_state(self, request: Any) -> Fields:
+        self._handles.simulation.load_state(self._node(request), request.state_name)
+        return {"success": 1}
+
+    def _set_joint_position(self, request: Any) -> Fields:
+        node = self._node(request)
+        self._handles.simulation.set_joint_position(node, request.position, request.index)
+        return {"success": True}
 
     def _reset_physics(self, request: Any) -> Fields:
         robot = self._robot(self._node(request))

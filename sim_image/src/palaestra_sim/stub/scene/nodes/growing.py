@@ -6,6 +6,7 @@ node, with the values of the instance. It keeps the DEF name and the place in th
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -54,7 +55,8 @@ class Grower:
 
     def __init__(self, descriptions: Descriptions) -> None:
         self._descriptions = descriptions
-        self.nodes: list[SceneNode] = []
+        self.nodes: dict[int, SceneNode] = {}
+        self._numbers = itertools.count()
         self._twins: dict[tuple[Scope, int], list[SceneNode]] = {}
         self.refused: list[WorldError] = []
 
@@ -172,8 +174,8 @@ class Grower:
         return pose
 
     def _new(self, type_name: str, origin: Origin | None, parent: SceneNode | None) -> SceneNode:
-        node = SceneNode(len(self.nodes), type_name, origin, parent)
-        self.nodes.append(node)
+        node = SceneNode(next(self._numbers), type_name, origin, parent)
+        self.nodes[node.number] = node
         return node
 
     def _refuse_unknown(self, value: Value, source: Node, scope: Scope) -> None:

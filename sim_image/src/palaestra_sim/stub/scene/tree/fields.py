@@ -92,6 +92,15 @@ class Field:
         self._writes += 1
         self._changes.before_next_step(self._take_effect)
 
+    def room(self, index: int) -> int | None:
+        """Return where a node inserted at `index` comes to be, -1 for the end; None if that is impossible."""
+        size = len(self._current())
+        if self.kind.type is not FieldType.NODE:
+            return None
+        if not self.kind.multiple:
+            return 0 if self._current() == [None] else None
+        return (index if index >= 0 else size + 1 + index) if -size - 1 <= index <= size else None
+
     def insert(self, type_: FieldType, index: int, value: Any) -> bool:
         """Insert a value before `index`, -1 for the end; return False if that is impossible.
 
@@ -125,6 +134,8 @@ class Field:
 
     def _current(self) -> list[Any]:
         """Return the values: those written last, else those of the simulation."""
+        if self.kind.type is FieldType.NODE:
+            return _initial(self.node, self.name, self.kind)
         if self._writes == 0:
             place = self.node.place
             if place is not None and self.name == "translation":

@@ -1,0 +1,221 @@
+"""Worlds that change while they run: nodes added and removed, saved states, joints put by hand."""
+
+import math
+
+import pytest
+
+from palaestra_sim.stub.ros.node import ServiceFailed
+
+WALL = 'DEF WALL Solid { translation 1.3 0.5 0.5 boundingObject Box { size 0.1 4 1 } name "wall" }'
+STEP_MS = 32
+
+
+@pytest.fixture
+def children(robot):
+    """The handle of the root's children."""
+    root = robot.get("supervisor/get_root")
+    return robot.get("supervisor/node/get_field", node=root, fieldName="children")
+
+
+@pytest.fixture
+def add(robot, children):
+    """`add(text, position)`: the answer of an import into the root's children."""
+
+    def call(text, position=-1, field=None):
+        return robot.get(
+            "supervisor/field/import_node_from_string",
+            field=children if field is None else field,
+            position=position,
+            nodeString=text,
+        )
+
+    return call
+
+
+@pytest.fixture
+def find(robot):
+    """`find("WALL")`: the handle of a node by its DEF."""
+    return lambda name: robot.get("supervisor/get_from_def", name=name)
+
+
+def count(robot, field):
+    """Return the number of values of a field."""
+    return robot.get("supervisor/field/get_count", field=field)
+
+
+def test_an_added_node_is_found_and_counts_at_once(robot, children, add, find):
+    """Also while the simulation is paused, as in Webots."""
+    before = count(robot, children)
+
+    assert add(WALL) == 1
+    assert count(robot, children) == before + 1
+    wall = find("WALL")
+    assert robot.get("supervisor/field/get_node", field=children, index=-1) == wall
+    assert robot.get("supervisor/node/get_parent_node", node=wall) == robot.get("supervisor/get_root")
+    assert robot.get("supervisor/node/get_position", node=wall) == (1.3, 0.5, 0.5)
+    assert "DEF WALL" in robot.get("supervisor/node/export_string", node=wall)
+
+
+def test_several_nodes_are_added_in_their_order_before_the_position(robot, children, add, find):
+    """A position counts from 0, or from the end."""
+    assert add("DEF A Group { } DEF B Group { }", position=1) == 1
+
+    assert robot.get("supervisor/field/get_node", field=children, index=1) == find("A")
+    assert robot.get("supervisor/field/get_node", field=children, index=2) == find("B")
+
+
+def test_an_added_solid_is_an_obstacle_until_it_is_removed(start, ros):
+    """Rays see it at the next step."""
+    simulation = start().simulation
+    (robot,) = simulation.robots
+    node = ros.node("robotino")
+    simulation.step(STEP_MS)
+    ahead = robot.sensors["ir1"].value
+    x, y, _ = robot.place.translation
+    sensor = node.get("supervisor/get_from_device", value="ir1")
+    at = node.get("supervisor/node/get_position", node=sensor)
+    away = math.atan2(at.y - y, at.x - x)
+    root = node.get("supervisor/get_root")
+    field = node.get("supervisor/node/get_field", node=root, fieldName="children")
+    post = f"DEF POST Solid {{ translation {x + 0.4 * math.cos(away)} {y + 0.4 * math.sin(away)} 0.5"
+    post += " boundingObject Cylinder { radius 0.05 height 1 } }"
+
+    node.get("supervisor/field/import_node_from_string", field=field, position=-1, nodeString=post)
+    simulation.step(STEP_MS)
+    assert robot.sensors["ir1"].value != pytest.approx(ahead, abs=0.02)
+
+    node.get("supervisor/node/remove", node=node.get("supervisor/get_from_def", name="POST"))
+    simulation.step(STEP_MS)
+    assert robot.sensors["ir1"].value == pytest.approx(ahead, abs=0.02)
+
+
+def test_a_removed_node_is_gone_with_its_handle_and_its_number(robot, children, add, find):
+    """In Webots the handle is a dangling pointer."""
+    add("DEF OUTER Pose { children [ DEF INNER Solid { } ] }")
+    outer, inner = find("OUTER"), find("INNER")
+    number = robot.get("supervisor/node/get_id", node=inner)
+    before = count(robot, children)
+
+    assert robot.get("supervisor/node/remove", node=outer) == 1
+    assert count(robot, children) == before - 1
+    assert (find("OUTER"), find("INNER")) == (0, 0)
+    assert robot.get("supervisor/get_from_id", id=number) == 0
+    for handle in (outer, inner):
+        with pytest.raises(ServiceFailed, match="does not exist; get a new handle"):
+            robot.get("supervisor/node/get_position", node=handle)
+
+
+@pytest.mark.parametrize("service", ["remove_node", "remove"])
+def test_a_node_is_removed_by_its_place_in_a_field(robot, children, add, find, service):
+    """`remove` takes nodes too, as `wb_supervisor_field_remove_mf` does."""
+    add(WALL)
+    index = "position" if service == "remove_node" else "index"
+
+    assert robot.get(f"supervisor/field/{service}", field=children, **{index: -1}) == 1
+    assert find("WALL") == 0
+    assert robot.get(f"supervisor/field/{service}", field=children, **{index: 999}) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Solid {", "node:1"),
+        ("Solid { boundingObject Colosseum { } }", "Colosseum"),
+        ("Solid { physics Physics { } }", "with physics"),
+        ("Solid { translation 1 }", "not 3 numbers"),
+        ("USE NOTHING", "USE NOTHING has no DEF"),
+        ('Robot { controller "ros" }', "controller ros"),
+    ],
+)
+def test_what_cannot_be_added_fails_and_changes_nothing(robot, children, add, text, message):
+    """All or nothing, with the place in the text."""
+    before = count(robot, children)
+
+    with pytest.raises(ServiceFailed, match=message):
+        add(f"DEF FIRST Group {{ }} {text}")
+    assert count(robot, children) == before
+    assert robot.get("supervisor/get_from_def", name="FIRST") == 0
+
+
+def test_a_place_that_the_field_does_not_have_answers_no_success(robot, children, add):
+    """Of the count, or of a field that holds numbers."""
+    own = robot.get("supervisor/get_self")
+    numbers = robot.get("supervisor/node/get_field", node=own, fieldName="translation")
+    before = count(robot, children)
+
+    assert [add(WALL, position=at) for at in (999, -999)] == [0, 0]
+    assert add(WALL, position=0, field=numbers) == 0
+    assert count(robot, children) == before
+
+
+def test_a_running_robot_and_its_parts_cannot_be_removed(robot, find):
+    """A success without the effect would leave a client with another robot than it thinks."""
+    for name in ("ROBOTINO", "BODY"):
+        with pytest.raises(ServiceFailed, match="remove"):
+            robot.get("supervisor/node/remove", node=find(name))
+
+
+def test_a_reset_removes_what_was_added_and_brings_nothing_back(start, ros):
+    """As in Webots."""
+    simulation = start().simulation
+    node = ros.node("robotino")
+    root = node.get("supervisor/get_root")
+    field = node.get("supervisor/node/get_field", node=root, fieldName="children")
+    node.get("supervisor/node/remove", node=node.get("supervisor/get_from_def", name="CYLINDER_0"))
+    node.get("supervisor/field/import_node_from_string", field=field, position=-1, nodeString=WALL)
+
+    node.get("supervisor/simulation_reset")
+    simulation.step(STEP_MS)
+
+    assert node.get("supervisor/get_from_def", name="WALL") == 0
+    assert node.get("supervisor/get_from_def", name="CYLINDER_0") == 0
+
+
+def test_a_state_holds_a_node_and_all_inside_it(start, ros):
+    """A robot goes back to where it was, at rest; `__init__` is its start in the world file."""
+    simulation = start().simulation
+    (robot,) = simulation.robots
+    node = ros.node("robotino")
+    handle = node.get("supervisor/get_self")
+    begin = robot.place.translation
+    for motor in robot.motors.values():
+        motor.set_position(math.inf)
+        motor.set_velocity(1.0 if motor.name == "wheel0_joint" else -0.5)
+    simulation.step(10 * STEP_MS)
+    there = (robot.place.translation, robot.place.rotation)
+    assert node.get("supervisor/node/save_state", node=handle, state_name="there") == 1
+    simulation.step(10 * STEP_MS)
+    assert (robot.place.translation, robot.place.rotation) != there
+
+    assert node.get("supervisor/node/load_state", node=handle, state_name="there") == 1
+    assert (robot.place.translation, robot.place.rotation) == there
+    assert robot.body.velocity == (0.0, 0.0, 0.0)
+    node.get("supervisor/node/load_state", node=handle, state_name="__init__")
+    assert robot.place.translation == begin
+    with pytest.raises(ServiceFailed, match="has no state 'nowhere'; save it first"):
+        node.get("supervisor/node/load_state", node=handle, state_name="nowhere")
+
+
+def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, simple_robot):
+    """As Webots sets the motor's target."""
+    arm = """DEF ARM SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop 0 maxStop 0.2 }
+      device [ PositionSensor { name "height" } LinearMotor { name "lift" } ] endPoint Solid { } }"""
+    simulation = start(world(robot=simple_robot.replace("DEF IR", f"{arm} DEF IR"))).simulation
+    (robot,) = simulation.robots
+    node = ros.node("robotino")
+    joint = node.get("supervisor/get_from_def", name="ARM")
+
+    assert node.get("supervisor/node/set_joint_position", node=joint, position=0.1, index=1) is True
+    simulation.step(10 * STEP_MS)
+    assert robot.sensors["height"].value == 0.1
+    node.get("supervisor/node/set_joint_position", node=joint, position=9.0, index=1)
+    assert robot.motors["lift"].angle_rad == 0.2
+    with pytest.raises(ServiceFailed, match="no axis 2"):
+        node.get("supervisor/node/set_joint_position", node=joint, position=0.1, index=2)
+    with pytest.raises(ServiceFailed, match="a Robot has no joint position"):
+        node.get(
+            "supervisor/node/set_joint_position",
+            node=node.get("supervisor/get_self"),
+            position=0.1,
+            index=1,
+        )
