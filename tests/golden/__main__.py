@@ -5,6 +5,7 @@
 - `docs/trainingjob.md`: the default hyperparameters of the algorithms
 - `docs/metrics.md`: every metric that the programs declare
 - `docs/simulators.md`: the devices of the stub
+- `docs/ros-interface.md`: the services and topics of a robot
 - `docs/judging.md`: the checks on a replica, in their order
 - `charts/palaestra/README.md`: made from its values.yaml
 - `charts/palaestra/dashboards/*.json`: made by tools/dashboards
@@ -30,6 +31,7 @@ from tests.control_plane.programs import NoPrograms
 from tools import dashboards
 from tools.devices import page as devices
 from tools.hyperparameters import page as hyperparameters
+from tools.interface import page as interface
 from tools.judging import page as judging
 from tools.metrics import page as metrics
 
@@ -56,6 +58,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
     yield ROOT / hyperparameters.PAGE, hyperparameters.page((ROOT / hyperparameters.PAGE).read_text())
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
     yield ROOT / judging.PAGE, judging.page((ROOT / judging.PAGE).read_text())
+    yield ROOT / interface.PAGE, interface.page((ROOT / interface.PAGE).read_text())
     yield ROOT / devices.PAGE, devices.page((ROOT / devices.PAGE).read_text())
     for name, text in dashboards.generated_files().items():
         yield ROOT / name, text

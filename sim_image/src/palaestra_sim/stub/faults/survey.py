@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import filter as matching
 from pathlib import Path
@@ -33,13 +33,13 @@ class Survey:
 
     Attributes:
         simulator: the name of its first robot, without the part that differs from job to job.
-        services: paths below the robot's name.
+        services: the type of each, by its path below the robot's name.
         topics: in the same way, those of sensors only once they are enabled.
     """
 
     simulator: str
-    services: frozenset[str]
-    topics: frozenset[str]
+    services: Mapping[str, str]
+    topics: Mapping[str, str]
 
 
 def survey(world_path: Path) -> Survey:
@@ -61,8 +61,8 @@ def survey(world_path: Path) -> Survey:
         node.enable_all(simulator.simulation.basic_step_ms)
     return Survey(
         simulator=_HASH.sub("", nodes[0].name) if nodes else "",
-        services=frozenset().union(*(node.services for node in nodes)),
-        topics=frozenset().union(*(node.topics for node in nodes)),
+        services={path: type_name for node in nodes for path, type_name in node.types.items()},
+        topics={path: type_name for node in nodes for path, type_name in node.topics.items()},
     )
 
 
@@ -118,7 +118,8 @@ class _Listener:
         self.blocked: Callable[[], bool] = lambda: False
         self.current_call: object | None = None
         self.services: dict[str, Handler] = {}
-        self.topics: set[str] = set()
+        self.types: dict[str, str] = {}
+        self.topics: dict[str, str] = {}
 
     def enable_all(self, period_ms: int) -> None:
         """Enable every sensor, because only then its topic exists; a device that refuses has none."""
@@ -129,8 +130,8 @@ class _Listener:
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
         """Record a service."""
-        del type_name
         self.services[path] = handler
+        self.types[path] = type_name
 
     def advertise(
         self,
@@ -142,8 +143,8 @@ class _Listener:
         reading: str = "",
     ) -> _Silent:
         """Record a topic."""
-        del type_name, latched, template, reading
-        self.topics.add(path)
+        del latched, template, reading
+        self.topics[path] = type_name
         return _Silent()
 
     def withdraw(self, publisher: Any) -> None:

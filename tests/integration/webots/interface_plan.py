@@ -1,0 +1,152 @@
+"""What the client with rospy asks of a stub, and the answers that it expects.
+
+A service that is not here is called with an empty request, and has to succeed. `REQUESTS` has the requests of
+the others, by the end of their paths, `ANSWERS` what some of them answer: a value that is set is read back.
+"""
+
+from tools.interface.everything import ROBOT, offered
+
+STEP_MS = 32
+QUIT_STATUS = 3
+STEP = (f"/{ROBOT}/robot/time_step", "webots_ros/set_int", {"value": STEP_MS})
+REFUSED = (f"/{ROBOT}/robot/get_urdf", "webots_ros/get_urdf", {})  # /rosout has it
+DRAWN = """DEF DRAWN Pose { children [ DEF SHADED Shape { castShadows FALSE
+  appearance DEF PAINT PBRAppearance { roughness 0.25 baseColor 1 0.5 0.25 name "red" }
+  geometry DEF ROUND Cylinder { subdivision 24 } } Shape { geometry DEF FLAT Plane { size 3 2 } } ] }"""
+POINT = {"x": 2.5, "y": 1.0, "z": 0.5}
+ENDING = (
+    "simulation_reset",
+    "restart_controller",
+    "simulation_revert",
+    "world_reload",
+    "world_load",
+    "simulation_quit",
+)
+FIELDS = {
+    "bool": ("SHADED", "castShadows", 1),
+    "int32": ("ROUND", "subdivision", 12),
+    "float": ("PAINT", "roughness", 0.5),
+    "vec2f": ("FLAT", "size", {"x": 1.0, "y": 4.0, "z": 0.0}),
+    "vec3f": ("BOX", "translation", POINT),
+    "rotation": ("BOX", "rotation", {"x": 0.0, "y": 0.0, "z": 0.6, "w": 0.8}),
+    "color": ("PAINT", "baseColor", {"r": 0.5, "g": 0.25, "b": 1.0, "a": 1.0}),
+    "string": ("PAINT", "name", "blue"),
+}
+REQUESTS = {
+    "set_logger_level": {"logger": "ros", "level": "debug"},
+    "/enable": {"value": STEP_MS},
+    "_enable": {"value": STEP_MS},
+    "/enable_point_cloud": {"value": True},
+    "camera/recognition_enable": {"value": STEP_MS},
+    "_motor/set_velocity": {"value": 0.5},
+    "/emitter/send": {"data": "hello"},
+    "led/set_led": {"value": 1},
+    "display/image_paste": {"ir": "@display/image_new"},
+    "display/image_delete": {"ir": "@display/image_new"},
+    "sf_tracking": {"field": "@FIELD vec3f"},
+    "keyboard/press": {"value": 65},
+    "keyboard/release": {"value": 65},
+    "joystick/press": {"value": 1},
+    "joystick/release": {"value": 1},
+    "emitter/set_channel": {"value": 0},
+    "supervisor/simulation_set_mode": {"value": 2},
+    "supervisor/simulation_quit": {"value": QUIT_STATUS},
+    "supervisor/get_from_def": {"name": "BOX"},
+    "supervisor/get_from_device": {"value": "gps"},
+    "supervisor/get_from_id": {"id": 0},
+    "supervisor/set_label": {"label": "here"},
+    "node/get_field": {"node": "@BOX", "fieldName": "translation"},
+    "node/get_pose": {"node": "@BOX", "from_node": "@supervisor/get_self"},
+    "node/set_joint_position": {"node": "@LINEARMOTOR_JOINT", "position": 0.0, "index": 1},
+    "node/save_state": {"node": "@BOX", "state_name": "there"},
+    "node/load_state": {"node": "@BOX", "state_name": "there"},
+    "node/remove": {"node": "@ADDED"},
+    "node/restart_controller": {"node": "@supervisor/get_self"},
+    "node/get_velocity": {"node": "@BOX"},
+    "field/import_node_from_string": {"field": "@CHILDREN", "position": -1, "nodeString": "Group { }"},
+    "field/remove_node": {"field": "@CHILDREN", "position": -1},
+    "field/remove": {"field": "@INFO", "index": 0},
+    "field/get_node": {"field": "@CHILDREN", "index": 1},
+    "field/get_count": {"field": "@CHILDREN"},
+    "display/image_new": {"width": 1, "height": 1, "format": 3, "data": [1, 2, 3]},
+    "lidar/get_layer_point_cloud": {"layer": 0},
+}
+ANSWERS = {
+    "robot/get_model": {"value": ""},
+    "robot/get_basic_time_step": {"value": 32.0},
+    "robot/get_supervisor": {"value": True},
+    "robot/get_custom_data": {"value": "seven"},
+    "robot/get_data": {"value": "eight"},
+    "rotational_motor/get_velocity": {"value": 0.5},
+    "led/get_led": {"value": 1},
+    "supervisor/simulation_get_mode": {"value": 2},
+    "supervisor/node/get_type_name": {"name": "Solid"},
+    "supervisor/node/get_def": {"name": "BOX"},
+    "supervisor/virtual_reality_headset_is_used": {"value": False},
+    "supervisor/animation_stop_recording": {"value": False},
+}
+
+
+HANDLES = ("BOX", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
+
+
+def plan(world_path):
+    """Return the plan for the client; the name of a call is its path, but for those that get handles."""
+    survey = offered()
+    typed = {**survey.services}
+    calls = [_call(typed, name, path, request) for name, path, request in _opening()]
+    last = []
+    for path in typed:
+        if path.endswith(ENDING):
+            last.append(_call(typed, path, path, _request(path, world_path)))
+        elif path != "robot/time_step" and path not in {name for name, *_ in calls}:
+            calls.append(_call(typed, path, path, _request(path, world_path)))
+    last.sort(key=lambda call: [call[0].endswith(end) for end in ENDING], reverse=True)
+    topics = {absolute(path): type_name for path, type_name in survey.topics.items()}
+    return {"calls": calls, "topics": topics, "rounds": [STEP, REFUSED], "last": last}
+
+
+def absolute(path):
+    """Return the name in ROS of a path below the robot's name."""
+    return path if path.startswith("/") else f"/{ROBOT}/{path}"
+
+
+def _call(typed, name, path, request):
+    return name, absolute(path), typed[path], request
+
+
+def _opening():
+    """Yield calls that come first: handles, and one field of every type, which is written and read back."""
+    get_field, from_def = "supervisor/node/get_field", "supervisor/get_from_def"
+    for name, text in (("data", "eight"), ("custom_data", "seven")):
+        yield f"robot/set_{name}", f"robot/set_{name}", {"value": text}
+        yield f"robot/get_{name}", f"robot/get_{name}", {}
+    yield "another key", "palaestra/keyboard/press", {"value": 66}
+    yield "another button", "palaestra/joystick/press", {"value": 2}
+    yield "supervisor/get_root", "supervisor/get_root", {}
+    yield "supervisor/get_self", "supervisor/get_self", {}
+    yield "CHILDREN", get_field, {"node": "@supervisor/get_root", "fieldName": "children"}
+    imported = "supervisor/field/import_node_from_string"
+    yield imported, imported, {"field": "@CHILDREN", "position": -1, "nodeString": DRAWN}
+    yield "GROUP", imported, {"field": "@CHILDREN", "position": -1, "nodeString": "DEF ADDED Group { }"}
+    for name in (*HANDLES, "ADDED"):
+        yield name, from_def, {"name": name}
+    yield "WORLD", "supervisor/field/get_node", {"field": "@CHILDREN", "index": 0}
+    yield "INFO", get_field, {"node": "@WORLD", "fieldName": "info"}
+    for type_name, (node, field, value) in FIELDS.items():
+        yield f"FIELD {type_name}", get_field, {"node": f"@{node}", "fieldName": field}
+        for verb in ("set", "get", "insert"):
+            path = f"supervisor/field/{verb}_{type_name}"
+            given = {} if verb == "get" else {"value": value}
+            yield path, path, {"field": f"@FIELD {type_name}", "index": 0, **given}
+
+
+def _request(path, world_path):
+    if path == "supervisor/world_load":
+        return {"value": str(world_path)}
+    request = next((it for end, it in REQUESTS.items() if path.endswith(end)), {})
+    if path.startswith("supervisor/node/") and "node" not in request:
+        return {"node": "@BOX", **request}
+    if path.startswith("supervisor/field/") and "field" not in request:
+        return {"field": "@FIELD float", **request}
+    return request

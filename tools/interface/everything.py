@@ -1,0 +1,111 @@
+"""A world whose supervisor has every device of the stub, and the services and topics that it offers there."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from palaestra_sim.stub.faults.survey import Survey, survey
+from palaestra_sim.stub.scene.devices import DEVICES
+from palaestra_sim.stub.scene.devices.kind import Kind
+
+ROBOT = "everything"
+_SETTINGS = {
+    "Camera": "focus Focus { } zoom Zoom { } recognition Recognition { segmentation TRUE }",
+    "Lidar": "numberOfLayers 2",
+}
+
+# What the stub cannot do fails, so that no client trains with a success that did nothing.
+FAILING = frozenset(
+    (
+        "camera/enable",
+        "camera/recognition_enable",
+        "camera/recognition_enable_segmentation",
+        "camera/recognition_save_segmentation_image",
+        "camera/save_image",
+        "display/attach_camera",
+        "display/image_load",
+        "display/image_save",
+        "linear_motor/set_force",
+        "linear_motor/force_feedback_sensor/enable",
+        "radar/enable",
+        "range_finder/enable",
+        "range_finder/save_image",
+        "robot/get_urdf",
+        "rotational_motor/set_torque",
+        "rotational_motor/torque_feedback_sensor/enable",
+        "skin/get_bone_name",
+        "skin/get_bone_orientation",
+        "skin/get_bone_position",
+        "skin/set_bone_orientation",
+        "skin/set_bone_position",
+        "speaker/set_engine",
+        "speaker/set_language",
+        "supervisor/animation_start_recording",
+        "supervisor/export_image",
+        "supervisor/movie_start_recording",
+        "supervisor/node/add_force",
+        "supervisor/node/add_force_with_offset",
+        "supervisor/node/add_torque",
+        "supervisor/node/get_contact_points",
+        "supervisor/virtual_reality_headset_get_orientation",
+        "supervisor/virtual_reality_headset_get_position",
+        "supervisor/world_save",
+        "vacuum_gripper/presence_sensor/enable",
+    )
+)
+
+
+def device_name(type_name: str) -> str:
+    """Return the name in the world of the device of a type: "DistanceSensor" is "distance_sensor"."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type_name).lower()
+
+
+def world() -> str:
+    """Return the world."""
+    parts = "\n".join(_part(kind) for kind in DEVICES.values())
+    return f"""#VRML_SIM R2023b utf8
+WorldInfo {{ basicTimeStep 32 info [ "everything" ] }}
+DEF BOX Solid {{ translation 2 0 0.5 boundingObject Box {{ size 0.5 0.5 1 }} }}
+DEF ROBOT Robot {{
+  name "{ROBOT}" controller "ros" supervisor TRUE battery [ 100, 100, 0 ]
+  controllerArgs [ "--name={ROBOT}" "--synchronize" "--clock" ]
+  children [
+{parts}
+  ]
+}}
+"""
+
+
+def offered() -> Survey:
+    """Return the services and topics of the stub in that world."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "everything.wbt")
+        path.write_text(world())
+        return survey(path)
+
+
+def groups(paths: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """Return paths by the thing that they are of: a type of device, "robot", "supervisor/node" and so on."""
+    types = {device_name(name): name for name in DEVICES}
+    found: dict[str, dict[str, str]] = {}
+    for path, type_name in paths.items():
+        first, _, rest = path.partition("/")
+        group = types.get(first, first)
+        if group == "supervisor" and rest.startswith(("node/", "field/")):
+            group = f"supervisor/{rest.partition('/')[0]}"
+        if not rest:
+            group = "node"
+        found.setdefault(group, {})[path] = type_name
+    return found
+
+
+def _part(kind: Kind[Any]) -> str:
+    node = f'{kind.node} {{ name "{device_name(kind.node)}" {_SETTINGS.get(kind.node, "")} }}'
+    if not kind.on_joint:
+        return node
+    joint = "SliderJoint" if kind.node == "LinearMotor" else "HingeJoint"
+    return f"DEF {kind.node.upper()}_JOINT {joint} {{ device {node} endPoint Solid {{ }} }}"

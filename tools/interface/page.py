@@ -1,0 +1,61 @@
+"""docs/ros-interface.md: every service and topic, with its type, its md5, and the simulators that have it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from palaestra.api.marks import between_marks
+from palaestra_protocol.ros.rostypes import message_type, service_type
+from palaestra_sim.stub.scene.devices import DEVICES
+from tools.interface.everything import FAILING, device_name, groups, offered
+
+PAGE = "docs/ros-interface.md"
+BEGIN = "<!-- generated: services and topics -->"
+_TEST: Final = "test_ros_interface.py"
+_OURS: Final = frozenset(("palaestra",))
+_TITLES: Final = {
+    "node": "Every node",
+    "robot": "Robot",
+    "supervisor": "Supervisor",
+    "supervisor/node": "Supervisor: nodes",
+    "supervisor/field": "Supervisor: fields",
+    "battery_sensor": "Battery",
+    "keyboard": "Keyboard",
+    "joystick": "Joystick",
+    "palaestra": "Services of ours",
+}
+_HEAD: Final = ("| path | type | md5 | stub | MuJoCo | Webots | tested by |", "|---|---|---|---|---|---|---|")
+
+
+def page(text: str) -> str:
+    """Return docs/ros-interface.md, now `text`, with its tables made anew.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    return between_marks(text, BEGIN, tables())
+
+
+def tables() -> str:
+    """Return a table for the robot, the supervisor, each type of device, and the services of ours."""
+    found = offered()
+    services, topics = groups(found.services), groups(found.topics)
+    sections = (
+        _section(group, services.get(group, {}), topics.get(group, {}))
+        for group in [*services, *(topics.keys() - services.keys())]
+    )
+    return "\n".join(sections)
+
+
+def _section(group: str, services: Mapping[str, str], topics: Mapping[str, str]) -> str:
+    rows = [_row(group, path, type_name, service_type(type_name).md5) for path, type_name in services.items()]
+    rows += [_row(group, path, type_name, message_type(type_name).md5) for path, type_name in topics.items()]
+    return "\n".join((f"### {_TITLES.get(group, group)}", "", *_HEAD, *rows, ""))
+
+
+def _row(group: str, path: str, type_name: str, md5: str) -> str:
+    shown = path.replace(device_name(group), "<name>", 1) if group in DEVICES else path
+    stub = "fails" if path in FAILING else "yes"
+    webots = "no" if group in _OURS else "yes"
+    return f"| `{shown}` | {type_name} | `{md5}` | {stub} | no | {webots} | {_TEST} |"
