@@ -50,7 +50,6 @@ FAILING = frozenset(
         "supervisor/node/add_force",
         "supervisor/node/add_force_with_offset",
         "supervisor/node/add_torque",
-        "supervisor/node/get_contact_points",
         "supervisor/virtual_reality_headset_get_orientation",
         "supervisor/virtual_reality_headset_get_position",
         "supervisor/world_save",

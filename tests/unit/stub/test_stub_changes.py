@@ -219,3 +219,32 @@ def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, 
             position=0.1,
             index=1,
         )
+
+
+def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
+    """With the number of the Solid that touches: the robot's for the robot, the wall's for the wall."""
+    simulation = start().simulation
+    (robot,) = simulation.robots
+    node = ros.node("robotino")
+    own, root = node.get("supervisor/get_self"), node.get("supervisor/get_root")
+    children = node.get("supervisor/node/get_field", node=root, fieldName="children")
+    importing = "supervisor/field/import_node_from_string"
+    node.get(importing, field=children, position=-1, nodeString=WALL)
+    wall = node.get("supervisor/get_from_def", name="WALL")
+    assert points(node, own) == []
+
+    robot.place.translation = (1.3 - 0.05 - robot.body.radius + 0.01, 0.5, 0.0)
+    simulation.step(STEP_MS)
+
+    of_robot, of_wall = points(node, own), points(node, wall)
+    number = node.get("supervisor/node/get_id", node=wall)
+    assert {it.point for it in of_robot} >= {it.point for it in of_wall} != set()
+    assert [it.point.x for it in of_wall] == pytest.approx([1.25] * len(of_wall))
+    assert {it.node_id for it in of_wall} == {number}
+    assert number not in {it.node_id for it in of_robot}
+
+
+def points(node, handle):
+    """Return the contact points of a node and of what is inside it."""
+    asked = {"node": handle, "include_descendants": True}
+    return node.get("supervisor/node/get_contact_points", **asked)

@@ -18,7 +18,9 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from palaestra_sim.errors import SimError
+from palaestra_sim.stub.physics.geometry import Vector
 from palaestra_sim.stub.scene.air import Air
+from palaestra_sim.stub.scene.contacts import contact_points
 from palaestra_sim.stub.scene.devices.connector import Connector
 from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
@@ -220,6 +222,16 @@ class Simulation:
         self.robots = tuple(robot for robot in self.robots if robot.parts.node not in gone)
         self._assemble()
         self._arrange()
+
+    def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
+        """Return where a node touches others: points in meters, each with the number of the touching node."""
+        asked = {node, *node.descendants()} if descendants else {node}
+        return [
+            (point, touching.number)
+            for point, nodes in contact_points(self.robots, self.scene.solids)
+            for touching in nodes
+            if touching in asked
+        ]
 
     def save_state(self, node: SceneNode, name: str) -> None:
         """Save the places and joints of a node, and of all inside it, under a name."""

@@ -1,6 +1,6 @@
 """Services under `supervisor/node/`: a node's type, its place, and changes to it.
 
-A request for something that the stub lacks (forces, contact points) fails with a sentence that says
+A request for something that the stub lacks (forces, torques) fails with a sentence that says
 so, instead of a success that did nothing.
 """
 
@@ -62,7 +62,7 @@ class NodeServices:
             ("get_velocity", "node_get_velocity", self._get_velocity),
             ("get_center_of_mass", "node_get_center_of_mass", self._get_center_of_mass),
             ("get_static_balance", "node_get_static_balance", self._get_static_balance),
-            ("get_contact_points", "node_get_contact_points", _unable("contact points")),
+            ("get_contact_points", "node_get_contact_points", self._get_contact_points),
             (f"enable_{tracking}", f"node_enable_{tracking}", self._accept),
             (f"disable_{tracking}", f"node_disable_{tracking}", self._accept),
         )
@@ -138,6 +138,13 @@ class NodeServices:
     def _get_static_balance(self, request: Any) -> Fields:
         self._node(request)
         return {"balance": 1}
+
+    def _get_contact_points(self, request: Any) -> Fields:
+        found = self._handles.simulation.contact_points(
+            self._node(request), descendants=request.include_descendants
+        )
+        points = [{"point": _point(point), "node_id": number} for point, number in found]
+        return {"contact_points": points}
 
     def _get_velocity(self, request: Any) -> Fields:
         node = self._node(request)
