@@ -15,7 +15,7 @@ from palaestra_protocol.ros.rostypes import service_type
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros.node import LATER, ServiceFailed
-from palaestra_sim.stub.scene.simulation import Mode
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.world import builtin
 
 PENDING = object()

@@ -5,7 +5,7 @@ import pytest
 from palaestra_sim.errors import WorldError
 from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.scene.simulation import Mode
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.world import builtin
 
 

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.scene.simulation import Mode, Simulation
+from palaestra_sim.stub.scene.mode import Mode
+from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
 from palaestra_sim.world import builtin
 

@@ -7,10 +7,11 @@ import pytest
 from palaestra_sim.errors import WorldError
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.front.simulator import StubSimulator
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.nodes import growing
 from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.reading import LeaveOut
-from palaestra_sim.stub.scene.simulation import Mode, Simulation
+from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.world import builtin_protos, parse, parse_proto
 from palaestra_sim.world.stand_ins import load_stand_ins as load
 from palaestra_sim.world.stand_ins import shipped

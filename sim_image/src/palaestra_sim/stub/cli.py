@@ -16,10 +16,11 @@ from palaestra_protocol.numbers import milliseconds
 from palaestra_sim.errors import SimError, WorldRefusedError
 from palaestra_sim.stub import faults
 from palaestra_sim.stub.front.options import StubOptions
-from palaestra_sim.stub.front.simulator import StubSimulator, read_world
+from palaestra_sim.stub.front.simulator import StubSimulator
 from palaestra_sim.stub.ros import Loop, MasterUnreachable, RosNode
+from palaestra_sim.stub.scene.loading import read_world
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.reading import LeaveOut
-from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.stub.scene.summary import silent_devices, summary
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
@@ -65,11 +66,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _check(options: argparse.Namespace) -> int:
     """Print what the stub makes of the world; return 0 if it can start it as it is."""
     everything = LeaveOut(everything=True, names=True)
-    lenient = StubOptions(stand_ins=_stand_ins(options.stand_ins), leave_out=everything)
-    simulation = read_world(options.world.absolute(), _MODES[options.mode], lenient)
+    simulation = read_world(
+        options.world.absolute(),
+        _MODES[options.mode],
+        stand_ins=_stand_ins(options.stand_ins),
+        leave_out=everything,
+    )
     for line in summary(simulation):
         sys.stdout.write(f"{line}\n")
-    return _WRONG_WORLD if simulation.scene.left_out else 0
+    return _WRONG_WORLD if simulation.left_out else 0
 
 
 class _Process:
@@ -131,9 +136,9 @@ class _Process:
 
     def _start(self) -> None:
         self._simulator.start()
-        for left_out in self._simulator.simulation.scene.left_out:
+        for left_out in self._simulator.simulation.left_out:
             log.warning("%s", left_out)
-        silent = silent_devices(self._simulator.simulation)
+        silent = silent_devices(self._simulator.simulation.robots)
         if silent:
             log.warning("devices without readings, whose enable answers failure: %s", silent)
         log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))

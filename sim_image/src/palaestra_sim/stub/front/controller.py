@@ -19,6 +19,7 @@ import math
 from functools import partial
 from typing import Any
 
+from palaestra_sim.stub.front.backend import Backend
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.front.inputs import inputs
@@ -30,8 +31,8 @@ from palaestra_sim.stub.front.services.scene_nodes import NodeServices
 from palaestra_sim.stub.front.services.supervisor import SupervisorServices
 from palaestra_sim.stub.ros.node import LATER
 from palaestra_sim.stub.scene.arguments import Arguments
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
 from palaestra_sim.stub.seam import Node, Publisher, Service
 
@@ -48,7 +49,7 @@ class Controller:
 
     def __init__(self, host: Host, stepping: Stepping, handles: Handles, robot: Robot, node: Node) -> None:
         self._host = host
-        self.simulation: Simulation = handles.simulation
+        self.simulation: Backend = handles.simulation
         self._handles = handles
         self.robot = robot
         self.node = node

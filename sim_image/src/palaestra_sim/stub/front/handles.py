@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Final
 
 from palaestra_sim.errors import SimError
+from palaestra_sim.stub.front.backend import Backend
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
-from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.stub.scene.tree.fields import Field
 
 _FIRST_ADDRESS: Final = 0x5580_0000_0000  # where Linux puts the heap of a position-independent program
@@ -31,7 +31,7 @@ class Handles:
         load: how many worlds were loaded before: makes handles of different loads different.
     """
 
-    def __init__(self, simulation: Simulation, load: int = 0) -> None:
+    def __init__(self, simulation: Backend, load: int = 0) -> None:
         self.simulation = simulation
         self.tree = simulation.tree
         self._next = _FIRST_ADDRESS + (load + 1) * _LOAD_SPACING

@@ -11,8 +11,8 @@ from typing import Protocol
 
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.scene.arguments import Arguments
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.stub.scene.simulation import Mode
 
 
 class Host(Protocol):

@@ -11,17 +11,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from palaestra_sim.errors import WorldError
+from palaestra_sim.stub.front.backend import Backend
 from palaestra_sim.stub.front.controller import Controller
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.options import StubOptions
 from palaestra_sim.stub.scene.arguments import Arguments
-from palaestra_sim.stub.scene.nodes.growing import Descriptions
+from palaestra_sim.stub.scene.loading import read_world
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.stub.scene.simulation import Mode, Simulation
 from palaestra_sim.stub.scene.stepping import Stepping
 from palaestra_sim.stub.seam import Node
-from palaestra_sim.world import builtin_protos, local_protos, parse
-from palaestra_sim.world.stand_ins import shipped
 
 MakeNode = Callable[[str], Node]
 
@@ -122,7 +121,7 @@ class StubSimulator:
             controller.close()
         self.controllers.clear()
 
-    def _take(self, simulation: Simulation, arguments: dict[Robot, Arguments]) -> None:
+    def _take(self, simulation: Backend, arguments: dict[Robot, Arguments]) -> None:
         self.simulation = simulation
         self._arguments = arguments
         self._stepping = Stepping(simulation)
@@ -133,7 +132,7 @@ class StubSimulator:
         self.controllers[node.name] = controller
         controller.start()
 
-    def _exchange(self, world_path: Path, loaded: tuple[Simulation, dict[Robot, Arguments]]) -> None:
+    def _exchange(self, world_path: Path, loaded: tuple[Backend, dict[Robot, Arguments]]) -> None:
         self.close()
         self.world_path = world_path
         self._loads += 1
@@ -155,30 +154,13 @@ class StubSimulator:
         next(iter(self.controllers.values())).node.later(0.0, callback)
 
 
-def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Simulation, dict[Robot, Arguments]]:
+def _read(world_path: Path, mode: Mode, options: StubOptions) -> tuple[Backend, dict[Robot, Arguments]]:
     """Return a world that is ready to run, with the arguments of its robots."""
-    simulation = read_world(world_path, mode, options)
+    simulation: Backend = read_world(
+        world_path, mode, stand_ins=options.stand_ins, leave_out=options.leave_out
+    )
     arguments = {robot: robot.parts.arguments for robot in simulation.robots}
     return simulation, {robot: given for robot, given in arguments.items() if given is not None}
-
-
-def read_world(world_path: Path, mode: Mode, options: StubOptions) -> Simulation:
-    """Return the simulation of a world and of the PROTOs in its project.
-
-    Raises:
-        WorldError: the file is wrong, or holds something that the stub cannot simulate.
-        OSError: it cannot be read.
-    """
-    world = parse(world_path.read_bytes(), world_path.name)
-    found = local_protos(world_path, world, name=world_path.name, without=options.stand_ins)
-    # A PROTO of the project is what its author means; a stand-in of the user's comes before it.
-    solids = {name: entry for name, entry in shipped().items() if name not in found.local}
-    descriptions = Descriptions(
-        protos={**builtin_protos(), **found.local},
-        stand_ins={**solids, **options.stand_ins},
-        unusable=found.refused,
-    )
-    return Simulation.of(world, world_path.name, mode, descriptions, options.leave_out)
 
 
 def _ignore(_status: int) -> None:

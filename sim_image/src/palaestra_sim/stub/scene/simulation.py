@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from enum import IntEnum
 
-from palaestra_sim.errors import SimError
+from palaestra_sim.errors import SimError, WorldError
 from palaestra_sim.stub.physics.geometry import Vector
 from palaestra_sim.stub.scene.air import Air
 from palaestra_sim.stub.scene.contacts import contact_points
 from palaestra_sim.stub.scene.devices.connector import Connector
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.nodes.growing import Descriptions
 from palaestra_sim.stub.scene.nodes.scene_node import SceneNode
 from palaestra_sim.stub.scene.places import Place
@@ -34,14 +34,6 @@ from palaestra_sim.stub.scene.tree.effects import require_removable, require_roo
 from palaestra_sim.stub.scene.tree.fields import Field
 from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
 from palaestra_sim.world import World, parse
-
-
-class Mode(IntEnum):
-    """The modes of the simulator, with the numbers of `simulation_set_mode` in R2021a and later."""
-
-    PAUSE = 0
-    REAL_TIME = 1
-    FAST = 2
 
 
 class Simulation:
@@ -103,6 +95,11 @@ class Simulation:
         """
         tree = SceneTree(world, name, descriptions)
         return cls(tree, read_scene(tree, leave_out), mode)
+
+    @property
+    def left_out(self) -> tuple[WorldError, ...]:
+        """What the stub lacks and the user left out, each with its place."""
+        return self.scene.left_out
 
     @property
     def basic_step_ms(self) -> int:

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.stub.scene.simulation import Mode
 
 Done = Callable[[bool], None]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from palaestra_sim.errors import refusal
@@ -24,21 +24,21 @@ def summary(simulation: Simulation) -> Iterator[str]:
     stand_ins = Counter(node.proto_name for node in simulation.tree.nodes.values() if node.stand_in)
     if stand_ins:
         yield f"stand-ins, which stand still: {_counted(stand_ins)}"
-    silent = silent_devices(simulation)
+    silent = silent_devices(simulation.robots)
     if silent:
         yield f"devices without readings, whose enable answers failure: {silent}"
-    error = refusal(simulation.scene.left_out)
+    error = refusal(simulation.left_out)
     if error is not None:
         yield "cannot be simulated; --leave-out leaves it out:"
         yield from str(error).splitlines()
 
 
-def silent_devices(simulation: Simulation) -> str:
+def silent_devices(robots: Iterable[Robot]) -> str:
     """Return how many devices have no readings here, by type; "" if all have."""
     return _counted(
         Counter(
             kind.node
-            for robot in simulation.robots
+            for robot in robots
             if robot.parts.arguments is not None
             for kind, _ in robot.parts.devices.rows.values()
             if kind.enable is never

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from palaestra_sim.stub.front.backend import Backend
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.ros.node import ServiceFailed
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.stub.scene.simulation import Simulation
 from palaestra_sim.stub.seam import Handler, Row, Service
 
 Fields = dict[str, Any]
@@ -17,7 +17,7 @@ Fields = dict[str, Any]
 class RobotServices:
     """The services of one robot about itself, but for `time_step` and `get_device_list`."""
 
-    def __init__(self, host: Host, simulation: Simulation, robot: Robot) -> None:
+    def __init__(self, host: Host, simulation: Backend, robot: Robot) -> None:
         self._host = host
         self._simulation = simulation
         self._robot = robot

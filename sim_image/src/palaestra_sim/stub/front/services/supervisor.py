@@ -11,8 +11,8 @@ from typing import Any, Final
 from palaestra_sim.stub.front.handles import Handles
 from palaestra_sim.stub.front.host import Host
 from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.stub.scene.mode import Mode
 from palaestra_sim.stub.scene.robot import Robot
-from palaestra_sim.stub.scene.simulation import Mode
 from palaestra_sim.stub.seam import Service
 
 Fields = dict[str, Any]
