@@ -23,7 +23,7 @@ PATH = re.compile(
     r"`((?:[\w.-]+/)+[\w.-]+\.\w+)`"  # a word of its own, by its suffix
     r"|(?<![\w/.~-])((?:operator|trainer|sim_image|tests|docs|manifests|charts|tools)/[\w./-]*[\w/])"
 )
-NEW = {"sim_image/src/palaestra_sim/stub/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}
+NEW = {"sim_image/src/palaestra_sim/scene/devices/gps.py", "tests/integration/webots/test_gps.py"}
 CHANGE = re.compile(r"^ *```diff\n *\+\+\+ (\S+)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 
 

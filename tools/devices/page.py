@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from palaestra.api.marks import between_marks
-from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.stub.scene.devices.kind import Kind
-from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.devices.kind import Kind
+from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.stub.physics import StubPhysics
 
 PAGE = "docs/simulators.md"
 BEGIN = "<!-- generated: devices of the stub -->"
@@ -40,6 +41,6 @@ def _device(kind: Kind[Any]) -> object:
     node = f"{kind.node} {{ }}"
     part = f"HingeJoint {{ device {node} }}" if kind.on_joint else node
     world = f"#VRML_SIM R2023b utf8\nRobot {{ children [ {part} ] }}\n"
-    (robot,) = Simulation.load(world.encode()).robots
+    (robot,) = Simulation.load(world.encode(), StubPhysics()).robots
     (device,) = robot.parts.devices.of(kind)
     return device

@@ -8,9 +8,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from palaestra_sim.stub.faults.survey import Survey, survey
-from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.stub.scene.devices.kind import Kind
+from palaestra_sim.faults.survey import Survey, survey
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.devices.kind import Kind
+from palaestra_sim.scene.loading import Loader
+from palaestra_sim.stub.physics import StubPhysics
 
 ROBOT = "everything"
 _SETTINGS = {
@@ -84,7 +86,7 @@ def offered() -> Survey:
     with TemporaryDirectory() as folder:
         path = Path(folder, "everything.wbt")
         path.write_text(world())
-        return survey(path)
+        return survey(Loader(physics=StubPhysics), path)
 
 
 def groups(paths: Mapping[str, str]) -> dict[str, dict[str, str]]:

@@ -7,7 +7,7 @@ from typing import Final
 
 from palaestra.api.marks import between_marks
 from palaestra_protocol.ros.rostypes import message_type, service_type
-from palaestra_sim.stub.scene.devices import DEVICES
+from palaestra_sim.scene.devices import DEVICES
 from tools.interface.everything import FAILING, device_name, groups, offered
 
 PAGE = "docs/ros-interface.md"

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from palaestra_sim.stub.ros import LATER, Loop, RosNode, ServiceFailed
+from palaestra_sim.ros import LATER, Loop, RosNode, ServiceFailed
 
 DEADLINE_S = 60.0  # of what takes milliseconds, on a busy machine
 

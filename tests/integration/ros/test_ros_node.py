@@ -9,7 +9,7 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_protocol.ros.tcpros import FrameReader, decode_header, encode_header, frame
-from palaestra_sim.stub.ros import LATER
+from palaestra_sim.ros import LATER
 from palaestra_trainer.ros import Master
 from tests.waiting import eventually
 

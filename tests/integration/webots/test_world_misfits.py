@@ -7,7 +7,7 @@ import gymnasium
 import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
-from palaestra_sim.stub.ros import Loop, RosNode
+from palaestra_sim.ros import Loop, RosNode
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit
 from palaestra_trainer.launching.process import ProcessLauncher

@@ -12,10 +12,12 @@ from collections import deque
 import pytest
 
 from palaestra_protocol.ros.rostypes import service_type
-from palaestra_sim.stub.front.options import StubOptions
-from palaestra_sim.stub.front.simulator import StubSimulator
-from palaestra_sim.stub.ros.node import LATER, ServiceFailed
-from palaestra_sim.stub.scene.mode import Mode
+from palaestra_sim.front.options import FrontOptions
+from palaestra_sim.front.simulator import Simulator
+from palaestra_sim.ros.node import LATER, ServiceFailed
+from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 
 PENDING = object()
@@ -206,14 +208,19 @@ def ros():
 
 @pytest.fixture
 def start(ros, tmp_path):
-    """Start a stub: `start(world=..., mode=..., options=...)` returns the StubSimulator."""
+    """Start a stub: `start(world=..., mode=..., options=...)` returns the Simulator."""
 
     def begin(world=None, mode=Mode.FAST, **options):
         path = tmp_path / "worlds" / "arena.wbt"
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(builtin("arena") if world is None else world)
-        simulator = StubSimulator(
-            path, ros.make_node, options=StubOptions(**options), mode=mode, clock=ros.clock
+        simulator = Simulator(
+            path,
+            Loader(physics=StubPhysics),
+            ros.make_node,
+            options=FrontOptions(**options),
+            mode=mode,
+            clock=ros.clock,
         )
         simulator.start()
         return simulator

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.ros.node import ServiceFailed
+from tests.scenes import load_scene
 
 STEP_MS = 32
 LIFT = """SliderJoint { jointParameters JointParameters { axis 0 0 1 minStop 0 maxStop 0.2 }
@@ -22,7 +22,7 @@ CAMERA = """Camera { name "eye" width 320 height 200 focus Focus { focalDistance
 @pytest.fixture
 def load(world, simple_robot):
     """`load(part)`: a simulation whose robot has that part."""
-    return lambda part: Simulation.load(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
+    return lambda part: load_scene(world(robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
 
 
 @pytest.fixture
@@ -200,7 +200,7 @@ TANK = """Robot { name "tank" controller "ros" controllerArgs [ "--name=tank" "-
 
 def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
     """A belt moves the robot by as many meters as its motor turns; there is no slip."""
-    (robot,) = (simulation := Simulation.load(world(robot=TANK))).robots
+    (robot,) = (simulation := load_scene(world(robot=TANK))).robots
     for name, speed in (("left", 0.1), ("right", 0.2)):
         robot.motors[name].set_position(math.inf)
         robot.motors[name].set_velocity(speed)
@@ -214,9 +214,9 @@ def test_two_tracks_drive_a_robot_as_two_wheels_do(world):
 
 def test_a_track_without_a_motor_is_a_fixed_part_of_its_robot(world):
     """Its boundingObject counts; its wheels and its belt are only drawn."""
-    (robot,) = Simulation.load(world(robot=TANK.replace("LinearMotor", "Brake"))).robots
+    (robot,) = load_scene(world(robot=TANK.replace("LinearMotor", "Brake"))).robots
 
-    assert robot.body.drive is None
+    assert robot.body.base.drive is None
     assert robot.body.radius > 0.2
 
 

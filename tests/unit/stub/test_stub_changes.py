@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.ros.node import ServiceFailed
 
 WALL = 'DEF WALL Solid { translation 1.3 0.5 0.5 boundingObject Box { size 0.1 4 1 } name "wall" }'
 STEP_MS = 32

@@ -9,15 +9,15 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import message_type, reading_field
 from palaestra_protocol.ros.tcpros import LENGTH
-from palaestra_sim.stub.faults.damage import damaged_message
-from palaestra_sim.stub.faults.language import parse
-from palaestra_sim.stub.ros.topics import Publisher, Topic
-from palaestra_sim.stub.scene.devices import DEVICES
-from palaestra_sim.stub.scene.devices.kind import ROLES
-from palaestra_sim.stub.scene.nodes.types import type_number
-from palaestra_sim.stub.scene.tree.catalogue import field_kinds
-from palaestra_sim.stub.scene.tree.effects import require_effect
-from palaestra_sim.stub.seam import UnsimulatedError
+from palaestra_sim.faults.damage import damaged_message
+from palaestra_sim.faults.language import parse
+from palaestra_sim.ros.topics import Publisher, Topic
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.devices.kind import ROLES
+from palaestra_sim.scene.nodes.types import type_number
+from palaestra_sim.scene.tree.catalogue import field_kinds
+from palaestra_sim.scene.tree.effects import require_effect
+from palaestra_sim.seam import UnsimulatedError
 
 COMMON = {"get_model", "get_name", "get_node_type"}
 NAMES_ON_JOINT = {f"get_{role}_name" for role in ROLES}

@@ -2,9 +2,9 @@
 
 import pytest
 
-from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.scene import raster
-from palaestra_sim.stub.scene.raster import Raster
+from palaestra_sim.ros.node import ServiceFailed
+from palaestra_sim.scene import raster
+from palaestra_sim.scene.raster import Raster
 
 RED = (0, 0, 255, 255)
 ROBOT = """Robot { supervisor TRUE controller "ros" controllerArgs [ "--name=painter" "--synchronize" ]

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.drive import STANDING, Ring, Wheel, find_drive
+from palaestra_sim.scene.drive import STANDING, Ring, Wheel, find_drive
 from tests.robotino import ROBOTINO, twist, wheel_speeds
 
 H = math.sqrt(0.5)

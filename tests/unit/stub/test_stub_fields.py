@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.geometry import axis_angle_to_quaternion
-from palaestra_sim.stub.ros.node import ServiceFailed
-from palaestra_sim.stub.scene.nodes.types import type_number
-from palaestra_sim.stub.scene.simulation import Simulation
-from palaestra_sim.stub.scene.tree.catalogue import FieldType, field_kinds, kinds_of
-from palaestra_sim.stub.scene.tree.fields import quaternion_to_axis_angle
+from palaestra_sim.ros.node import ServiceFailed
+from palaestra_sim.scene.geometry import axis_angle_to_quaternion
+from palaestra_sim.scene.nodes.types import type_number
+from palaestra_sim.scene.tree.catalogue import FieldType, field_kinds, kinds_of
+from palaestra_sim.scene.tree.fields import quaternion_to_axis_angle
 from palaestra_sim.world import builtin
+from tests.scenes import load_scene
 
 HALF = math.sqrt(0.5)
 
@@ -427,7 +427,7 @@ def test_a_kind_of_robot_is_a_kind_of_solid():
 )
 def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, written, kind):
     """So that a newer or rarer field can still be read."""
-    simulation = Simulation.load(world(f"DEF A Pose {{ novelty {written} }}"))
+    simulation = load_scene(world(f"DEF A Pose {{ novelty {written} }}"))
     tree = simulation.tree
 
     assert tree.field_of(tree.of_def("A"), "novelty", simulation).kind.name == kind
@@ -436,7 +436,7 @@ def test_a_field_that_is_not_listed_has_the_type_that_its_value_shows(world, wri
 def test_every_field_of_the_shipped_worlds_has_values():
     """No default is malformed, no value is lost."""
     for name in ("arena", "two_robots"):
-        simulation = Simulation.load(builtin(name))
+        simulation = load_scene(builtin(name))
         for node in list(simulation.tree.nodes.values()):
             for field_name, kind in kinds_of(node).items():
                 found = simulation.tree.field_of(node, field_name, simulation)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.geometry import (
+from palaestra_sim.scene.geometry import (
     Pose,
     axis_angle_to_quaternion,
     from_axis_angle,

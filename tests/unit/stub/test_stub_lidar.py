@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.ros.node import ServiceFailed
 
 WALL = "Solid { translation 2 0 0.5 boundingObject Box { size 0.2 8 1 } }"
 FLAT = "horizontalResolution 5 numberOfLayers 1 fieldOfView 1.5 minRange 0.1 maxRange 3"

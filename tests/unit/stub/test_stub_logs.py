@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.ros.node import ServiceFailed
 
 
 def test_a_refusal_is_logged(robot):

@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from palaestra_sim.stub.ros.loop import Loop
+from palaestra_sim.ros.loop import Loop
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ import random
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.stub.physics.motors import Motor, MotorSpec
-from palaestra_sim.stub.scene.joints import Joint, JointPlace
-from palaestra_sim.stub.scene.motion import motion_of
-from palaestra_sim.stub.scene.places import Place
-from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.scene.joints import Joint, JointPlace
+from palaestra_sim.scene.motion import motion_of
+from palaestra_sim.scene.motors import Motor, MotorSpec
+from palaestra_sim.scene.places import Place
 from tests.robotino import WHEELS, wheel_speeds
+from tests.scenes import load_scene
 
 STEP_MS = 32
 NORTH = "rotation 0 0 1 1.5707963267948966"  # of a robot that looks along +y
@@ -28,7 +28,7 @@ def load(world, simple_robot):
     def begin(sensor, robot="", info="", objects=""):
         text = simple_robot.replace("DEF IR", f"{sensor} DEF IR")
         text = text.replace('name "robotino"', f'{robot} customData "7" name "robotino"', 1)
-        return Simulation.load(world(objects, robot=text, info=info))
+        return load_scene(world(objects, robot=text, info=info))
 
     return begin
 
@@ -187,9 +187,7 @@ def test_a_gps_reads_a_worldinfo_that_follows_its_robot(simple_robot):
     """The order of nodes in a file has no meaning."""
     robot = simple_robot.replace("DEF IR", "GPS { } DEF IR")
 
-    simulation = Simulation.load(
-        f"#VRML_SIM R2023b utf8\n{robot}\nWorldInfo {{ gpsReference 1 2 3 }}\n".encode()
-    )
+    simulation = load_scene(f"#VRML_SIM R2023b utf8\n{robot}\nWorldInfo {{ gpsReference 1 2 3 }}\n".encode())
     simulation.step(STEP_MS)
 
     assert value_of(simulation, "gps") == pytest.approx((1.0, 2.0, 3.0))

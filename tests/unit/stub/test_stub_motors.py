@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from palaestra_sim.stub.physics.motors import Motor, MotorSpec
+from palaestra_sim.scene.motors import Motor, MotorSpec
 
 INF = math.inf
 

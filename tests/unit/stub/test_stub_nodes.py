@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from palaestra_sim.stub.ros.node import ServiceFailed
+from palaestra_sim.ros.node import ServiceFailed
 from palaestra_sim.world import builtin
 
 

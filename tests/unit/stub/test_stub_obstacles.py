@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.obstacles import Block, Disc, Neighborhood
+from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 
 places = st.floats(-3, 3)
 nearby = st.floats(-1.5, 1.5)  # from the middle of an obstacle, so that most touch it

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.outline import RoundPart, discs_of_box
+from palaestra_sim.stub.outline import RoundPart, discs_of_box
 
 sizes = st.floats(0.01, 3.0)
 places = st.floats(-2.0, 2.0)

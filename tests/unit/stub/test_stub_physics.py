@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.body import Body
-from palaestra_sim.stub.physics.drive import find_drive
-from palaestra_sim.stub.physics.motors import Motor, MotorSpec
-from palaestra_sim.stub.physics.obstacles import Block, Disc, Neighborhood
+from palaestra_sim.scene.base import Base
+from palaestra_sim.scene.drive import find_drive
+from palaestra_sim.scene.motors import Motor, MotorSpec
+from palaestra_sim.stub.body import StubBody
+from palaestra_sim.stub.obstacles import Block, Disc, Neighborhood
 from tests.robotino import ROBOTINO, WHEELS, twist, wheel_speeds
 
 STEP_S = 0.032
@@ -25,7 +26,7 @@ def build():
         wheels = [Motor(MotorSpec(name=name, **{"max_velocity_rad_s": 137.46, **spec})) for name in WHEELS]
         for wheel in wheels:
             wheel.set_position(math.inf)
-        body = Body([(0.0, 0.0, RADIUS)], wheels, find_drive(ROBOTINO))
+        body = StubBody(Base(wheels, find_drive(ROBOTINO)), [(0.0, 0.0, RADIUS)])
         body.face(Neighborhood(obstacles, RADIUS), others)
 
         def go(vx, vy, omega, steps):
@@ -302,7 +303,7 @@ def test_a_robot_never_ends_inside_anything(commands):
     walls += [Block(0.0, s * 1.05, 0.0, (2.2, 0.1)) for s in (-1, 1)]
     obstacles = [*walls, Disc(0.6, 0.6, 0.1)]
     wheels = [Motor(MotorSpec(name=name, max_velocity_rad_s=137.46)) for name in WHEELS]
-    body = Body([(0.0, 0.0, RADIUS)], wheels, find_drive(ROBOTINO))
+    body = StubBody(Base(wheels, find_drive(ROBOTINO)), [(0.0, 0.0, RADIUS)])
     body.face(Neighborhood(obstacles, RADIUS), ())
     for wheel in wheels:
         wheel.set_position(math.inf)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.physics.obstacles import Disc, Neighborhood
-from palaestra_sim.stub.physics.rays import Fan, LookupTable
+from palaestra_sim.scene.lookup import LookupTable
+from palaestra_sim.stub.obstacles import Disc, Neighborhood
+from palaestra_sim.stub.rays import Fan
 
 ROWS = [(0.1, 3.0, 0.0), (0.2, 2.0, 0.0), (0.4, 1.0, 0.0)]
 

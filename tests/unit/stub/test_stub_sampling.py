@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra_sim.stub.scene.mode import Mode
+from palaestra_sim.scene.mode import Mode
 
 
 def test_enable_takes_multiples_of_the_basic_step_before_the_first_step(robot):

@@ -6,17 +6,19 @@ import pickle
 import pytest
 
 from palaestra_sim.errors import WorldError, WorldRefusedError
-from palaestra_sim.stub.scene.devices.distance_sensor import DISTANCE_SENSOR
-from palaestra_sim.stub.scene.reader import read_scene
-from palaestra_sim.stub.scene.simulation import Simulation
-from palaestra_sim.stub.scene.tree.catalogue import FieldType
-from palaestra_sim.stub.scene.tree.scene_tree import SceneTree
+from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR
+from palaestra_sim.scene.reader import read_scene
+from palaestra_sim.scene.tree.catalogue import FieldType
+from palaestra_sim.scene.tree.scene_tree import SceneTree
+from palaestra_sim.stub.outline import obstacle
+from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin, parse
+from tests.scenes import load_scene
 
 
 def scene_of(source):
     """The scene of a world file."""
-    return read_scene(SceneTree(parse(source), "my.wbt"))
+    return read_scene(SceneTree(parse(source), "my.wbt"), StubPhysics())
 
 
 def distance(simulation):
@@ -52,14 +54,14 @@ def test_walls_stand_where_the_file_has_them():
     """Inner faces at 2 m."""
     walls = scene_of(builtin("arena")).solids[1:5]
 
-    assert [wall.obstacle().gap(0.0, 0.0) for wall in walls] == pytest.approx([2.0] * 4)
+    assert [obstacle(wall).gap(0.0, 0.0) for wall in walls] == pytest.approx([2.0] * 4)
 
 
 def test_a_robot_without_a_body_watches_only(world):
     """A separate supervisor: nothing runs into it, and it is not seen."""
     watcher = """Robot { name "eye" supervisor TRUE controller "ros"
       controllerArgs ["--name=eye" "--synchronize"] }"""
-    simulation = Simulation.load(world(watcher))
+    simulation = load_scene(world(watcher))
 
     assert simulation.robots[0].body is None
     simulation.step(32)
@@ -73,7 +75,7 @@ def test_a_box_may_have_any_heading(world, angle):
       boundingObject Box {{ size 0.4 0.4 0.3 }} }}"""
     half = 0.2 / max(abs(math.cos(angle)), abs(math.sin(angle)))
 
-    simulation = Simulation.load(world(crate))
+    simulation = load_scene(world(crate))
 
     assert distance(simulation) == pytest.approx(0.8 - half, abs=1e-6)
 
@@ -84,7 +86,7 @@ def test_frames_inside_frames_are_followed(world):
       Solid { name "post" translation 1 0.9 0 boundingObject Pose { translation 0 0 0.1 children [
         Shape { geometry Cylinder { radius 0.1 height 0.2 } } ] } } ] } ] }"""
 
-    simulation = Simulation.load(world(nested))
+    simulation = load_scene(world(nested))
 
     assert distance(simulation) == pytest.approx(0.6, abs=1e-6)
 
@@ -95,7 +97,7 @@ def test_a_use_is_the_last_def_before_it(world):
         boundingObject DEF SHAPE Cylinder { radius 0.1 height 0.2 } }
       Solid { translation 1 0 0.1 name "b" boundingObject USE SHAPE }"""
 
-    assert distance(Simulation.load(world(posts))) == pytest.approx(0.7)
+    assert distance(load_scene(world(posts))) == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize(
@@ -112,7 +114,7 @@ def test_a_ray_sees_what_is_at_its_height(world, z, height, seen):
     post = f"""Solid {{ translation 1 0 {z} name "post"
       boundingObject Cylinder {{ radius 0.1 height {height} }} }}"""
 
-    assert (distance(Simulation.load(world(post))) < 0.9) is seen
+    assert (distance(load_scene(world(post))) < 0.9) is seen
 
 
 def test_what_is_drawn_only_is_neither_seen_nor_felt(world):
@@ -121,14 +123,14 @@ def test_what_is_drawn_only_is_neither_seen_nor_felt(world):
       Solid { translation 0.5 0 0 name "ghost" children [ Shape { geometry Box { } } ] }
       Viewpoint { } Background { } DirectionalLight { }"""
 
-    assert distance(Simulation.load(world(drawn))) == pytest.approx(1.0)
+    assert distance(load_scene(world(drawn))) == pytest.approx(1.0)
 
 
 def test_two_robots_see_each_other(world, simple_robot):
     """By their bodies, where they are now."""
     second = simple_robot.replace("DEF ROBOTINO", "DEF OTHER").replace("robotino", "other")
     second = second.replace("Robot {", "Robot { translation 1 0 0 ", 1)
-    simulation = Simulation.load(world(second))
+    simulation = load_scene(world(second))
 
     simulation.step(32)
 
@@ -142,7 +144,7 @@ def test_a_bumper_without_a_boundingobject_never_fires(world, simple_robot):
         '"touch sensor" boundingObject Cylinder { radius 0.2 height 0.2 }', '"touch sensor"'
     )
     wall = 'Solid { translation 0.15 0 0.15 name "wall" boundingObject Box { size 0.1 4 0.3 } }'
-    simulation = Simulation.load(world(wall, robot=bare))
+    simulation = load_scene(world(wall, robot=bare))
 
     simulation.step(32)
 
@@ -154,7 +156,7 @@ def test_an_obstacle_may_get_another_size(world):
     """A client that randomizes sizes trains in the worlds that it wrote."""
     post = """Solid { translation 1 0 0.1 name "post" children [ Shape {
       geometry DEF SIZE Cylinder { radius 0.1 height 0.2 } } ] boundingObject USE SIZE }"""
-    simulation = Simulation.load(world(post))
+    simulation = load_scene(world(post))
     assert distance(simulation) == pytest.approx(0.7)
     radius = simulation.tree.field_of(simulation.tree.of_def("SIZE"), "radius", simulation)
 
@@ -245,7 +247,7 @@ def test_a_ray_may_look_up_and_down(world, simple_robot, rays, seen):
     wall = 'Solid { translation 0.9 0 0.1 name "wall" boundingObject Box { size 0.1 4 0.2 } }'
     tilted = simple_robot.replace("DEF IR DistanceSensor {", f"DistanceSensor {{ {rays}")
 
-    assert distance(Simulation.load(world(wall, robot=tilted))) == pytest.approx(seen, rel=1e-6)
+    assert distance(load_scene(world(wall, robot=tilted))) == pytest.approx(seen, rel=1e-6)
 
 
 @pytest.mark.parametrize("count", range(1, 31))
@@ -254,7 +256,7 @@ def test_several_rays_are_a_cone_that_is_symmetric_about_its_axis(world, simple_
     sonar = simple_robot.replace('name "ir1"', f'name "ir1" type "sonar" numberOfRays {count} aperture 0.2')
     wall = 'Solid { translation 0.55 0 0.3 name "wall" boundingObject Box { size 0.1 4 2 } }'
 
-    measured = distance(Simulation.load(world(wall, robot=sonar)))
+    measured = distance(load_scene(world(wall, robot=sonar)))
 
     assert 0.3 - 1e-9 <= measured <= 0.3 / math.cos(0.1) + 1e-9
 
@@ -265,7 +267,7 @@ def test_rays_off_the_axis_count_less(world, simple_robot):
     post = "Solid { translation 0.6 0 0.1 boundingObject Cylinder { radius 0.01 height 0.2 } }"
     weight = math.exp(-1.0)  # 0.2 rad off the axis, and 0.4 * 0.5 is the width
 
-    measured = distance(Simulation.load(world(post, robot=cone)))
+    measured = distance(load_scene(world(post, robot=cone)))
 
     above, below, aside = 0.39 / math.cos(0.2), 0.05 / math.sin(0.2), 1.0
     expected = (0.39 + weight * (above + below + 2 * aside)) / (1 + 4 * weight)
@@ -282,7 +284,7 @@ def test_a_robot_may_have_its_parts_in_groups_and_its_table_from_the_default(wor
     """What a world leaves out is as Webots has it: 0 to 1000 over 10 cm."""
     part = 'Group { children [ DistanceSensor { translation 0.2 0 0.05 name "near" } ] }'
     wall = 'Solid { translation 0.3 0 0.15 name "wall" boundingObject Box { size 0.1 4 0.3 } }'
-    simulation = Simulation.load(world(wall, robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
+    simulation = load_scene(world(wall, robot=simple_robot.replace("DEF IR", f"{part} DEF IR")))
     simulation.robots[0].body.place(0.0, 0.0, 0.0)
 
     simulation.step(32)
@@ -294,12 +296,12 @@ def test_a_robot_without_a_body_may_have_rays(world):
     """A light barrier: it stands where the file has it, turned as the file has it."""
     barrier = """Robot { name "barrier" translation 0 1 0 rotation 0 0 1 -1.5707963 children [
       DistanceSensor { translation 0 0 0.1 name "beam" lookupTable [ 0 0 0, 5 5 0 ] } ] }"""
-    simulation = Simulation.load(world(robot=barrier))
+    simulation = load_scene(world(robot=barrier))
     simulation.step(32)
     assert simulation.robots[0].sensors["beam"].value == pytest.approx(5.0)
 
     post = "Solid { translation 0 0 0.1 boundingObject Cylinder { radius 0.2 height 0.2 } }"
-    simulation = Simulation.load(world(post, robot=barrier))
+    simulation = load_scene(world(post, robot=barrier))
     simulation.step(32)
 
     assert simulation.robots[0].sensors["beam"].value == pytest.approx(0.8)
@@ -308,7 +310,7 @@ def test_a_robot_without_a_body_may_have_rays(world):
 def test_a_joint_without_a_motor_stays_where_it_is(world, simple_robot):
     """Its sensor tells 0."""
     joint = 'HingeJoint { device [ PositionSensor { name "hinge" } ] }'
-    simulation = Simulation.load(world(robot=simple_robot.replace("DEF IR", f"{joint} DEF IR")))
+    simulation = load_scene(world(robot=simple_robot.replace("DEF IR", f"{joint} DEF IR")))
 
     simulation.step(32)
 
@@ -321,7 +323,7 @@ def test_a_position_sensor_may_be_coarse_and_noisy(world, simple_robot):
         'PositionSensor { name "wheel0_joint_sensor" }',
         'PositionSensor { name "wheel0_joint_sensor" resolution 0.25 noise 0.5 }',
     )
-    simulation = Simulation.load(world(robot=coarse))
+    simulation = load_scene(world(robot=coarse))
     values = set()
 
     for _ in range(50):

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.scene.robot import seed_of
-from palaestra_sim.stub.scene.simulation import Simulation
-from palaestra_sim.stub.scene.tree.catalogue import FieldType
+from palaestra_sim.scene.robot import seed_of
+from palaestra_sim.scene.tree.catalogue import FieldType
 from palaestra_sim.world import builtin
 from tests.robotino import WHEELS, wheel_speeds
+from tests.scenes import load_scene
 
 
 @pytest.fixture
 def simulation():
     """The shipped arena."""
-    return Simulation.load(builtin("arena"))
+    return load_scene(builtin("arena"))
 
 
 def drive(simulation, vx, vy, omega):
@@ -71,7 +71,7 @@ def test_sending_a_velocity_again_changes_nothing(ways):
     """The trainer's facade does not send unchanged velocities; a run must stay the same bit by bit."""
 
     def moments(told_again):
-        simulation = Simulation.load(builtin("arena"))
+        simulation = load_scene(builtin("arena"))
         motors = simulation.robots[0].motors
         told = dict.fromkeys(WHEELS, 0.0)
         drive(simulation, 0.0, 0.0, 0.0)
@@ -124,7 +124,7 @@ def test_only_multiples_of_the_basic_step_can_be_stepped(simulation, duration_ms
 
 def test_two_simulations_of_a_world_agree_bit_by_bit():
     """Same world, same commands, same seed."""
-    assert run(Simulation.load(builtin("arena"))) == run(Simulation.load(builtin("arena")))
+    assert run(load_scene(builtin("arena"))) == run(load_scene(builtin("arena")))
 
 
 def test_a_reset_repeats_the_run_bit_by_bit(simulation):
@@ -172,7 +172,7 @@ def test_every_robot_has_noise_of_its_own():
     robot = source[source.index(b"DEF ROBOTINO Robot") :]
     source += robot.replace(b'name "robotino"', b'name "second" translation 0 1 0 customData "5"', 1)
 
-    simulation = Simulation.load(source)
+    simulation = load_scene(source)
     simulation.step(32)
 
     assert [it.seed for it in simulation.robots] == [0, 5]
@@ -209,7 +209,7 @@ def test_no_custom_data_is_an_error(text):
 
 def test_the_first_seed_is_that_of_the_world(world):
     """WorldInfo.randomSeed, until customData gives another."""
-    assert Simulation.load(world(info="randomSeed 42")).robots[0].seed == 42
+    assert load_scene(world(info="randomSeed 42")).robots[0].seed == 42
 
 
 def test_a_reset_happens_within_the_next_basic_step(simulation):
@@ -280,9 +280,10 @@ def test_reset_physics_is_at_once_and_keeps_time_and_place(simulation):
 def test_it_is_small():
     """Many run on one machine: the whole stub below 120 MB, and this part of it far below."""
     program = (
-        "import pathlib, sys; from palaestra_sim.stub.scene.simulation import Simulation;"
+        "import pathlib, sys; from palaestra_sim.scene.simulation import Simulation;"
+        "from palaestra_sim.stub.physics import StubPhysics;"
         "from palaestra_sim.world import builtin;"
-        "Simulation.load(builtin('arena')).step(192);"
+        "Simulation.load(builtin('arena'), StubPhysics()).step(192);"
         "status = pathlib.Path('/proc/self/status').read_text();"
         "print(status.split('VmHWM:')[1].split()[0], 'numpy' in sys.modules)"
     )

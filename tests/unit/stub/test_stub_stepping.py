@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.scene.mode import Mode
-from palaestra_sim.stub.scene.simulation import Simulation
-from palaestra_sim.stub.scene.stepping import Stepping
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.stepping import Stepping
 from palaestra_sim.world import builtin
+from tests.scenes import load_scene
 
 PENDING = "pending"
 
@@ -181,7 +181,7 @@ def test_modes_are_those_since_r2021a(robot, mode, known):
 )
 def test_no_robot_is_ever_ahead_of_another_by_more_than_it_asked_for(orders):
     """The world's time is the smallest of what the robots have asked for in total."""
-    simulation = Simulation.load(builtin("two_robots"))
+    simulation = load_scene(builtin("two_robots"))
     stepping = Stepping(simulation)
     for robot in simulation.robots:
         stepping.join(robot)

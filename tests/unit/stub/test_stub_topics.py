@@ -4,7 +4,7 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import last_field, message_type
 from palaestra_protocol.ros.tcpros import LENGTH
-from palaestra_sim.stub.ros.topics import Publisher, Topic
+from palaestra_sim.ros.topics import Publisher, Topic
 
 
 class Link:

@@ -5,13 +5,15 @@ import math
 import pytest
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.stub.front.options import StubOptions
-from palaestra_sim.stub.front.simulator import StubSimulator
-from palaestra_sim.stub.scene.mode import Mode
-from palaestra_sim.stub.scene.nodes import growing
-from palaestra_sim.stub.scene.nodes.growing import Descriptions
-from palaestra_sim.stub.scene.reading import LeaveOut
-from palaestra_sim.stub.scene.simulation import Simulation
+from palaestra_sim.front.simulator import Simulator
+from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.nodes import growing
+from palaestra_sim.scene.nodes.growing import Descriptions
+from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.stub.outline import obstacle
+from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin_protos, parse, parse_proto
 from palaestra_sim.world.stand_ins import load_stand_ins as load
 from palaestra_sim.world.stand_ins import shipped
@@ -30,7 +32,7 @@ def load_world(text, *protos, stand_ins=None, leave_out=None):
         stand_ins=shipped() if stand_ins is None else stand_ins,
     )
     world = parse(f"{HEAD}WorldInfo {{ basicTimeStep 16 }} {text}".encode(), "my.wbt")
-    return Simulation.of(world, "my.wbt", Mode.FAST, descriptions, leave_out)
+    return Simulation.of(world, StubPhysics(), "my.wbt", Mode.FAST, descriptions, leave_out)
 
 
 def obstacles(simulation):
@@ -170,7 +172,7 @@ def test_a_mistake_is_refused_even_if_everything_may_be_left_out():
 def test_a_stand_in_that_leans_has_the_outline_of_one_that_stands():
     """People save worlds in which crates have tumbled by a few degrees; the shape is simple anyway."""
     (shape,) = load_world("CardboardBox { size 0.6 0.4 0.5 rotation 1 0 0 0.1 }").scene.solids
-    outline = shape.obstacle()
+    outline = obstacle(shape)
 
     assert (2.0 * outline.half_x, 2.0 * outline.half_y) == pytest.approx((0.6, 0.4))
 
@@ -224,10 +226,12 @@ def test_a_world_with_other_axes_is_refused_unless_the_user_leaves_them_out(head
     world = parse(f"#VRML_SIM {header} utf8\nViewpoint {{ }}\nWorldInfo {{ {system} }}".encode(), "my.wbt")
 
     with pytest.raises(WorldError) as caught:
-        Simulation.of(world, "my.wbt")
+        Simulation.of(world, StubPhysics(), "my.wbt")
     assert str(caught.value).startswith(f"my.wbt:3:1: {fact}; convert it")
 
-    simulation = Simulation.of(world, "my.wbt", leave_out=LeaveOut(types=frozenset({"WorldInfo"})))
+    simulation = Simulation.of(
+        world, StubPhysics(), "my.wbt", leave_out=LeaveOut(types=frozenset({"WorldInfo"}))
+    )
     assert len(simulation.scene.left_out) == 1
 
 
@@ -236,12 +240,12 @@ def test_the_cylinders_of_an_old_proto_stand_along_its_y_axis():
     post = "PROTO Post [ ] { Solid { boundingObject Cylinder { radius 0.1 height 2 } } }"
     old = parse_proto(f"#VRML_SIM R2021b utf8\n{post}".encode(), "Post.proto")
     simulation = Simulation.of(
-        parse(f"{HEAD}Post {{ }}".encode()), descriptions=Descriptions(protos={"Post": old})
+        parse(f"{HEAD}Post {{ }}".encode()), StubPhysics(), descriptions=Descriptions(protos={"Post": old})
     )
     (shape,) = simulation.scene.solids
 
     assert shape.heights() == pytest.approx((-0.1, 0.1))
-    assert shape.obstacle().half_y == pytest.approx(1.0)
+    assert obstacle(shape).half_y == pytest.approx(1.0)
 
 
 STRETCHED = """Solid { boundingObject Transform { translation 1 0 0 scale 3 2 1 children [
@@ -379,14 +383,21 @@ def test_a_world_in_a_project_finds_its_protos(ros, tmp_path):
     world = tmp_path / "worlds" / "mine.wbt"
     world.write_text(f'{HEAD}EXTERNPROTO "../protos/Stool.proto"\nStool {{ }}')
 
-    assert len(StubSimulator(world, ros.make_node).simulation.scene.solids) == 1
+    assert len(Simulator(world, Loader(physics=StubPhysics), ros.make_node).simulation.scene.solids) == 1
 
     world.write_text(f'{HEAD}EXTERNPROTO "../protos/Lamp.proto"\nLamp {{ }}')
     with pytest.raises(WorldError, match=r"mine.wbt:3:1: Lamp is not expanded \(.*Lamp.proto:2:.*template"):
-        StubSimulator(world, ros.make_node)
+        Simulator(world, Loader(physics=StubPhysics), ros.make_node)
 
-    lamp = StubOptions(stand_ins=load("[Lamp]\ncylinder = { radius = 0.1, height = 2 }", "mine.toml"))
-    assert len(StubSimulator(world, ros.make_node, options=lamp).simulation.scene.solids) == 1
+    lamp = load("[Lamp]\ncylinder = { radius = 0.1, height = 2 }", "mine.toml")
+    assert (
+        len(
+            Simulator(
+                world, Loader(physics=StubPhysics, stand_ins=lamp), ros.make_node
+            ).simulation.scene.solids
+        )
+        == 1
+    )
 
 
 ARM = """Robot { name "arm" children [ HingeJoint {

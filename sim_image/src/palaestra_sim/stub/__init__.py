@@ -1,10 +1,10 @@
-"""The stub simulator: worlds, robots and the ROS interface of Webots' `ros` controller, without Webots.
+"""The stub simulator: a physics without masses and forces, small, fast, and exact where it stands.
 
 - `cli`: `palaestra-stub`
-- `front`: the `ros` controllers of the robots, with their services and topics
-- `ros`: the wire
-- `scene`: the contents of a world, its devices, nodes and fields, and the steps of time
-- `physics`: motion, contacts and rays
-- `faults`: faults on demand
-- `seam`: the Protocol of a node, and services as data
+- `physics`: the robots and obstacles of a world
+- `body`, `contacts`: motion, and what a robot runs into
+- `rays`: how far the beams of sensors travel
+- `outline`, `obstacles`: shapes, seen from above
+
+`scene` has worlds and devices, `front` the interface of Webots' `ros` controller; all simulators share them.
 """

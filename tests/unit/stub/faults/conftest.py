@@ -2,9 +2,9 @@
 
 import pytest
 
-from palaestra_sim.stub.faults.course import Course
-from palaestra_sim.stub.faults.language import parse
-from palaestra_sim.stub.faults.schedule import Life, Schedule
+from palaestra_sim.faults.course import Course
+from palaestra_sim.faults.language import parse
+from palaestra_sim.faults.schedule import Life, Schedule
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@
 
 import pytest
 
-from palaestra_sim.stub.faults.course import UNHARMED
-from palaestra_sim.stub.faults.kinds import RESET_PATHS
+from palaestra_sim.faults.course import UNHARMED
+from palaestra_sim.faults.kinds import RESET_PATHS
 
 STEP = "robot/time_step"
 RESET = "supervisor/simulation_reset"

@@ -6,8 +6,8 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import message_type, reading_field, service_type
 from palaestra_protocol.ros.tcpros import LENGTH, FrameReader, frame
-from palaestra_sim.stub.faults.damage import damaged_answer, damaged_message
-from palaestra_sim.stub.faults.language import parse
+from palaestra_sim.faults.damage import damaged_answer, damaged_message
+from palaestra_sim.faults.language import parse
 
 WRONG_VALUE = parse("wrong_value", "test")
 WRONG_SHAPE = parse("wrong_shape", "test")

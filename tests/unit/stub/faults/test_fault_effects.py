@@ -2,8 +2,8 @@
 
 import pytest
 
-from palaestra_sim.stub.faults import Effects
-from palaestra_sim.stub.faults.language import parse
+from palaestra_sim.faults import Effects
+from palaestra_sim.faults.language import parse
 
 
 class Endings:

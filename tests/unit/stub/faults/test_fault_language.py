@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.faults import kinds
-from palaestra_sim.stub.faults.kinds import Event, Trigger
-from palaestra_sim.stub.faults.language import KINDS, FaultError, parse
+from palaestra_sim.faults import kinds
+from palaestra_sim.faults.kinds import Event, Trigger
+from palaestra_sim.faults.language import KINDS, FaultError, parse
 
 
 def one(text):

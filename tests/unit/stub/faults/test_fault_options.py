@@ -4,7 +4,10 @@ import argparse
 
 import pytest
 
-from palaestra_sim.stub.faults import FaultError, add_options, begin, read_options
+from palaestra_sim.faults import FaultError, add_options, begin, read_options
+from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.stub.physics import StubPhysics
 from palaestra_sim.world import builtin
 
 
@@ -96,7 +99,7 @@ def test_an_error_names_the_place_of_the_mistake(read, arguments, environment, w
 def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read, arena, fault, words):
     """Found by starting its controllers on nodes that only listen."""
     with pytest.raises(FaultError, match=words):
-        begin(read(f"--fault={fault}"), arena)
+        begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena)
 
 
 @pytest.mark.parametrize(
@@ -104,7 +107,9 @@ def test_the_error_for_a_name_that_the_world_lacks_suggests_one_that_it_has(read
 )
 def test_what_the_world_has_can_be_named(read, arena, fault):
     """Topics of sensors are there before anybody enables one."""
-    assert begin(read(f"--fault={fault}"), arena).schedule.faults[0].text == fault
+    assert (
+        begin(read(f"--fault={fault}"), Loader(physics=StubPhysics), arena).schedule.faults[0].text == fault
+    )
 
 
 def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
@@ -112,6 +117,15 @@ def test_the_random_part_of_a_ros_name_makes_no_difference(read, arena):
     names = []
     for name in (b"job_r0_collect_0a_robotino_8c31f2", b"job_r0_collect_0a_robotino_00ff00"):
         arena.write_bytes(builtin("arena").replace(b"--name=robotino", b"--name=" + name))
-        names.append(begin(read("--fault=crash"), arena).schedule.life.simulator)
+        names.append(begin(read("--fault=crash"), Loader(physics=StubPhysics), arena).schedule.life.simulator)
 
     assert names == ["job_r0_collect_0a_robotino"] * 2
+
+
+def test_faults_are_looked_up_in_the_world_as_it_will_run(read, tmp_path):
+    """A world that starts only with --leave-out has faults too."""
+    world = tmp_path / "odd.wbt"
+    world.write_bytes(builtin("arena") + b"Unheard { }")
+    load = Loader(physics=StubPhysics, leave_out=LeaveOut(everything=True))
+
+    assert begin(read("--fault=crash"), load, world).schedule.faults[0].text == "crash"

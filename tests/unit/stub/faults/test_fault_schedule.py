@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_sim.stub.faults.kinds import Event, Trigger
-from palaestra_sim.stub.faults.language import parse
-from palaestra_sim.stub.faults.schedule import Life, Schedule
+from palaestra_sim.faults.kinds import Event, Trigger
+from palaestra_sim.faults.language import parse
+from palaestra_sim.faults.schedule import Life, Schedule
 
 STEPS = range(1, 4001)
 

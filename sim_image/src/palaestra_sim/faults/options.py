@@ -1,0 +1,93 @@
+"""The faults from the command line and the environment, and the number of this life."""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from palaestra_sim.faults.kinds import Event, Fault
+from palaestra_sim.faults.language import FaultError, parse
+
+FAULTS: Final = "PALAESTRA_STUB_FAULTS"
+SEED: Final = "PALAESTRA_STUB_FAULT_SEED"
+START: Final = "PALAESTRA_SIMULATOR_START"  # the number of this start, counted by the sidecar
+_MOST_DRAWN: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ordered:
+    """The faults of this process.
+
+    Attributes:
+        faults: in the order they were written, options before the environment's.
+        seed: of all draws.
+        life: the number of this start of the simulator, from 1.
+        counted: whether a sidecar or a person counts the lives; otherwise `life` was drawn.
+    """
+
+    faults: tuple[Fault, ...]
+    seed: int
+    life: int
+    counted: bool
+
+    def __str__(self) -> str:
+        life = f"life {self.life}" if self.counted else f"--fault-life {self.life}, drawn"
+        return f"{' '.join(fault.text for fault in self.faults)} (seed {self.seed}, {life})"
+
+
+def add_options(add: Callable[..., Any]) -> None:
+    """Add the options about faults to a parser, by its `add_argument`."""
+    add("--fault", action="append", default=[], metavar="KIND[:KEY=VALUE,...]", help="fail so; repeatable")
+    add("--fault-seed", metavar="N", help="what all draws follow from (default: 0)")
+    add("--fault-life", metavar="N", help="which life of the simulator this is, from 1 (default: drawn)")
+
+
+def read_options(options: argparse.Namespace, environment: Mapping[str, str]) -> Ordered | None:
+    """Return the faults of the options and the environment together; None: no faults.
+
+    Raises:
+        FaultError: a description or a number is wrong.
+    """
+    faults = tuple(
+        fault
+        for where, text in (*(("--fault", it) for it in options.fault), (FAULTS, environment.get(FAULTS, "")))
+        for fault in parse(text, where)
+    )
+    if not faults:
+        return None
+    seed = _whole(0, ("--fault-seed", options.fault_seed), (SEED, environment.get(SEED)))
+    life = _whole(1, ("--fault-life", options.fault_life), (START, environment.get(START)))
+    _check(faults, counted=life is not None)
+    return Ordered(
+        faults=faults,
+        seed=seed or 0,
+        life=secrets.randbelow(_MOST_DRAWN) + 1 if life is None else life,
+        counted=life is not None,
+    )
+
+
+def _check(faults: tuple[Fault, ...], *, counted: bool) -> None:
+    texts = [fault.text for fault in faults]
+    for fault in faults:
+        if texts.count(fault.text) > 1:
+            raise FaultError(f"fault {fault.text}: is there twice; leave one")
+        trigger = fault.trigger
+        if not counted and trigger.event is Event.START and (trigger.at or trigger.every > 1):
+            raise FaultError(
+                f"fault {fault.text}: nobody counts the starts here;"
+                " give --fault-life N, or start the stub through its sidecar"
+            )
+
+
+def _whole(least: int, *given: tuple[str, str | None]) -> int | None:
+    """Return the first given number; None if there is none."""
+    for where, text in given:
+        if text is None:
+            continue
+        if not (text.isascii() and text.isdigit() and int(text) >= least):
+            raise FaultError(f"{where}: {text!r} is no whole number from {least} on; give one")
+        return int(text)
+    return None

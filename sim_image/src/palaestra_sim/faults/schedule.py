@@ -1,0 +1,61 @@
+"""The schedule of a life: the faults at its k-th event.
+
+Pure, and a function rather than a stream: the draw for an event is a hash over the seed, the simulator, its
+life, the fault and the event's number. So a draw does not depend on earlier draws, and an additional fault
+changes no other. Two lives of a simulator, or two simulators of a group, have different draws.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from palaestra_sim.faults.kinds import Delayed, Event, Fault
+
+_DRAW_BYTES = 7  # 56 bits: more than a float's 53
+_DRAWS = float(256**_DRAW_BYTES)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Life:
+    """The values that distinguish the faults of one life.
+
+    Attributes:
+        seed: chosen by a person.
+        simulator: which one it is among those with that seed.
+        number: of the life, counted from 1 by the program that starts the simulator.
+    """
+
+    seed: int = 0
+    simulator: str = ""
+    number: int = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Schedule:
+    """The faults of one life."""
+
+    faults: Sequence[Fault]
+    life: Life
+
+    def happens(self, fault: Fault, number: int) -> bool:
+        """Return whether `fault` happens at the event of that number, counted from 1."""
+        return fault.trigger.fires(number, self._draw(fault, number, "happens"))
+
+    def at(self, event: Event, number: int) -> tuple[Fault, ...]:
+        """Return the faults that happen at the event of that number, in the order they were written."""
+        return tuple(
+            fault for fault in self.faults if fault.trigger.event is event and self.happens(fault, number)
+        )
+
+    def delay_s(self, fault: Delayed, number: int) -> float:
+        """Return how long the fault delays the event of that number: latency, and a share of the jitter."""
+        return fault.latency_s + fault.jitter_s * self._draw(fault, number, "jitter")
+
+    def _draw(self, fault: Fault, number: int, purpose: str) -> float:
+        """Return a number in [0, 1), uniformly distributed."""
+        life = self.life
+        words = (life.seed, life.simulator, life.number, fault.text, number, purpose)
+        digest = hashlib.blake2b(repr(words).encode(), digest_size=_DRAW_BYTES).digest()
+        return int.from_bytes(digest) / _DRAWS

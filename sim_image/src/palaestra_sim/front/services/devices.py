@@ -1,0 +1,162 @@
+"""Devices over ROS: the services of each, and the feeds that publish values once they are enabled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from palaestra_sim.scene.devices.kind import ROLES, Device, Enable, Kind, Shaft, Source, Topic
+from palaestra_sim.scene.nodes.types import type_number
+from palaestra_sim.seam import Fields, Node, Publisher, Row, Service, topic_name
+
+
+@dataclass(slots=True, eq=False)
+class Feed:
+    """One topic of a device.
+
+    A period that differs from those before adds a second publisher of the same topic, as in the controller;
+    the messages of the two are mixed.
+
+    Attributes:
+        constants: the other fields, as they are when the topic begins.
+        reading: the field of the value; "" is the last one.
+        many: whether the value is a sequence, with a message for each of its items.
+        publishers: by period in ms.
+    """
+
+    path: str
+    type_name: str
+    template: Fields
+    constants: Fields
+    source: Source | None
+    reading: str = ""
+    many: bool = False
+    publishers: dict[int, Publisher] = field(default_factory=dict)
+
+    def begin(self, node: Node, period_ms: int) -> None:
+        """Publish every `period_ms` too."""
+        if period_ms not in self.publishers:
+            template = {**self.template, **self.constants}
+            self.publishers[period_ms] = node.advertise(
+                self.path, self.type_name, template=template, reading=self.reading
+            )
+
+    def end(self, node: Node) -> None:
+        """Withdraw all publishers."""
+        for publisher in self.publishers.values():
+            node.withdraw(publisher)
+        self.publishers.clear()
+
+    def publish(self, elapsed_ms: int) -> None:
+        """Send the value to the subscribers, by each publisher that is due."""
+        source = self.source
+        if source is None:
+            return
+        for period_ms, publisher in self.publishers.items():
+            if elapsed_ms % period_ms == 0:
+                for value in source.value if self.many else (source.value,):
+                    if self.reading:
+                        publisher.send_stamped({self.reading: value})
+                    else:
+                        publisher.send_value(value)
+
+
+class Outlet:
+    """All topics of one device, which its `enable` begins and ends together.
+
+    Args:
+        node: that publishes.
+        device_name: as in the world.
+        topics: of the device.
+        accepts: whether it accepts a period.
+        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+        sensor: the path of `enable` below the device; "" for the device itself.
+
+    Attributes:
+        feeds: one for each topic.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        device_name: str,
+        topics: Iterable[Topic],
+        accepts: Enable,
+        enabled: Callable[[int], None] = lambda _period_ms: None,
+        sensor: str = "",
+    ) -> None:
+        path = topic_name(device_name)
+        header = {"header": {"frame_id": f"{node.name}/{path}"}}
+        self.feeds = tuple(
+            Feed(f"{path}/{it.name}", it.type_name, header, it.constants, it.source, it.reading, it.many)
+            for it in topics
+        )
+        self._node = node
+        self._path = f"{path}/{sensor}" if sensor else path
+        self._enabled = enabled
+        self._accepts = accepts
+        self._periods_ms: set[int] = set()
+
+    def enable(self, period_ms: int, step_ms: int) -> bool:
+        """Publish every `period_ms`; 0 stops. Return whether the device accepts the period.
+
+        Raises:
+            UnsimulatedError: the device never publishes.
+        """
+        if period_ms == 0:
+            self._periods_ms.clear()
+            for feed in self.feeds:
+                feed.end(self._node)
+            self._enabled(0)
+            return True
+        if not self._accepts(period_ms, step_ms):
+            return False
+        self._periods_ms.add(period_ms)
+        self._enabled(min(self._periods_ms))
+        for feed in self.feeds:
+            feed.begin(self._node, period_ms)
+        return True
+
+    def services(self, step_ms: Callable[[], int]) -> tuple[Service, ...]:
+        """Return `enable` and `get_sampling_period`; `step_ms()` is the controller's last step."""
+
+        def enable(request: Any) -> dict[str, Any]:
+            return {"success": self.enable(request.value, step_ms())}
+
+        def get_sampling_period(_request: Any) -> dict[str, Any]:
+            return {"value": min(self._periods_ms, default=0)}
+
+        return (
+            Service(f"{self._path}/enable", "webots_ros/set_int", enable),
+            Service(f"{self._path}/get_sampling_period", "webots_ros/get_int", get_sampling_period),
+        )
+
+
+def device_services(kind: Kind[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:
+    """Return the services of a device beside `enable` and `get_sampling_period`; `shaft` is its joint."""
+    rows: tuple[Row, ...] = (
+        ("get_model", "get_string", lambda _: {"value": device.model}),
+        ("get_name", "get_string", lambda _: {"value": device.name}),
+        ("get_node_type", "get_int", lambda _: {"value": type_number(kind.node)}),
+    )
+    return services_below(topic_name(device.name), (*rows, *kind.services(device), *_neighbors(kind, shaft)))
+
+
+def services_below(path: str, rows: Iterable[Row]) -> tuple[Service, ...]:
+    """Return the services of a table, with their paths below `path`."""
+    return tuple(
+        Service(f"{path}/{name}", f"webots_ros/{type_name}", handler) for name, type_name, handler in rows
+    )
+
+
+def _neighbors(kind: Kind[Any], shaft: Shaft | None) -> tuple[Row, ...]:
+    """Return the services that answer the names of the other devices of a joint."""
+    if shaft is None:
+        return ()
+    names = shaft.names
+    return tuple(
+        (f"get_{role}_name", "get_string", lambda _, role=role: {"value": names.get(role, "")})
+        for role in ROLES
+        if role != kind.role
+    )

@@ -1,0 +1,80 @@
+"""Services under `robot/`, and those of the pseudo devices that every robot has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from palaestra_sim.front.backend import Backend
+from palaestra_sim.front.host import Host
+from palaestra_sim.ros.node import ServiceFailed
+from palaestra_sim.scene.robot import Robot
+from palaestra_sim.seam import Handler, Row, Service
+
+Fields = dict[str, Any]
+
+
+class RobotServices:
+    """The services of one robot about itself, but for `time_step` and `get_device_list`."""
+
+    def __init__(self, host: Host, simulation: Backend, robot: Robot) -> None:
+        self._host = host
+        self._simulation = simulation
+        self._robot = robot
+
+    def table(self) -> tuple[Service, ...]:
+        """Return the services, with their paths below the robot's name."""
+        return tuple(
+            Service(f"robot/{name}", f"webots_ros/{type_name}", handler)
+            for name, type_name, handler in (*self._constants(), *self._actions())
+        )
+
+    def _constants(self) -> Iterator[Row]:
+        node = self._robot.parts.node
+        world_path = self._host.world_path
+        for name, type_name, value in (
+            ("get_model", "get_string", node.text("model") or ""),
+            ("get_mode", "get_int", 0),
+            ("get_supervisor", "get_bool", node.flag("supervisor", False)),
+            ("get_synchronization", "get_bool", node.flag("synchronization", True)),
+            ("get_project_path", "get_string", str(world_path.parent.parent)),
+            ("get_world_path", "get_string", str(world_path)),
+            ("get_basic_time_step", "get_float", float(self._simulation.basic_step_ms)),
+            ("get_number_of_devices", "get_int", len(self._robot.parts.devices.names)),
+            ("wwi_receive_text", "get_string", ""),
+        ):
+            yield name, type_name, _always({"value": value})
+
+    def _actions(self) -> tuple[Row, ...]:
+        wait = "wait_for_user_input_event"
+        return (
+            (wait, f"robot_{wait}", _always({"event": 0})),
+            ("get_time", "get_float", lambda _: {"value": self._simulation.time_ms / 1000.0}),
+            ("get_urdf", "get_urdf", _no_urdf),
+            ("get_custom_data", "get_string", self._get_custom_data),
+            ("set_custom_data", "set_string", self._set_custom_data),
+            ("get_data", "get_string", self._get_custom_data),
+            ("set_data", "set_string", self._set_custom_data),
+            ("set_mode", "robot_set_mode", lambda request: {"success": int(request.mode == 0)}),
+            ("wwi_send_text", "set_string", _always({"success": True})),
+        )
+
+    def device_list(self) -> Service:
+        """Return the service that is advertised last, so that a client that finds it finds all."""
+        names = list(self._robot.parts.devices.names)
+        return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
+
+    def _get_custom_data(self, _request: Any) -> Fields:
+        return {"value": self._robot.custom_data}
+
+    def _set_custom_data(self, request: Any) -> Fields:
+        self._robot.custom_data = request.value
+        return {"success": True}
+
+
+def _always(fields: Fields) -> Handler:
+    return lambda _request: fields
+
+
+def _no_urdf(_request: Any) -> Fields:
+    raise ServiceFailed("the stub writes no URDF; use driver webots")

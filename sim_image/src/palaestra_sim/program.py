@@ -1,0 +1,254 @@
+"""A simulator as a program: its command line, and the life of its process.
+
+Every simulator that is made of the front and the scene is this program, with a physics of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+from palaestra_protocol.numbers import milliseconds
+from palaestra_sim import faults
+from palaestra_sim.errors import SimError, WorldRefusedError
+from palaestra_sim.front.options import FrontOptions
+from palaestra_sim.front.simulator import Simulator
+from palaestra_sim.ros import Loop, MasterUnreachable, RosNode
+from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.scene.summary import silent_devices, summary
+from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
+
+log = logging.getLogger(__name__)
+
+_MODES = {"pause": Mode.PAUSE, "realtime": Mode.REAL_TIME, "fast": Mode.FAST}
+_CHECK_MASTER_S = 1.0
+_ALL = "all"
+_WRONG_WORLD = 2
+_NO_MASTER = 1
+
+_EPILOG = """\
+Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes nothing.
+
+faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/simulators.md has them all.
+PALAESTRA_STUB_FAULTS takes them with blanks between, PALAESTRA_STUB_FAULT_SEED what --fault-seed does,
+PALAESTRA_SIMULATOR_START what --fault-life does.
+
+exit codes: 0 after SIGTERM; what `simulation_quit` says; 1 the ROS master does not answer, or not any more;
+2 the world or the options cannot be used; what a fault says
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program:
+    """One simulator.
+
+    Attributes:
+        name: of the program.
+        description: for its help.
+        physics: returns the physics of a world that is about to be read.
+    """
+
+    name: str
+    description: str
+    physics: Callable[[], Physics]
+
+    def run(self, arguments: Sequence[str] | None = None) -> int:
+        """Run the simulator until a client or a signal ends it; return the exit code."""
+        options = _parser(self).parse_args(arguments)
+        logging.basicConfig(level=logging.INFO, format=f"{self.name}: %(message)s", stream=sys.stderr)
+        try:
+            return self._check(options) if options.check else self._simulate(options)
+        except WorldRefusedError as error:
+            # A sidecar reports the last line alone.
+            sys.stderr.write(f"{error}\n{self.name}: {error.summary}\n")
+        except SimError as error:
+            sys.stderr.write(f"{self.name}: {error}\n")
+        except MasterUnreachable as error:
+            sys.stderr.write(f"{self.name}: {error}\n")
+            return _NO_MASTER
+        except OSError as error:
+            sys.stderr.write(f"{self.name}: {error.filename or 'network'}: {error.strerror}\n")
+        return _WRONG_WORLD
+
+    def _check(self, options: argparse.Namespace) -> int:
+        """Print what becomes of the world; return 0 if it can be started as it is."""
+        load = self._loader(options, LeaveOut(everything=True, names=True))
+        simulation = load(options.world.absolute(), _MODES[options.mode])
+        for line in summary(simulation):
+            sys.stdout.write(f"{line}\n")
+        return _WRONG_WORLD if simulation.left_out else 0
+
+    def _simulate(self, options: argparse.Namespace) -> int:
+        return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()
+
+    def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Loader:
+        return Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
+
+
+class _Process:
+    """The loop, the nodes in it, and the simulator between them."""
+
+    def __init__(self, options: argparse.Namespace, load: Loader) -> None:
+        self._ordered = faults.read_options(options, os.environ)
+        self._course = None if self._ordered is None else faults.begin(self._ordered, load, options.world)
+        self._loop = Loop()
+        self._master_uri = os.environ.get("ROS_MASTER_URI", "http://localhost:11311")
+        self._new_node = self._node_maker()
+        self._nodes: dict[str, RosNode] = {}
+        self._exit_code = 0
+        self._simulator = Simulator(
+            options.world,
+            load,
+            self._make_node,
+            options=FrontOptions(
+                step_sleep_s=options.step_sleep_ms / 1000.0,
+                lost_wakeup=options.lost_wakeup,
+                publish_delay_s=options.publish_delay_ms / 1000.0,
+            ),
+            mode=_MODES[options.mode],
+        )
+        self._simulator.on_quit(self.end)
+
+    def run(self) -> int:
+        """Serve until the end; return the exit code."""
+        self._loop.wake_on_signals()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: self._loop.post(lambda: self.end(0)))
+        if self._course is None:
+            self._start()
+        else:
+            self._start_as_ordered(self._course)
+        self._loop.run()
+        self._simulator.close()
+        self._loop.close()
+        return self._exit_code
+
+    def end(self, status: int) -> None:
+        """Let `run` return that exit code, once everything is closed in good order."""
+        self._exit_code = status
+        self._loop.stop()
+
+    def lose_master(self) -> None:
+        """End as if the ROS master did not answer any more."""
+        log.warning("no ROS master at %s: a fault", self._master_uri)
+        for node in self._nodes.values():
+            if isinstance(node, faults.FaultyNode):
+                node.lose_master()
+        self.end(_NO_MASTER)
+
+    def lose_names(self) -> None:
+        """Let the master forget every name, and go on."""
+        for name in self._simulator.controllers:
+            self._nodes[name].unregister()
+
+    def _start(self) -> None:
+        self._simulator.start()
+        for left_out in self._simulator.simulation.left_out:
+            log.warning("%s", left_out)
+        silent = silent_devices(self._simulator.simulation.robots)
+        if silent:
+            log.warning("devices without readings, whose enable answers failure: %s", silent)
+        log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
+        self._loop.later(_CHECK_MASTER_S, self._check_master)
+
+    def _start_as_ordered(self, course: faults.Course) -> None:
+        """Start with the faults of a course: late, or not at all."""
+        log.info("faults: %s", self._ordered)
+        refused, delay_s = course.start()
+        if refused is None:
+            self._loop.later(delay_s, self._start)
+        else:
+            log.error("fault: %s", refused.text)
+            self._loop.later(0.0, lambda: self.end(refused.code))
+
+    def _node_maker(self) -> Callable[[str], RosNode]:
+        """Return what makes the node of a name: a plain one, unless faults are ordered."""
+        if self._course is None:
+            return partial(RosNode, self._loop, master_uri=self._master_uri)
+        failing = faults.Failing(course=self._course, effects=faults.Effects(self))
+        return partial(faults.FaultyNode, self._loop, master_uri=self._master_uri, failing=failing)
+
+    def _make_node(self, name: str) -> RosNode:
+        node = self._new_node(name)
+        node.on_end(lambda reason: self._lose(name, reason))
+        self._nodes[name] = node
+        return node
+
+    def _lose(self, name: str, reason: str) -> None:
+        """End one controller whose node was shut down; the simulation goes on without it."""
+        log.warning("the node %s was shut down (%s); its robot has no controller any more", name, reason)
+        controller = self._simulator.controllers.pop(name, None)
+        if controller is not None:
+            controller.close()
+
+    def _check_master(self) -> None:
+        """End when the master is gone: its names are lost, and a controller would end too."""
+        for name in self._simulator.controllers:
+            try:
+                self._nodes[name].check_master()
+            except MasterUnreachable as error:
+                log.warning("%s", error)
+                self.end(_NO_MASTER)
+                return
+        self._loop.later(_CHECK_MASTER_S, self._check_master)
+
+
+def _parser(program: Program) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=program.name,
+        description=program.description,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--version", action="version", version=version("palaestra-sim"))
+    add("world", type=Path, help="the .wbt file to load")
+    add("--check", action="store_true", help="print what becomes of the world, and start nothing")
+    add("--mode", choices=_MODES, default="fast", help="how time passes at first (default: %(default)s)")
+    add("--step-sleep-ms", type=milliseconds, default=0.0, help="real time that each step takes at least")
+    add("--publish-delay-ms", type=milliseconds, default=0.0, help="from the end of a step to its messages")
+    add("--lost-wakeup", action="store_true", help="lose the messages of a step that comes too early")
+    add(
+        "--stand-ins",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a table of PROTOs that are simulated as simple solids, beside those that ship; repeatable",
+    )
+    add(
+        "--leave-out",
+        action="append",
+        default=[],
+        metavar="TYPE",
+        help=f"leave out nodes of this type that cannot be simulated, or {_ALL} of them; repeatable",
+    )
+    faults.add_options(add)
+    return parser
+
+
+def _stand_ins(files: Sequence[Path]) -> Mapping[str, StandIn]:
+    """Return the entries of these files; the last of a name counts.
+
+    Raises:
+        StandInError: a file is no such table.
+    """
+    table: dict[str, StandIn] = {}
+    for file in files:
+        table.update(load_stand_ins(file.read_text("utf-8"), str(file)))
+    return table
+
+
+def _leave_out(types: Sequence[str]) -> LeaveOut:
+    return LeaveOut(types=frozenset(types), everything=_ALL in types)

@@ -1,0 +1,149 @@
+"""One TCPROS connection each: a client of a service, or a subscriber of a topic.
+
+Sockets are non-blocking. A service client's answers are queued without loss; a subscriber that reads too
+slowly gets the newest message only, as with a publisher of queue size 1.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from palaestra_protocol.ros import sockets
+from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
+from palaestra_sim.ros.loop import Loop
+
+
+class Endpoint(Protocol):
+    """The receiver of a connection after its header has been read."""
+
+    def receive(self, payload: bytes) -> None:
+        """Take one frame from the peer."""
+        ...
+
+    def lost(self) -> None:
+        """Handle the end of the connection."""
+        ...
+
+
+class Connection(Protocol):
+    """The connection through which an endpoint sends: a link, or a wrapper of one."""
+
+    @property
+    def closed(self) -> bool:
+        """Return whether it is closed, so that nothing can be sent."""
+        ...
+
+    def send(self, data: bytes) -> None:
+        """Send all of `data`."""
+        ...
+
+    def send_newest(self, data: bytes) -> None:
+        """Send `data`; while the peer does not read, keep only the newest."""
+        ...
+
+    def close(self) -> None:
+        """Close it; safe to repeat."""
+        ...
+
+
+class Refused(Exception):
+    """The header names a service or topic that is not here; the text is sent to the peer."""
+
+
+Greet = Callable[["Link", Mapping[str, str]], Endpoint]
+
+
+class Link:
+    """A connection from accept to close; `greet` turns its header into an endpoint."""
+
+    __slots__ = ("_endpoint", "_frames", "_greet", "_loop", "_newest", "_socket", "_unsent", "closed")
+
+    def __init__(self, loop: Loop, connection: socket.socket, greet: Greet) -> None:
+        connection.setblocking(False)
+        for option in sockets.OPTIONS:
+            connection.setsockopt(*option)
+        self._loop = loop
+        self._socket = connection
+        self._greet = greet
+        self._frames = FrameReader()
+        self._endpoint: Endpoint | None = None
+        self._unsent = b""
+        self._newest: bytes | None = None
+        self.closed = False
+        loop.watch(connection, self._ready)
+
+    def send(self, data: bytes) -> None:
+        """Send all of `data`, now or as soon as the peer reads."""
+        if self._unsent:
+            self._unsent += data
+        else:
+            self._write(data)
+
+    def send_newest(self, data: bytes) -> None:
+        """Send `data`; while the peer does not read, keep it in place of the data kept before."""
+        if self._unsent:
+            self._newest = data
+        else:
+            self._write(data)
+
+    def close(self) -> None:
+        """Close the connection; safe to repeat."""
+        if self.closed:
+            return
+        self.closed = True
+        self._loop.forget(self._socket)
+        self._socket.close()
+        if self._endpoint is not None:
+            self._endpoint.lost()
+
+    def _write(self, data: bytes) -> None:
+        try:
+            sent = self._socket.send(data)
+        except BlockingIOError:
+            sent = 0
+        except OSError:
+            self.close()
+            return
+        if sent < len(data):
+            self._unsent = data[sent:]
+            self._loop.watch(self._socket, self._ready, writing=True)
+        elif self._unsent:
+            self._unsent = b""
+
+    def _flush(self) -> None:
+        unsent, self._unsent = self._unsent, b""
+        self._write(unsent)
+        if not self._unsent and self._newest is not None:
+            newest, self._newest = self._newest, None
+            self._write(newest)
+        if not self._unsent and not self.closed:
+            self._loop.watch(self._socket, self._ready)
+
+    def _ready(self) -> None:
+        if self._unsent:
+            self._flush()
+        if self.closed:
+            return
+        try:
+            data = self._socket.recv(sockets.FIRST_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+            return
+        self._take(data)
+
+    def _take(self, data: bytes) -> None:
+        try:
+            for payload in self._frames.feed(data):
+                if self._endpoint is None:
+                    self._endpoint = self._greet(self, decode_header(payload))
+                elif not self.closed:
+                    self._endpoint.receive(payload)
+        except (Refused, FramingError) as error:
+            self._write(encode_header({"error": str(error)}))
+            self.close()

@@ -1,0 +1,292 @@
+"""A ROS node: services that answer and topics that publish, under one name.
+
+The robot's controller uses this interface. A handler gets the decoded request and returns the fields of the
+response. It returns `LATER` if it will call `answer` itself, like a step that waits for another robot or
+for the end of a pause.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
+from palaestra_protocol.ros.tcpros import encode_header, frame
+from palaestra_sim.ros.links import Connection, Endpoint, Link, Refused
+from palaestra_sim.ros.loop import Loop
+from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name
+from palaestra_sim.ros.topics import Publisher, Topic
+
+LATER: Final = object()
+Handler = Callable[[Any], Any]
+
+_BACKLOG = 128
+
+
+class ServiceFailed(Exception):
+    """The service cannot answer; the client gets the text as a ServiceException."""
+
+
+class RosNode:
+    """One node with its services and topics, registered at the master from `start` to `close`.
+
+    Args:
+        loop: watches its sockets.
+        name: the node's name and the prefix of its relative paths, e.g. "robotino".
+        master_uri: the master, e.g. http://localhost:11311
+    """
+
+    def __init__(self, loop: Loop, name: str, master_uri: str) -> None:
+        self.name = name
+        self.blocked: Callable[[], bool] = lambda: False
+        self.current_call: object | None = None
+        self._loop = loop
+        self._ended: Callable[[str], None] = lambda _reason: self.abandon()
+        self._master = Master(master_uri, f"/{name}")
+        self._services: dict[str, tuple[ServiceType, Handler]] = {}
+        self._topics: dict[str, Topic] = {}
+        self._links: set[Connection] = set()
+        self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
+        self._connected = 0
+        self._waiting: deque[tuple[ServiceEnd, bytes]] = deque()
+        host = host_name()
+        self._listener = socket.create_server((bind_address(host), 0), backlog=_BACKLOG)
+        self._listener.setblocking(False)
+        port = self._listener.getsockname()[1]
+        self._rosrpc = f"rosrpc://{host}:{port}"
+        self._slave = SlaveApi(host, master_uri, port, self, self._asked_to_end)
+        loop.watch(self._listener, self._accept)
+
+    def resolve(self, path: str) -> str:
+        """Return the global name of `path`, which is relative to the node unless it begins with a slash."""
+        return path if path.startswith("/") else f"/{self.name}/{path}"
+
+    def serve(self, path: str, type_name: str, handler: Handler) -> None:
+        """Answer a service, registered at once.
+
+        Raises:
+            MasterUnreachable: the master did not take the registration.
+        """
+        name = self.resolve(path)
+        self._services[name] = (service_type(type_name), handler)
+        self._master.call("registerService", name, self._rosrpc, self._slave.uri)
+
+    def advertise(
+        self,
+        path: str,
+        type_name: str,
+        *,
+        latched: bool = False,
+        template: Mapping[str, Any] | None = None,
+        reading: str = "",
+    ) -> Publisher:
+        """Return a new publisher of a topic; several of one topic share its subscribers.
+
+        Args:
+            path: relative to the node, or global with a leading slash.
+            type_name: e.g. sensor_msgs/Range
+            latched: whether a late subscriber gets the last message.
+            template: the fields that stay the same, for `Publisher.send_value`.
+            reading: the field of the value, for faults; "" is the last one.
+        """
+        name = self.resolve(path)
+        topic = self._topics.get(name)
+        if topic is None:
+            topic = self._topics[name] = Topic(
+                name, message_type(type_name), latched=latched, reading=reading
+            )
+            self._master.call("registerPublisher", name, type_name, self._slave.uri)
+        topic.publishers += 1
+        return Publisher(topic, dict(template or {}))
+
+    def withdraw(self, publisher: Publisher) -> None:
+        """Take one publisher back; the last one of a topic closes it."""
+        topic = publisher.topic
+        topic.publishers -= 1
+        if topic.publishers == 0:
+            del self._topics[topic.name]
+            self._master.call("unregisterPublisher", topic.name, self._slave.uri)
+            for link in list(topic.links):
+                link.close()
+
+    def answer(self, call: object, fields: Mapping[str, Any]) -> None:
+        """Answer a call whose handler returned LATER, then the requests that waited behind it."""
+        if isinstance(call, ServiceEnd):
+            call.answer(fields)
+        self._loop.later(0, self.take_waiting)
+
+    def later(self, delay_s: float, callback: Callable[[], None]) -> None:
+        """Call `callback` after `delay_s` seconds; 0 is after the answer of the present call was sent."""
+        self._loop.later(delay_s, callback)
+
+    def take_waiting(self) -> None:
+        """Handle the requests that came while the controller was blocked, in their order."""
+        while self._waiting and not self.blocked():
+            end, payload = self._waiting.popleft()
+            end.handle(payload)
+
+    def request(self, end: ServiceEnd, payload: bytes) -> None:
+        """Take a request: handled now, or after the step that blocks the controller."""
+        if self.blocked():
+            self._waiting.append((end, payload))
+        else:
+            end.handle(payload)
+
+    def close(self) -> None:
+        """Unregister all names, like a controller that exits normally, and close every socket."""
+        self.unregister()
+        self.abandon()
+
+    def unregister(self) -> None:
+        """Unregister every service and topic at the master; connections stay open."""
+        # A master that is gone has forgotten us already.
+        with contextlib.suppress(MasterUnreachable):
+            for name in self._services:
+                self._master.call("unregisterService", name, self._rosrpc)
+            for name in self._topics:
+                self._master.call("unregisterPublisher", name, self._slave.uri)
+
+    def abandon(self) -> None:
+        """Close every socket without unregistering, like a controller that was killed."""
+        self._loop.forget(self._listener)
+        self._listener.close()
+        for link in list(self._links):
+            link.close()
+        self._slave.close()
+        self._master.close()
+
+    def check_master(self) -> None:
+        """Check that the master answers.
+
+        Raises:
+            MasterUnreachable: it does not.
+        """
+        self._master.call("getPid")
+
+    def publications(self) -> list[list[str]]:
+        """Return name and type of each topic, for `getPublications`."""
+        return [[topic.name, topic.type.name] for topic in tuple(self._topics.values())]
+
+    def connections(self) -> list[list[Any]]:
+        """Return number, subscriber, direction, transport and topic of each, for `getBusInfo`."""
+        return list(self._subscribers.values())
+
+    def on_end(self, callback: Callable[[str], None]) -> None:
+        """Set the function to call with the reason when this node is asked to end.
+
+        `rosnode kill` asks, and so does the master when a newer node registers with its name.
+        """
+        self._ended = callback
+
+    def _asked_to_end(self, reason: str) -> None:
+        self._loop.post(lambda: self._ended(reason))
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:
+            return  # the peer has disconnected already
+        self._links.add(Link(self._loop, connection, self._greet))
+
+    def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        if "service" in header:
+            return self._greet_client(link, header)
+        return self._greet_subscriber(link, header)
+
+    def _greet_client(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        known = self._services.get(header["service"])
+        if known is None:
+            raise Refused(f"no such service {header['service']}")
+        service, handler = known
+        _check_md5(header, service.name, service.md5)
+        link.send(
+            encode_header(
+                {
+                    "callerid": f"/{self.name}",
+                    "md5sum": service.md5,
+                    "request_type": f"{service.name}Request",
+                    "response_type": f"{service.name}Response",
+                    "type": service.name,
+                }
+            )
+        )
+        return ServiceEnd(self, link, service, handler, persistent=header.get("persistent") == "1")
+
+    def _greet_subscriber(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
+        topic = self._topics.get(header.get("topic", ""))
+        if topic is None:
+            raise Refused(f"no such topic {header.get('topic')}")
+        _check_md5(header, topic.type.name, topic.type.md5)
+        link.send(
+            encode_header(
+                {
+                    "callerid": f"/{self.name}",
+                    "latching": str(int(topic.latched)),
+                    "md5sum": topic.type.md5,
+                    "message_definition": topic.type.definition,
+                    "topic": topic.name,
+                    "type": topic.type.name,
+                }
+            )
+        )
+        self._connected += 1
+        caller = header.get("callerid", "")
+        self._subscribers[link] = [self._connected, caller, "o", "TCPROS", topic.name, True]
+        return topic.connect(link, self.dropped)
+
+    def dropped(self, link: Connection) -> None:
+        """Forget a connection that is closed."""
+        self._links.discard(link)
+        self._subscribers.pop(link, None)
+
+
+def _check_md5(header: Mapping[str, str], type_name: str, md5: str) -> None:
+    theirs = header.get("md5sum", "*")
+    if theirs not in {"*", md5}:
+        raise Refused(f"client wants md5sum {theirs}, but {type_name} has {md5}")
+
+
+class ServiceEnd:
+    """The server's end of one client's connection to one service."""
+
+    __slots__ = ("_handler", "_link", "_node", "_persistent", "_service")
+
+    def __init__(
+        self, node: RosNode, link: Connection, service: ServiceType, handler: Handler, *, persistent: bool
+    ) -> None:
+        self._node = node
+        self._link = link
+        self._service = service
+        self._handler = handler
+        self._persistent = persistent
+
+    def receive(self, payload: bytes) -> None:
+        """Take a request from the link."""
+        self._node.request(self, payload)
+
+    def handle(self, payload: bytes) -> None:
+        """Handle a request, and answer it, unless the handler answers later."""
+        self._node.current_call = self
+        try:
+            fields = self._handler(self._service.request.decode(payload))
+        except (ServiceFailed, ValueError) as error:
+            self._send(b"\0" + frame(str(error).encode()))
+            return
+        if fields is not LATER:
+            self.answer(fields)
+
+    def answer(self, fields: Mapping[str, Any]) -> None:
+        """Answer the request that was handled last."""
+        self._send(b"\1" + self._service.response.frame(fields))
+
+    def lost(self) -> None:
+        """Let the node forget the connection."""
+        self._node.dropped(self._link)
+
+    def _send(self, data: bytes) -> None:
+        self._link.send(data)
+        if not self._persistent:
+            self._link.close()

@@ -1,0 +1,46 @@
+"""The controllerArgs of a robot that matter to the stub."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.reading import Reading
+
+# They let the controller step by itself or hand the motors to others, which the stub does not do.
+_REFUSED: Final = ("--use-sim-time", "--use-ros-control")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arguments:
+    """The arguments that matter here; like Webots' controller, the stub ignores unknown ones.
+
+    Attributes:
+        name: the node's name and the prefix of all paths.
+        clock: whether to publish /clock.
+        auto_publish: whether every sensor is enabled from the start.
+    """
+
+    name: str
+    clock: bool = False
+    auto_publish: bool = False
+
+
+def read_arguments(reading: Reading, node: SceneNode) -> Arguments:
+    """Return the arguments of a robot whose controller is "ros".
+
+    Refused: without `--name` two robots collide, without `--synchronize` no client controls the steps.
+    """
+    texts = node.texts("controllerArgs")
+    names = [text.removeprefix("--name=") for text in texts if text.startswith("--name=")]
+    if not names and not reading.leave_out.names:
+        reading.refuse(node, "controllerArgs without --name=", "generate the world")
+    if "--synchronize" not in texts and not reading.leave_out.names:
+        fact = "controllerArgs without --synchronize: the stub steps only when it is asked to"
+        reading.refuse(node, fact, "add it")
+    for text in texts:
+        if text in _REFUSED:
+            reading.lacks(node, f"the stub knows no {text}")
+    name = names[-1] if names else ""
+    return Arguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)

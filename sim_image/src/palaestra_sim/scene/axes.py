@@ -1,0 +1,50 @@
+"""Axes: the stub simulates worlds whose z axis points up, with the conventions of R2022a and later.
+
+Before R2020b the y axis of every world pointed up; since then WorldInfo.coordinateSystem chooses. Before
+R2022a robots looked along -z, cylinders stood along y, and many devices looked along other axes. Webots turns
+the nodes of such files when it loads them; the stub turns the shapes alone, and refuses the rest.
+Source: WbNodeUtilities::fixBackwardCompatibility and WbWorldInfo of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from palaestra_sim.scene.geometry import Pose, from_axis_angle
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.reading import Reading
+
+_CONVERT: Final = (
+    "convert it (wiki of Webots: How to adapt your world or PROTO to Webots R2022a),"
+    " leave WorldInfo out (--leave-out) to read it as it stands, or run this world with driver webots"
+)
+_Z_TO_Y: Final = Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, -math.pi / 2.0)))
+
+
+def check_axes(reading: Reading, node: SceneNode) -> None:
+    """Note that the world has other axes than the stub; `node` is its WorldInfo, or its first node."""
+    system = node.text("coordinateSystem") or "ENU"
+    if of_old_axes(node):
+        fact = f"a world of {_release(node)}: before R2022a, robots, devices and shapes had other axes"
+        reading.lacks(node, fact, _CONVERT)
+    elif system != "ENU":
+        fact = f'a world with coordinateSystem "{system}", whose y axis points up'
+        reading.lacks(node, fact, _CONVERT)
+
+
+def of_old_axes(node: SceneNode) -> bool:
+    """Return whether a node was written in a file from before R2022a."""
+    return node.origin is not None and node.origin.source.older_than(2022, "")
+
+
+def standing(node: SceneNode, frame: Pose) -> Pose:
+    """Return the frame of a Cylinder, Capsule or Plane whose axis is z, although it was y in its file."""
+    if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
+        return frame
+    return frame.after(_Z_TO_Y)
+
+
+def _release(node: SceneNode) -> str:
+    """Return the release in the first line of the file of a node."""
+    return "" if node.origin is None else node.origin.source.header().split()[1]

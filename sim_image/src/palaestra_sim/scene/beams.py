@@ -1,0 +1,44 @@
+"""Beams: the rays of sensors, before they are cast, in the frame of the robot that carries them."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from palaestra_sim.scene.geometry import Pose, Vector, turn
+
+# A ray in a robot's frame: x and y of its origin in meters, x and y of its unit direction.
+Ray = tuple[float, float, float, float]
+
+_LEVEL: Final = 1e-3  # a smaller slope counts as none
+_STEEPEST: Final = 1e-6  # of a vertical ray: how far it goes along the floor for each meter
+
+
+class Beam(NamedTuple):
+    """A ray that may look up or down: its trace on the floor, its height, and its slope.
+
+    Attributes:
+        ray: in the robot's frame, seen from above.
+        height_m: of its origin, in the robot's frame.
+        slope: how far it climbs for each meter along the floor.
+        reach_m: the longest distance that matters.
+    """
+
+    ray: Ray
+    height_m: float
+    slope: float
+    reach_m: float
+
+    @property
+    def level(self) -> bool:
+        """Whether it stays at its height."""
+        return self.slope == 0.0
+
+
+def beam_along(pose: Pose, direction: Vector, reach_m: float) -> Beam:
+    """Return the beam that leaves a frame in a direction of this frame."""
+    dx, dy, dz = turn(pose.rotation, direction)
+    along = max(math.hypot(dx, dy), _STEEPEST)
+    slope = dz / along
+    ray = pose.position[0], pose.position[1], dx / along, dy / along
+    return Beam(ray, pose.position[2], slope if abs(slope) > _LEVEL else 0.0, reach_m)

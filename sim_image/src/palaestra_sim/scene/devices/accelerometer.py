@@ -1,0 +1,75 @@
+"""Accelerometer: the change of its velocity over the last basic step, and the reaction to gravity.
+
+At rest it shows WorldInfo.gravity upward. Webots takes the change over the sensor's period, which is the same
+for a period of one basic step. Source: WbAccelerometer.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.devices.imu import imu_topic
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.scene.geometry import Vector, transposed, turn
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Row
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Accelerometer:
+    """An accelerometer of up to three axes; `value` is in m/s2, or as its lookup table has it."""
+
+    name: str
+    model: str
+    place: Place
+    gravity: float
+    axes: Axes
+    value: Vector = (math.nan, math.nan, math.nan)
+
+
+def _read(part: Part) -> Accelerometer:
+    part.require_enu("accelerometer")
+    (gravity,) = part.world_numbers("gravity", (9.81,))
+    return Accelerometer(
+        name=part.name,
+        model=part.text("model"),
+        place=part.place,
+        gravity=gravity,
+        axes=read_axes(part),
+    )
+
+
+def _sampler(sensors: Sequence[Accelerometer], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+    followed = [(sensor, robot.follow(sensor.place)) for sensor in sensors]
+
+    def sample() -> None:
+        for sensor, acceleration in followed:
+            x, y, z = acceleration()
+            inward = transposed(sensor.place.world_pose.rotation)
+            sensor.value = sensor.axes.respond(turn(inward, (x, y, z + sensor.gravity)), gauss)
+
+    return sample
+
+
+def _services(sensor: Accelerometer) -> tuple[Row, ...]:
+    return sensor.axes.services()
+
+
+def _topics(sensor: Accelerometer) -> tuple[Topic, ...]:
+    return (imu_topic("values", sensor, "linear_acceleration"),)
+
+
+ACCELEROMETER: Final = Kind(
+    node="Accelerometer",
+    name="accelerometer",
+    fields=AXES_FIELDS,
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+)

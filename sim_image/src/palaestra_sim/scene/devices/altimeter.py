@@ -1,0 +1,72 @@
+"""Altimeter: its height in the world plus that of WorldInfo.gpsReference.
+
+Source: WbAltimeter.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import discrete
+from palaestra_sim.scene.places import Place
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Altimeter:
+    """An altimeter; `value` is in meters.
+
+    Attributes:
+        reference: the offset from the height in the world.
+        accuracy: standard deviation of the noise, in meters.
+    """
+
+    name: str
+    model: str
+    place: Place
+    reference: float
+    accuracy: float
+    resolution: float
+    value: float = math.nan
+
+
+def _read(part: Part) -> Altimeter:
+    part.require_enu("altimeter")
+    return Altimeter(
+        name=part.name,
+        model=part.text("model"),
+        place=part.place,
+        reference=part.world_numbers("gpsReference", (0.0, 0.0, 0.0))[2],
+        accuracy=part.number("accuracy", 0.0),
+        resolution=part.number("resolution", -1.0),
+    )
+
+
+def _sampler(altimeters: Sequence[Altimeter], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for altimeter in altimeters:
+            height = altimeter.reference + altimeter.place.world_position[2]
+            if altimeter.accuracy:
+                height += altimeter.accuracy * gauss(0.0, 1.0)
+            altimeter.value = discrete(height, altimeter.resolution)
+
+    return sample
+
+
+def _topics(altimeter: Altimeter) -> tuple[Topic, ...]:
+    return (Topic(name="value", type_name="webots_ros/Float64Stamped", source=altimeter),)
+
+
+ALTIMETER: Final = Kind(
+    node="Altimeter",
+    name="altimeter",
+    fields="accuracy SFFloat 0; resolution SFFloat -1",
+    read=_read,
+    sampler=_sampler,
+    topics=_topics,
+)

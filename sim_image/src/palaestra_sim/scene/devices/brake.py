@@ -1,0 +1,41 @@
+"""Brake: the damping of a joint, which limits the speed that its motor reaches.
+
+A damper takes a torque of its constant times the speed of the shaft. A motor with a limited torque therefore
+turns no faster than the torque divided by the constant. A joint without a motor does not move here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from palaestra_sim.scene.devices.kind import Kind, Part, Shaft
+from palaestra_sim.seam import Fields, Row
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Brake:
+    """A brake on a joint."""
+
+    name: str
+    model: str
+    shaft: Shaft
+
+
+def _read(part: Part) -> Brake:
+    return Brake(name=part.name, model=part.text("model"), shaft=part.shaft or Shaft())
+
+
+def _services(brake: Brake) -> tuple[Row, ...]:
+    def set_damping_constant(request: Any) -> Fields:
+        if brake.shaft.motor is not None:
+            brake.shaft.motor.set_damping(request.value)
+        return {"success": True}
+
+    return (
+        ("set_damping_constant", "set_float", set_damping_constant),
+        ("get_type", "get_int", lambda _: {"value": brake.shaft.type_number}),
+    )
+
+
+BRAKE: Final = Kind(node="Brake", name="brake", fields="", role="brake", read=_read, services=_services)

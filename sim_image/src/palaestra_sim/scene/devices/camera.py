@@ -1,0 +1,172 @@
+"""Camera: its settings. The stub renders no images, so `enable` and what saves one answer failure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from palaestra_sim.scene.devices.kind import Kind, Part, Topic, never
+from palaestra_sim.seam import Fields, Handler, Row
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Camera:
+    """A camera that sees nothing.
+
+    Attributes:
+        size: width and height in pixels.
+        field_of_view_rad: as the world or a client set it.
+        near_m: nearest distance that would be visible.
+        exposure: as the world or a client set it.
+        focus: focal length, distance, and its highest and lowest value, in meters; None without a Focus node.
+        zoom: least and greatest field of view in rad; None without a Zoom node.
+        recognizes: whether it has a Recognition node.
+        segments: whether the Recognition node has `segmentation`.
+    """
+
+    name: str
+    model: str
+    size: tuple[int, int]
+    field_of_view_rad: float
+    near_m: float
+    exposure: float
+    focus: tuple[float, float, float, float] | None = None
+    zoom: tuple[float, float] | None = None
+    recognizes: bool = False
+    segments: bool = False
+
+
+def _read(part: Part) -> Camera:
+    recognition = part.inner("recognition")
+    return Camera(
+        name=part.name,
+        model=part.text("model"),
+        size=(int(part.number("width", 64.0)), int(part.number("height", 64.0))),
+        field_of_view_rad=part.number("fieldOfView", 0.7854),
+        near_m=part.number("near", 0.01),
+        exposure=part.number("exposure", 1.0),
+        focus=_focus(part),
+        zoom=_zoom(part),
+        recognizes=recognition is not None,
+        segments=recognition is not None and recognition.flag("segmentation", False),
+    )
+
+
+def _focus(part: Part) -> tuple[float, float, float, float] | None:
+    focus = part.inner("focus")
+    if focus is None:
+        return None
+    length, distance, highest, lowest = (
+        part.reading.number(focus, name, 0.0)
+        for name in ("focalLength", "focalDistance", "maxFocalDistance", "minFocalDistance")
+    )
+    return length, distance, highest, lowest
+
+
+def _zoom(part: Part) -> tuple[float, float] | None:
+    zoom = part.inner("zoom")
+    if zoom is None:
+        return None
+    number = part.reading.number
+    return number(zoom, "minFieldOfView", 0.5), number(zoom, "maxFieldOfView", 1.5)
+
+
+def _services(camera: Camera) -> tuple[Row, ...]:
+    return (
+        ("get_info", "camera_get_info", lambda _: _info(camera)),
+        ("get_focus_info", "camera_get_focus_info", lambda _: _focus_info(camera)),
+        ("get_zoom_info", "camera_get_zoom_info", lambda _: _zoom_info(camera)),
+        ("save_image", "save_image", _no_picture),
+        ("set_fov", "set_float", _fov_setter(camera)),
+        ("set_focal_distance", "set_float", _focus_setter(camera)),
+        ("set_exposure", "set_float", _exposure_setter(camera)),
+        ("get_exposure", "get_float", lambda _: {"value": camera.exposure}),
+        ("has_recognition", "get_bool", lambda _: {"value": camera.recognizes}),
+        ("recognition_has_segmentation", "get_bool", lambda _: {"value": camera.segments}),
+        *(_recognition() if camera.recognizes else ()),
+    )
+
+
+def _recognition() -> tuple[Row, ...]:
+    """Return the services of a camera that recognizes objects; all of them answer failure."""
+    return (
+        ("recognition_enable", "set_int", lambda request: {"success": request.value == 0}),
+        ("recognition_get_sampling_period", "get_int", lambda _: {"value": 0}),
+        ("recognition_enable_segmentation", "get_bool", lambda _: {"value": False}),
+        ("recognition_disable_segmentation", "get_bool", lambda _: {"value": True}),
+        ("recognition_is_segmentation_enabled", "get_bool", lambda _: {"value": False}),
+        ("recognition_save_segmentation_image", "save_image", _no_picture),
+    )
+
+
+def _info(camera: Camera) -> Fields:
+    width, height = camera.size
+    return {"width": width, "height": height, "Fov": camera.field_of_view_rad, "nearRange": camera.near_m}
+
+
+def _focus_info(camera: Camera) -> Fields:
+    length, distance, highest, lowest = camera.focus or (0.0, 0.0, 0.0, 0.0)
+    return {
+        "focalLength": length,
+        "focalDistance": distance,
+        "maxFocalDistance": highest,
+        "minFocalDistance": lowest,
+    }
+
+
+def _zoom_info(camera: Camera) -> Fields:
+    low, high = camera.zoom or (camera.field_of_view_rad, camera.field_of_view_rad)
+    return {"minFov": low, "maxFov": high}
+
+
+def _fov_setter(camera: Camera) -> Handler:
+    def set_fov(request: Any) -> Fields:
+        """Zoom, within the limits of the Zoom node; otherwise nothing changes, as in Webots."""
+        if camera.zoom is not None and camera.zoom[0] <= request.value <= camera.zoom[1]:
+            camera.field_of_view_rad = request.value
+        return {"success": True}
+
+    return set_fov
+
+
+def _focus_setter(camera: Camera) -> Handler:
+    def set_focal_distance(request: Any) -> Fields:
+        """Focus, within the limits of the Focus node; otherwise nothing changes, as in Webots."""
+        if camera.focus is not None:
+            length, _, highest, lowest = camera.focus
+            if lowest <= request.value <= highest:
+                camera.focus = length, request.value, highest, lowest
+        return {"success": True}
+
+    return set_focal_distance
+
+
+def _exposure_setter(camera: Camera) -> Handler:
+    def set_exposure(request: Any) -> Fields:
+        camera.exposure = request.value
+        return {"success": True}
+
+    return set_exposure
+
+
+def _no_picture(_request: Any) -> Fields:
+    return {"success": 0}
+
+
+def _topics(_camera: Camera) -> tuple[Topic, ...]:
+    return (Topic(name="image", type_name="sensor_msgs/Image", source=None),)
+
+
+CAMERA: Final = Kind(
+    node="Camera",
+    name="camera",
+    fields="""fieldOfView SFFloat 0.7854; width SFInt32 64; height SFInt32 64; spherical SFBool FALSE;
+        near SFFloat 0.01; far SFFloat 0; exposure SFFloat 1; antiAliasing SFBool FALSE;
+        ambientOcclusionRadius SFFloat 0; bloomThreshold SFFloat -1; motionBlur SFFloat 0;
+        noise SFFloat 0; noiseMaskUrl MFString; lens SFNode; focus SFNode; zoom SFNode;
+        recognition SFNode; lensFlare SFNode""",
+    read=_read,
+    services=_services,
+    topics=_topics,
+    enable=never,
+)

@@ -1,0 +1,67 @@
+"""Compass: the direction of north, a unit vector in the sensor's frame.
+
+North is +y of the world, as WorldInfo.coordinateSystem "ENU" has it; another system is refused. Source:
+WbCompass.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.scene.geometry import Vector, transposed, turn
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Row
+
+_NORTH: Final = (0.0, 1.0, 0.0)
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Compass:
+    """A compass of up to three axes; `value` is x, y, z of north in its own frame."""
+
+    name: str
+    model: str
+    place: Place
+    axes: Axes
+    value: Vector = (math.nan, math.nan, math.nan)
+
+
+def _read(part: Part) -> Compass:
+    part.require_enu("compass")
+    return Compass(name=part.name, model=part.text("model"), place=part.place, axes=read_axes(part))
+
+
+def _sampler(compasses: Sequence[Compass], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for compass in compasses:
+            north = turn(transposed(compass.place.world_pose.rotation), _NORTH)
+            compass.value = compass.axes.respond(north, gauss)
+
+    return sample
+
+
+def _services(compass: Compass) -> tuple[Row, ...]:
+    return compass.axes.services()
+
+
+def _topics(compass: Compass) -> tuple[Topic, ...]:
+    type_name = "sensor_msgs/MagneticField"
+    return (Topic(name="values", type_name=type_name, source=compass, reading="magnetic_field"),)
+
+
+COMPASS: Final = Kind(
+    node="Compass",
+    name="compass",
+    fields=AXES_FIELDS,
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+)

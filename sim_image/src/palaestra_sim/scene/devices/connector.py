@@ -1,0 +1,121 @@
+"""Connector: whether another one is near enough to connect. Locking joins nothing here.
+
+Two connectors face each other along their x axes, which point out of them.
+Source: WbConnector.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from palaestra_sim.scene.devices.kind import Kind, Part, Topic
+from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Fields, Row
+
+_PASSIVE: Final = -1  # the presence that a passive connector reads, which has no sensor
+_MATCHING: Final = {"symmetric": "symmetric", "active": "passive", "passive": "active"}
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Connector:
+    """A connector.
+
+    Attributes:
+        kind: "symmetric", "active" or "passive".
+        reach_m: largest distance to another one.
+        tilt_rad: largest angle between the axes.
+        turns: number of rotations about the axis in which it fits; 0 is all.
+        twist_rad: largest rotation off one of these.
+        others: all connectors of the world.
+        locked: as a client set it.
+    """
+
+    name: str
+    model: str
+    place: Place
+    kind: str
+    reach_m: float
+    tilt_rad: float
+    turns: int
+    twist_rad: float
+    locked: bool
+    others: tuple[Connector, ...] = field(default=(), repr=False)
+
+    @property
+    def value(self) -> int:
+        """1 if it could connect to another one, 0 if not, -1 for a passive one."""
+        if self.kind == "passive":
+            return _PASSIVE
+        return int(any(self._fits(other) for other in self.others if other is not self))
+
+    def _fits(self, other: Connector) -> bool:
+        if other.model != self.model or other.kind != _MATCHING[self.kind]:
+            return False
+        mine, theirs = self.place.world_pose, other.place.world_pose
+        if math.dist(mine.position, theirs.position) > self.reach_m:
+            return False
+        tilt_rad = math.pi - _angle(_axis(mine, 0), _axis(theirs, 0))
+        return tilt_rad <= self.tilt_rad and self._turned_right(_angle(_axis(mine, 2), _axis(theirs, 2)))
+
+    def _turned_right(self, twist_rad: float) -> bool:
+        if self.turns == 0:
+            return True
+        step_rad = 2.0 * math.pi / self.turns
+        return abs(twist_rad - step_rad * round(twist_rad / step_rad)) <= self.twist_rad
+
+
+def _axis(pose: Pose, index: int) -> Vector:
+    rotation = pose.rotation
+    return rotation[index], rotation[3 + index], rotation[6 + index]
+
+
+def _angle(a: Vector, b: Vector) -> float:
+    cosine = sum(left * right for left, right in zip(a, b, strict=True))
+    return math.acos(max(-1.0, min(1.0, cosine)))
+
+
+def _read(part: Part) -> Connector:
+    kind = part.text("type", "symmetric")
+    if kind not in _MATCHING:
+        part.refuse(f"no connector is of type {kind!r}", f"use {', '.join(_MATCHING)}")
+        kind = "symmetric"
+    return Connector(
+        name=part.name,
+        model=part.text("model"),
+        place=part.place,
+        kind=kind,
+        reach_m=part.number("distanceTolerance", 0.01),
+        tilt_rad=part.number("axisTolerance", 0.2),
+        turns=int(part.number("numberOfRotations", 4.0)),
+        twist_rad=part.number("rotationTolerance", 0.5),
+        locked=part.node.flag("isLocked", False),
+    )
+
+
+def _services(connector: Connector) -> tuple[Row, ...]:
+    def lock(request: Any) -> Fields:
+        connector.locked = request.value
+        return {"success": True}
+
+    return (("lock", "set_bool", lock), ("is_locked", "get_bool", lambda _: {"value": connector.locked}))
+
+
+def _topics(connector: Connector) -> tuple[Topic, ...]:
+    return (Topic(name="presence", type_name="webots_ros/Int8Stamped", source=connector),)
+
+
+CONNECTOR: Final = Kind(
+    node="Connector",
+    name="connector",
+    fields="""type SFString symmetric; isLocked SFBool FALSE; autoLock SFBool FALSE;
+        unilateralLock SFBool TRUE; unilateralUnlock SFBool TRUE; distanceTolerance SFFloat 0.01;
+        axisTolerance SFFloat 0.2; rotationTolerance SFFloat 0.5; numberOfRotations SFInt32 4;
+        snap SFBool TRUE; tensileStrength SFFloat -1; shearStrength SFFloat -1""",
+    read=_read,
+    services=_services,
+    topics=_topics,
+    sensor="presence_sensor",
+)

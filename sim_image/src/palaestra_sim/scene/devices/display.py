@@ -1,0 +1,191 @@
+"""Display: a picture that a program draws. A text leaves no pixels; no picture is loaded or saved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from palaestra_sim.scene import raster
+from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.scene.raster import Color, Point, Raster
+from palaestra_sim.seam import Fields, Handler, Row, UnsimulatedError
+
+_LARGEST: Final = 4096  # pixels in a row or column; a display of Webots is a texture
+# Where blue, green, red and alpha are in a pixel of each format. Source: webots/display.h
+_FORMATS: Final = {
+    3: (2, 1, 0, None),
+    4: (2, 1, 0, 3),
+    5: (3, 2, 1, 0),
+    6: (0, 1, 2, 3),
+    7: (1, 2, 3, 0),
+}
+_OPAQUE: Final = 255
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Display:
+    """A display.
+
+    Attributes:
+        picture: what it shows.
+        color: blue, green, red and alpha of what is drawn next.
+        opacity: of what is drawn next, from 0 to 1.
+        images: pictures that clients keep, by their handles.
+    """
+
+    name: str
+    model: str
+    picture: Raster
+    color: Color = (_OPAQUE, _OPAQUE, _OPAQUE, _OPAQUE)
+    opacity: float = 1.0
+    images: dict[int, Raster] = field(default_factory=dict)
+
+    def keep(self, image: Raster) -> Fields:
+        """Keep a picture, and return its handle."""
+        handle = max(self.images, default=0) + 1
+        self.images[handle] = image
+        return {"ir": handle}
+
+    def image(self, handle: int) -> Raster:
+        """Return a picture by its handle; Webots would read a null pointer for a wrong one."""
+        if handle not in self.images:
+            raise UnsimulatedError(f"no image {handle}; make one with image_new or image_copy")
+        return self.images[handle]
+
+
+def _read(part: Part) -> Display:
+    width, height = int(part.number("width", 64.0)), int(part.number("height", 64.0))
+    if not 0 < width <= _LARGEST or not 0 < height <= _LARGEST:
+        part.refuse(f"a display of {width} by {height} pixels", f"use 1 to {_LARGEST}")
+        width = height = 1
+    return Display(name=part.name, model=part.text("model"), picture=Raster(width=width, height=height))
+
+
+def _services(display: Display) -> tuple[Row, ...]:
+    picture = display.picture
+    return (
+        ("get_info", "display_get_info", lambda _: {"width": picture.width, "height": picture.height}),
+        ("set_font", "display_set_font", lambda _: {"success": 1}),
+        ("attach_camera", "set_string", lambda _: {"success": False}),
+        ("detach_camera", "get_bool", lambda _: {"value": True}),
+        *_ink(display),
+        *_drawing(display),
+        *_images(display),
+    )
+
+
+def _ink(display: Display) -> tuple[Row, ...]:
+    def set_color(request: Any) -> Fields:
+        blue, green, red = (request.value >> shift & 0xFF for shift in (0, 8, 16))
+        display.color = blue, green, red, display.color[3]
+        return {"success": True}
+
+    def set_alpha(request: Any) -> Fields:
+        display.color = *display.color[:3], round(_OPAQUE * _share(request.value))
+        return {"success": True}
+
+    def set_opacity(request: Any) -> Fields:
+        display.opacity = _share(request.value)
+        return {"success": True}
+
+    return (
+        ("set_color", "set_int", set_color),
+        ("set_alpha", "set_float", set_alpha),
+        ("set_opacity", "set_float", set_opacity),
+    )
+
+
+def _share(value: float) -> float:
+    return 0.0 if math.isnan(value) else max(0.0, min(1.0, value))
+
+
+def _drawing(display: Display) -> tuple[Row, ...]:
+    shapes: dict[str, tuple[str, Callable[[Any], Iterable[Point]]]] = {
+        "draw_pixel": ("pixel", lambda it: [(it.x1, it.y1)]),
+        "draw_line": ("line", lambda it: raster.line(it.x1, it.y1, it.x2, it.y2)),
+        "draw_rectangle": ("rectangle", lambda it: raster.rectangle(it.x, it.y, it.width, it.height)),
+        "draw_oval": ("oval", lambda it: raster.oval(it.cx, it.cy, it.a, it.b)),
+        "draw_polygon": ("polygon", lambda it: raster.outline(_corners(it))),
+        "draw_text": ("text", lambda _: ()),
+        "fill_rectangle": ("rectangle", lambda it: raster.filled_rectangle(it.x, it.y, it.width, it.height)),
+        "fill_oval": ("oval", lambda it: raster.filled_oval(it.cx, it.cy, it.a, it.b)),
+        "fill_polygon": ("polygon", lambda it: raster.filled_polygon(_corners(it))),
+    }
+
+    def drawer(points: Callable[[Any], Iterable[Point]]) -> Handler:
+        def draw(request: Any) -> Fields:
+            _require_small(request)
+            display.picture.draw(points(request), display.color, display.opacity)
+            return {"success": 1}
+
+        return draw
+
+    return tuple((name, f"display_draw_{type_}", drawer(points)) for name, (type_, points) in shapes.items())
+
+
+def _corners(request: Any) -> list[Point]:
+    return list(zip(request.x, request.y, strict=False))[: max(0, request.size)]
+
+
+def _require_small(request: Any) -> None:
+    """Check that nobody draws what takes minutes."""
+    for name, value in request._asdict().items():
+        numbers = value if isinstance(value, list | tuple) else [value]
+        if any(isinstance(number, int) and abs(number) > _LARGEST for number in numbers):
+            raise UnsimulatedError(f"{name} is beyond {_LARGEST}; no display is as large")
+
+
+def _images(display: Display) -> tuple[Row, ...]:
+    def image_copy(request: Any) -> Fields:
+        _require_small(request)
+        width, height = max(0, request.width), max(0, request.height)
+        return display.keep(display.picture.copy(request.x, request.y, width, height))
+
+    def image_paste(request: Any) -> Fields:
+        _require_small(request)
+        display.picture.paste(display.image(request.ir), request.x, request.y)
+        return {"success": 1}
+
+    def image_delete(request: Any) -> Fields:
+        display.image(request.ir)
+        del display.images[request.ir]
+        return {"success": 1}
+
+    return (
+        ("image_new", "display_image_new", lambda request: display.keep(_image_of(request))),
+        ("image_copy", "display_image_copy", image_copy),
+        ("image_paste", "display_image_paste", image_paste),
+        ("image_delete", "display_image_delete", image_delete),
+        ("image_load", "display_image_load", lambda _: {"ir": 0}),
+        ("image_save", "display_image_save", lambda _: {"success": 0}),
+    )
+
+
+def _image_of(request: Any) -> Raster:
+    """Return the picture of a request for a new one."""
+    width, height, data = request.width, request.height, bytes(request.data)
+    places = _FORMATS.get(request.format)
+    if places is None:
+        raise UnsimulatedError(
+            f"no image format {request.format}; use one of {', '.join(map(str, _FORMATS))}"
+        )
+    size = 3 if places[3] is None else 4
+    if width < 1 or height < 1 or len(data) != size * width * height:
+        raise UnsimulatedError(
+            f"{len(data)} bytes for {width} by {height} pixels; send {size} for each pixel"
+        )
+    pixels = bytearray(4 * width * height)
+    for channel, place in enumerate(places):
+        pixels[channel::4] = bytes([_OPAQUE]) * (width * height) if place is None else data[place::size]
+    return Raster(width=width, height=height, pixels=pixels)
+
+
+DISPLAY: Final = Kind(
+    node="Display",
+    name="display",
+    fields="width SFInt32 64; height SFInt32 64",
+    read=_read,
+    services=_services,
+)

@@ -1,0 +1,203 @@
+"""DistanceSensor: its rays, and the lookup table that their length goes through.
+
+Several rays are a cone around the first axis. A sonar measures the nearest one. The others measure the
+average, in which a ray counts less the more it is off the axis. Neither the color of an obstacle
+(infra-red) nor the angle at which a ray meets it (sonar) matters here. Source: WbDistanceSensor.cpp of
+Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from itertools import islice
+from typing import Final
+
+from palaestra_sim.scene.beams import Beam, beam_along
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import table_rows, table_service
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.lookup import LookupTable, lookup_table
+from palaestra_sim.seam import Row
+
+_MOST_RAYS: Final = 10_000  # each is cast at every step
+_TABLE: Final = ((0.0, 0.0, 0.0), (0.1, 1000.0, 0.0))  # the default of DistanceSensor.lookupTable
+# For 1 to 10 rays: rings of so many rays, each ring turned by a part of their spacing, and its share of the
+# aperture.
+_RINGS: Final = (
+    ((1, 0.0, 0.0),),
+    ((2, 0.5, 1.0),),
+    ((3, 0.0, 1.0),),
+    ((1, 0.0, 0.0), (3, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (4, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (5, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (6, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (7, 0.0, 1.0)),
+    ((3, 0.0, 0.3), (6, 0.0, 1.0)),
+    ((1, 0.0, 0.0), (3, 0.0, 0.5), (6, 0.0, 1.0)),
+)
+
+
+class DistanceSensorType(IntEnum):
+    """The answers of `get_type`."""
+
+    GENERIC = 0
+    INFRA_RED = 1
+    SONAR = 2
+    LASER = 3
+
+
+_TYPES: Final = {
+    "generic": DistanceSensorType.GENERIC,
+    "infra-red": DistanceSensorType.INFRA_RED,
+    "sonar": DistanceSensorType.SONAR,
+    "laser": DistanceSensorType.LASER,
+}
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class DistanceSensor:
+    """Rays with their weights, and a lookup table; `value` is in the table's unit, volts for a Robotino."""
+
+    name: str
+    model: str
+    beams: tuple[Beam, ...]
+    weights: tuple[float, ...]
+    table: LookupTable
+    type: DistanceSensorType
+    aperture_rad: float
+    value: float = math.nan
+
+
+def _read(part: Part) -> DistanceSensor:
+    type_name = part.text("type", "generic")
+    if type_name not in _TYPES:
+        part.refuse(f"no distance sensor is of type {type_name!r}", f"use {', '.join(_TYPES)}")
+    if part.number("resolution", -1.0) != -1.0:
+        part.lack("a distance sensor with a resolution")
+    table = lookup_table(*table_rows(part, _TABLE, "distances"))
+    aperture_rad = part.number("aperture", 1.5708)
+    rays = int(part.number("numberOfRays", 1.0))
+    if rays > _MOST_RAYS:
+        part.refuse(f"a distance sensor with {rays} rays", f"use 1 to {_MOST_RAYS}")
+        rays = 1
+    cone = _cone(rays, aperture_rad)
+    return DistanceSensor(
+        name=part.name,
+        model=part.text("model"),
+        beams=tuple(beam_along(part.place.world_pose, direction, table.reach_m) for direction in cone),
+        weights=_weights(cone, aperture_rad * part.number("gaussianWidth", 1.0)),
+        table=table,
+        type=_TYPES.get(type_name, DistanceSensorType.GENERIC),
+        aperture_rad=aperture_rad,
+    )
+
+
+def _cone(count: int, aperture_rad: float) -> list[Vector]:
+    """Return the directions of the rays, unit vectors in the frame of the sensor."""
+    if count <= 1 or aperture_rad == 0.0:
+        return [(1.0, 0.0, 0.0)]
+    if count <= len(_RINGS):
+        polar = [
+            (2.0 * math.pi * (index + offset) / size, share)
+            for size, offset, share in _RINGS[count - 1]
+            for index in range(size)
+        ]
+    else:
+        polar = _many(count)
+    return [_direction(alpha, share * aperture_rad / 2.0) for alpha, share in polar]
+
+
+def _many(count: int) -> list[tuple[float, float]]:
+    """Return angle around the axis and share of the aperture for rays on rings of 1, 4, 7 and more."""
+    rings: list[int] = []
+    left = count
+    while left > 0:
+        rings.append(min(left, 3 * len(rings) + 1))
+        left -= rings[-1]
+    polar: list[tuple[float, float]] = []
+    for ring, size in enumerate(rings):
+        first = len(polar)  # Webots counts on through the rings
+        share = ring / (len(rings) - 1)
+        polar += [(2.0 * math.pi * (first + index) / size, share) for index in range(size)]
+    return polar
+
+
+def _direction(alpha: float, theta: float) -> Vector:
+    """Return the direction at `theta` from the axis; `alpha` turns about it, 0 is up."""
+    alpha += math.pi / 2.0
+    return math.cos(theta), math.sin(theta) * math.sin(alpha), -math.sin(theta) * math.cos(alpha)
+
+
+def _weights(cone: Sequence[Vector], width_rad: float) -> tuple[float, ...]:
+    """Return the share of each ray in the average: a normal distribution over its angle to the axis."""
+    if len(cone) == 1:
+        return (1.0,)
+    weights = [math.exp(-((math.acos(min(1.0, x)) / width_rad) ** 2)) for x, _, _ in cone]
+    total = sum(weights)
+    return tuple(weight / total for weight in weights)
+
+
+def _sampler(sensors: Sequence[DistanceSensor], robot: Carrier) -> Sample:
+    """Cast all rays of the robot together; each sensor with noise draws it at every sample."""
+    cast = robot.look([beam for sensor in sensors for beam in sensor.beams])
+    gauss = robot.gauss
+
+    if all(len(sensor.beams) == 1 for sensor in sensors):
+
+        def sample_single() -> None:
+            for sensor, distance_m in zip(sensors, cast(), strict=True):
+                sensor.value = sensor.table.response(distance_m, gauss)
+
+        return sample_single
+
+    def sample() -> None:
+        distances = iter(cast())
+        for sensor in sensors:
+            own = list(islice(distances, len(sensor.beams)))
+            sensor.value = sensor.table.response(_measured(sensor, own), gauss)
+
+    return sample
+
+
+def _measured(sensor: DistanceSensor, distances_m: Sequence[float]) -> float:
+    if sensor.type is DistanceSensorType.SONAR:
+        return min(distances_m)
+    return sum(distance * weight for distance, weight in zip(distances_m, sensor.weights, strict=True))
+
+
+def _services(sensor: DistanceSensor) -> tuple[Row, ...]:
+    low, high = sensor.table.limits
+    return (
+        ("get_min_value", "get_float", lambda _: {"value": low}),
+        ("get_max_value", "get_float", lambda _: {"value": high}),
+        ("get_aperture", "get_float", lambda _: {"value": sensor.aperture_rad}),
+        *table_service(sensor.table.rows),
+        ("get_type", "get_int", lambda _: {"value": int(sensor.type)}),
+    )
+
+
+def _topics(sensor: DistanceSensor) -> tuple[Topic, ...]:
+    low, high = sensor.table.limits
+    constants = {
+        "radiation_type": int(sensor.type is DistanceSensorType.INFRA_RED),
+        "field_of_view": sensor.aperture_rad,
+        "min_range": low,
+        "max_range": high,
+    }
+    return (Topic(name="value", type_name="sensor_msgs/Range", source=sensor, constants=constants),)
+
+
+DISTANCE_SENSOR: Final = Kind(
+    node="DistanceSensor",
+    name="distance sensor",
+    fields="""lookupTable MFVec3f 0 0 0 0.1 1000 0; type SFString generic;
+        numberOfRays SFInt32 1; aperture SFFloat 1.5708; gaussianWidth SFFloat 1;
+        resolution SFFloat -1; redColorSensitivity SFFloat 1""",
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+)

@@ -1,0 +1,101 @@
+"""Emitter: sends packets by radio; receivers of its channel have them after the next basic step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Fields, Handler, Row
+
+EVERYWHERE: Final = -1  # as a range: without limit; as a channel: to or from all
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Emitter:
+    """An emitter.
+
+    Attributes:
+        range_m: how far packets reach; -1 is without limit.
+        channel: on which they are sent; -1 is to all receivers.
+        outbox: texts with the channel and the range at which each was sent.
+    """
+
+    name: str
+    model: str
+    place: Place
+    buffer_size: int
+    channel: int
+    range_m: float
+    max_range_m: float
+    outbox: list[tuple[str, int, float]] = field(default_factory=list)
+
+    def send(self, text: str) -> None:
+        """Queue a packet; one that the buffer cannot hold is dropped, as in Webots."""
+        waiting = sum(len(packet.encode()) for packet, _, _ in self.outbox)
+        if self.buffer_size == EVERYWHERE or waiting + len(text.encode()) <= self.buffer_size:
+            self.outbox.append((text, self.channel, self.range_m))
+
+    def set_range(self, range_m: float) -> None:
+        """Set the range; one beyond the limit is ignored, as in Webots."""
+        if self.max_range_m == EVERYWHERE or 0.0 <= range_m <= self.max_range_m:
+            self.range_m = range_m
+
+    def set_channel(self, channel: int) -> None:
+        """Set the channel; below -1 there is none."""
+        if channel >= EVERYWHERE:
+            self.channel = channel
+
+
+def require_radio(part: Part) -> None:
+    """Note that the stub simulates no medium but radio waves."""
+    medium = part.text("type", "radio")
+    if medium != "radio":
+        part.lack(f"the type {medium!r} of {part.node.type_name}")
+
+
+def _read(part: Part) -> Emitter:
+    require_radio(part)
+    return Emitter(
+        name=part.name,
+        model=part.text("model"),
+        place=part.place,
+        buffer_size=int(part.number("bufferSize", -1.0)),
+        channel=int(part.number("channel", 0.0)),
+        range_m=part.number("range", -1.0),
+        max_range_m=part.number("maxRange", -1.0),
+    )
+
+
+def _services(emitter: Emitter) -> tuple[Row, ...]:
+    return (
+        ("send", "set_string", _setter(emitter.send)),
+        ("set_channel", "set_int", _setter(emitter.set_channel)),
+        ("set_range", "set_float", _setter(emitter.set_range)),
+        ("get_channel", "get_int", lambda _: {"value": emitter.channel}),
+        ("get_range", "get_float", lambda _: {"value": emitter.range_m}),
+        ("get_buffer_size", "get_int", lambda _: {"value": emitter.buffer_size}),
+    )
+
+
+def _setter(command: Callable[[Any], None]) -> Handler:
+    """Return a handler that answers success even if the value is ignored, as the controller does."""
+
+    def handle(request: Any) -> Fields:
+        command(request.value)
+        return {"success": True}
+
+    return handle
+
+
+EMITTER: Final = Kind(
+    node="Emitter",
+    name="emitter",
+    fields="""type SFString radio; range SFFloat -1; maxRange SFFloat -1; aperture SFFloat -1;
+        channel SFInt32 0; baudRate SFInt32 -1; byteSize SFInt32 8; bufferSize SFInt32 -1;
+        allowedChannels MFInt32""",
+    read=_read,
+    services=_services,
+)

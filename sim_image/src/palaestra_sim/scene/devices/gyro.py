@@ -1,0 +1,64 @@
+"""Gyro: how fast it turns about its own axes, in rad/s.
+
+Webots measures the turning of the nearest Solid with physics; here every motor that carries the sensor
+counts. Source: WbGyro.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.devices.imu import imu_topic
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import AXES_FIELDS, Axes, read_axes
+from palaestra_sim.scene.geometry import Vector, transposed, turn
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Row
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Gyro:
+    """A gyro of up to three axes; `value` is in rad/s, or as its lookup table has it."""
+
+    name: str
+    model: str
+    place: Place
+    axes: Axes
+    value: Vector = (math.nan, math.nan, math.nan)
+
+
+def _read(part: Part) -> Gyro:
+    return Gyro(name=part.name, model=part.text("model"), place=part.place, axes=read_axes(part))
+
+
+def _sampler(gyros: Sequence[Gyro], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for gyro in gyros:
+            inward = transposed(gyro.place.world_pose.rotation)
+            gyro.value = gyro.axes.respond(turn(inward, robot.motion(gyro.place).turning), gauss)
+
+    return sample
+
+
+def _services(gyro: Gyro) -> tuple[Row, ...]:
+    return gyro.axes.services()
+
+
+def _topics(gyro: Gyro) -> tuple[Topic, ...]:
+    return (imu_topic("values", gyro, "angular_velocity"),)
+
+
+GYRO: Final = Kind(
+    node="Gyro",
+    name="gyro",
+    fields=AXES_FIELDS,
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+)

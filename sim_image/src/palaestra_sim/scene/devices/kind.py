@@ -1,0 +1,274 @@
+"""What the table of devices has of each type, and what a device of it is.
+
+Nothing here knows a wire: services are data (`seam`), and a message is its type and its fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Generic, Protocol, TypeVar
+
+from palaestra_sim.scene.beams import Beam
+from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.motion import Motion
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.seam import Fields, Row
+
+
+class Device(Protocol):
+    """A device of a robot. A sensor also has a `value`, which its sampler sets."""
+
+    @property
+    def name(self) -> str:
+        """Its name in the world file."""
+        ...
+
+    @property
+    def model(self) -> str:
+        """The node's `model`."""
+        ...
+
+
+DeviceT = TypeVar("DeviceT", bound=Device)
+
+
+ROLES: Final = ("motor", "brake", "position_sensor")  # of the devices of a joint
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Shaft:
+    """A joint, for the devices on it.
+
+    Attributes:
+        slides: whether it is a slider, not a hinge.
+        motor: the first motor on it.
+        names: of the first device of each role.
+    """
+
+    slides: bool = False
+    motor: Motor | None = None
+    names: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def type_number(self) -> int:
+        """What `get_type` of its devices answers: 0 for a hinge, 1 for a slider."""
+        return int(self.slides)
+
+
+@dataclass(slots=True, kw_only=True)
+class Part:
+    """The node of a device, while its robot is read.
+
+    Attributes:
+        reading: of the world.
+        lacks: notes that a node of the robot cannot be simulated.
+        node: of the device.
+        name: as the world file has it, else the default of its type.
+        place: its frame in the robot's; of a device on a joint, the frame of the joint.
+        shaft: the joint that it is a device of.
+        outline: the shapes with which the robot runs into things.
+    """
+
+    reading: Reading
+    node: SceneNode
+    lacks: Callable[[SceneNode, str], None]
+    name: str
+    place: Place
+    shaft: Shaft | None
+    outline: list[Shape]
+
+    def number(self, name: str, default: float) -> float:
+        """Return the number of a field; `default` if the field is refused."""
+        return self.reading.number(self.node, name, default)
+
+    def text(self, name: str, default: str = "") -> str:
+        """Return the text of a field, `default` if it has none."""
+        return self.node.text(name) or default
+
+    def inner(self, name: str) -> SceneNode | None:
+        """Return the node in a field; None if it is NULL."""
+        return next(iter(self.node.nodes(name)), None)
+
+    def world_numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the numbers of a field of WorldInfo; `default` if it is absent or refused."""
+        world_info = self.reading.world_info
+        return default if world_info is None else self.reading.vector(world_info, name, default)
+
+    def world_text(self, name: str, default: str) -> str:
+        """Return the text of a field of WorldInfo, `default` if it has none."""
+        world_info = self.reading.world_info
+        return default if world_info is None else world_info.text(name) or default
+
+    def require_enu(self, name: str) -> None:
+        """Note that a device of this name needs a world whose y axis is north and whose z axis is up."""
+        system = self.world_text("coordinateSystem", "ENU")
+        if system != "ENU":
+            self.lack(f"{name} in a world with WorldInfo.coordinateSystem {system!r}")
+
+    def refuse(self, fact: str, remedy: str) -> None:
+        """Note a mistake in the world."""
+        self.reading.refuse(self.node, fact, remedy)
+
+    def lack(self, fact: str) -> None:
+        """Note that this device cannot be simulated."""
+        self.lacks(self.node, fact)
+
+    def take_outline(self) -> list[Shape]:
+        """Return the shapes of its boundingObject, which become part of the robot's outline."""
+        shapes = list(bounding_shapes(self.reading, self.node, self.place))
+        self.outline += shapes
+        return shapes
+
+
+class Carrier(Protocol):
+    """The robot that carries a device, for sampling.
+
+    Attributes:
+        body: None if nothing can run into the robot.
+    """
+
+    body: Body | None
+
+    def gauss(self, mean: float, deviation: float, /) -> float:
+        """Return the next number of the robot's own noise."""
+        ...
+
+    def look(self, beams: Sequence[Beam]) -> Callable[[], Sequence[float]]:
+        """Return a function that returns how far each beam travels now, in meters."""
+        ...
+
+    def motion(self, place: Place) -> Motion:
+        """Return how a place on the robot moves in the world."""
+        ...
+
+    def follow(self, place: Place) -> Callable[[], Vector]:
+        """Return a function that returns the acceleration of a place, in world axes, in m/s2."""
+        ...
+
+
+class Source(Protocol):
+    """Holds a value that a topic publishes: a sensor, or a part of one."""
+
+    @property
+    def value(self) -> Any:
+        """Of the last step: a number, or as many as the last field of the message has."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Topic:
+    """A topic of one device.
+
+    Attributes:
+        name: below the device's name.
+        type_name: of its messages, which begin with a header.
+        source: of the reading; None if it never has one.
+        constants: the other fields.
+        reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
+        many: whether `value` is a sequence, with a message for each of its items.
+    """
+
+    name: str
+    type_name: str
+    source: Source | None
+    constants: Fields = field(default_factory=dict)
+    reading: str = ""
+    many: bool = False
+
+
+Sample = Callable[[], None]
+Enable = Callable[[int, int], bool]  # period and step in ms; returns whether the period is accepted
+
+
+def whole_steps(period_ms: int, step_ms: int) -> bool:
+    """Accept a period that is a multiple of the controller's last step."""
+    return period_ms % step_ms == 0
+
+
+def never(_period_ms: int, _step_ms: int) -> bool:
+    """Accept no period: Webots publishes readings of this device, and the stub has none."""
+    return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind(Generic[DeviceT]):
+    """A row of the table: one type of device.
+
+    Attributes:
+        node: the type of its node.
+        name: of a device whose node has none.
+        fields: of the node, written as in `catalogue`, beside `name` and, if it is one, those of a Solid.
+        solid: whether a node off joints is a Solid.
+        role: one of `ROLES` for a device of a joint; "" for one with a frame of its own on the robot.
+        read: returns the device of a node.
+        sampler: returns a function that gives devices of one robot their values; None: they have none.
+        services: returns those beside `get_model`, `get_name`, `get_node_type`; on joints, the names of the
+            others of the joint; and, with topics, `enable` and `get_sampling_period`.
+        topics: returns those that `enable` begins to publish.
+        enable: whether a period is accepted; 0, which ends publishing, always is.
+        enabled: called with a device and its sampling period in ms, 0 for none, after that has changed.
+        sensor: the path of `enable` below the name of the device, "" for the name itself.
+    """
+
+    node: str
+    name: str
+    fields: str
+    solid: bool = True
+    role: str = ""
+    read: Callable[[Part], DeviceT]
+    sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
+    services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
+    topics: Callable[[DeviceT], tuple[Topic, ...]] = lambda _: ()
+    enable: Enable = whole_steps
+    enabled: Callable[[DeviceT, int], None] = lambda _device, _period_ms: None
+    sensor: str = ""
+
+    @property
+    def on_joint(self) -> bool:
+        """Whether it is a device of a joint."""
+        return bool(self.role)
+
+    @property
+    def body(self) -> bool:
+        """Whether its node is a Solid, which others may run into."""
+        return self.solid and not self.on_joint
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Devices:
+    """All devices of a robot by name, in the order of the world file.
+
+    Attributes:
+        rows: each with its row of the table.
+        nodes: their nodes.
+        shafts: of those on joints.
+    """
+
+    rows: dict[str, tuple[Kind[Any], Any]] = field(default_factory=dict)
+    nodes: dict[str, SceneNode] = field(default_factory=dict)
+    shafts: dict[str, Shaft] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.rows)
+
+    @property
+    def motors(self) -> dict[str, Motor]:
+        """The motors."""
+        return {name: it for name, (_, it) in self.rows.items() if isinstance(it, Motor)}
+
+    @property
+    def sensors(self) -> Mapping[str, Source]:
+        """The devices that have a value."""
+        return {name: it for name, (kind, it) in self.rows.items() if kind.sampler is not None}
+
+    def of(self, kind: Kind[DeviceT]) -> tuple[DeviceT, ...]:
+        """Return the devices of one type."""
+        return tuple(device for found, device in self.rows.values() if found is kind)

@@ -1,0 +1,42 @@
+"""LED: a light that the robot's program sets, and that nobody sees here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.seam import Fields, Row
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Led:
+    """An LED; `state` is 0 for off, else the number of a color, or a color of an LED that is gradual."""
+
+    name: str
+    model: str
+    state: int = 0
+
+
+def _read(part: Part) -> Led:
+    return Led(name=part.name, model=part.text("model"))
+
+
+def _services(led: Led) -> tuple[Row, ...]:
+    def set_led(request: Any) -> Fields:
+        led.state = request.value
+        return {"success": True}
+
+    return (
+        ("set_led", "set_int", set_led),
+        ("get_led", "get_int", lambda _: {"value": led.state}),
+    )
+
+
+LED: Final = Kind(
+    node="LED",
+    name="led",
+    fields="color MFColor 1 0 0; gradual SFBool FALSE",
+    read=_read,
+    services=_services,
+)

@@ -1,0 +1,310 @@
+"""Lidar: layers of rays, as a range image, laser scans and a cloud of points.
+
+A layer is a row of the image, from the top down; in a row, the rays go from left to right. Every ray is cast
+at each step while the lidar is enabled, and none otherwise: they cost time. Something nearer than `minRange`
+is not seen, and neither is anything beyond `maxRange`: the distance is infinite.
+Source: WbLidar.cpp and RosLidar.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from palaestra_sim.scene.beams import Beam, beam_along
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import discrete
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.seam import Fields, Row, UnsimulatedError
+
+_FLOAT_BYTES: Final = 4
+_MOST_RAYS: Final = 1_000_000
+_POINT: Final = struct.Struct("<fffif")  # x, y, z, layer, time
+_FLOAT32, _INT32 = 7, 5  # sensor_msgs/PointField
+_POINT_FIELDS: Final = [
+    {"name": name, "offset": offset, "datatype": datatype, "count": 1}
+    for name, offset, datatype in (
+        ("x", 0, _FLOAT32),
+        ("y", 4, _FLOAT32),
+        ("z", 8, _FLOAT32),
+        ("layer", 12, _INT32),
+        ("time", 16, _FLOAT32),
+    )
+]
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Lidar:
+    """A lidar.
+
+    Attributes:
+        info: what `get_info` answers.
+        frequency: the same of `get_frequency_info`.
+        noise: standard deviation as a share of the greatest range.
+        resolution: of a distance; -1: as fine as can be.
+        directions: of the rays of each layer, unit vectors in the frame of the sensor.
+        beams: the rays of each layer, in the frame of the robot.
+        period_ms: how often it is sampled; 0 while it is not enabled.
+        clouded: whether the cloud of points is enabled.
+        layers: the distances of the last step in meters, by layer.
+        timing: `scan_time` and `time_increment` of its scans.
+    """
+
+    name: str
+    model: str
+    info: dict[str, Any]
+    frequency: dict[str, float]
+    noise: float
+    resolution: float
+    directions: tuple[tuple[Vector, ...], ...]
+    beams: tuple[tuple[Beam, ...], ...]
+    period_ms: int = 0
+    clouded: bool = False
+    layers: list[array[float]] = field(default_factory=list)
+    timing: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def value(self) -> bytes:
+        """The range image: a float32 for each ray, layer by layer."""
+        return b"".join(layer.tobytes() for layer in self.layers)
+
+    def enabled(self, period_ms: int) -> None:
+        """Take the period at which it is sampled."""
+        self.period_ms = period_ms
+        scan_s = period_ms / 1000.0
+        self.timing.update(scan_time=scan_s, time_increment=scan_s / self.info["horizontalResolution"])
+
+    def points(self, layer: int) -> Iterator[Vector]:
+        """Yield the points of a layer in the frame of the sensor; infinite where nothing was seen."""
+        for distance_m, (x, y, z) in zip(self.layers[layer], self.directions[layer], strict=True):
+            if math.isinf(distance_m):
+                yield math.inf, math.inf, math.inf
+            else:
+                yield x * distance_m, y * distance_m, z * distance_m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scan:
+    """One layer, for a laser scan."""
+
+    lidar: Lidar
+    layer: int
+
+    @property
+    def value(self) -> Sequence[float]:
+        return self.lidar.layers[self.layer]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Cloud:
+    """The cloud of points, as a list of one; empty while it is not enabled."""
+
+    lidar: Lidar
+
+    @property
+    def value(self) -> list[bytes]:
+        lidar = self.lidar
+        if not lidar.clouded:
+            return []
+        packed = (
+            _POINT.pack(*point, layer, 0.0)
+            for layer in range(len(lidar.layers))
+            for point in lidar.points(layer)
+        )
+        return [b"".join(packed)]
+
+
+def _read(part: Part) -> Lidar:
+    if part.text("type", "fixed") != "fixed":
+        part.lack("a lidar that rotates")
+    if part.number("tiltAngle", 0.0) != 0.0:
+        part.lack("a lidar with a tiltAngle")
+    number = part.number
+    info = {
+        "horizontalResolution": max(1, int(number("horizontalResolution", 512.0))),
+        "numberOfLayers": max(1, int(number("numberOfLayers", 4.0))),
+        "fov": number("fieldOfView", 1.5708),
+        "verticalFov": number("verticalFieldOfView", 0.2),
+        "minRange": number("minRange", 0.01),
+        "maxRange": number("maxRange", 1.0),
+    }
+    if (rays := info["horizontalResolution"] * info["numberOfLayers"]) > _MOST_RAYS:
+        part.refuse(f"a lidar with {rays} rays", f"use {_MOST_RAYS} at most")
+        info.update(horizontalResolution=1, numberOfLayers=1)
+    directions = tuple(_layers(info))
+    return Lidar(
+        name=part.name,
+        model=part.text("model"),
+        info=info,
+        frequency={
+            "frequency": number("defaultFrequency", 10.0),
+            "minFrequency": number("minFrequency", 1.0),
+            "maxFrequency": number("maxFrequency", 25.0),
+        },
+        noise=number("noise", 0.0),
+        resolution=number("resolution", -1.0),
+        directions=directions,
+        beams=tuple(
+            tuple(beam_along(part.place.world_pose, direction, info["maxRange"]) for direction in row)
+            for row in directions
+        ),
+        layers=[_blank(len(row)) for row in directions],
+    )
+
+
+def _blank(columns: int) -> array[float]:
+    return array("f", [math.inf]) * columns
+
+
+def _layers(info: dict[str, Any]) -> Iterator[tuple[Vector, ...]]:
+    """Yield the directions of each layer: spread over the vertical field of view, its ends included."""
+    layers, columns = info["numberOfLayers"], info["horizontalResolution"]
+    for layer in range(layers):
+        up = info["verticalFov"] * (0.5 - layer / (layers - 1)) if layers > 1 else 0.0
+        left = (info["fov"] * (0.5 - (column + 0.5) / columns) for column in range(columns))
+        yield tuple((math.cos(up) * math.cos(it), math.cos(up) * math.sin(it), math.sin(up)) for it in left)
+
+
+def _sampler(lidars: Sequence[Lidar], robot: Carrier) -> Sample:
+    casts = [(lidar, [robot.look(beams) for beams in lidar.beams]) for lidar in lidars]
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for lidar, layers in casts:
+            if lidar.period_ms:
+                for layer, cast in enumerate(layers):
+                    seen = (_seen(lidar, distance_m, gauss) for distance_m in cast())
+                    lidar.layers[layer] = array("f", seen)
+
+    return sample
+
+
+def _seen(lidar: Lidar, distance_m: float, gauss: Callable[[float, float], float]) -> float:
+    low, high = lidar.info["minRange"], lidar.info["maxRange"]
+    if not low <= distance_m < high:
+        return math.inf
+    if lidar.noise:
+        distance_m += lidar.noise * high * gauss(0.0, 1.0)
+    return discrete(distance_m, lidar.resolution)
+
+
+def _services(lidar: Lidar) -> tuple[Row, ...]:
+    def set_frequency(request: Any) -> Fields:
+        if lidar.frequency["minFrequency"] <= request.value <= lidar.frequency["maxFrequency"]:
+            lidar.frequency["frequency"] = request.value
+        return {"success": True}
+
+    def enable_point_cloud(request: Any) -> Fields:
+        lidar.clouded = request.value
+        return {"success": True}
+
+    return (
+        ("get_info", "lidar_get_info", lambda _: lidar.info),
+        ("get_frequency_info", "lidar_get_frequency_info", lambda _: lidar.frequency),
+        ("set_frequency", "set_float", set_frequency),
+        ("enable_point_cloud", "set_bool", enable_point_cloud),
+        ("is_point_cloud_enabled", "node_get_status", lambda _: {"status": int(lidar.clouded)}),
+        ("get_layer_range_image", "lidar_get_layer_range_image", lambda it: _layer_image(lidar, it.layer)),
+        ("get_layer_point_cloud", "lidar_get_layer_point_cloud", lambda it: _layer_points(lidar, it.layer)),
+    )
+
+
+def _layer_image(lidar: Lidar, layer: int) -> Fields:
+    _require(lidar, layer)
+    return {"image": {**_image(lidar, 1), "data": lidar.layers[layer].tobytes()}}
+
+
+def _layer_points(lidar: Lidar, layer: int) -> Fields:
+    if not lidar.clouded:
+        raise UnsimulatedError("the point cloud is not enabled; call enable_point_cloud")
+    _require(lidar, layer)
+    return {"pointCloud": {"points": [{"x": x, "y": y, "z": z} for x, y, z in lidar.points(layer)]}}
+
+
+def _require(lidar: Lidar, layer: int) -> None:
+    """Check that there is such a layer; Webots would read a null pointer."""
+    count = len(lidar.layers)
+    if not 0 <= layer < count:
+        raise UnsimulatedError(f"no layer {layer}; use one of 0 to {count - 1}")
+
+
+def _image(lidar: Lidar, height: int) -> Fields:
+    width = lidar.info["horizontalResolution"]
+    return {"height": height, "width": width, "encoding": "32FC1", "step": _FLOAT_BYTES * width}
+
+
+def _topics(lidar: Lidar) -> tuple[Topic, ...]:
+    layers = lidar.info["numberOfLayers"]
+    lidar.timing.update(_angles(lidar))
+    image = Topic(
+        name="range_image",
+        type_name="sensor_msgs/Image",
+        source=lidar,
+        constants=_image(lidar, layers),
+        reading="data",
+    )
+    # Programs for older versions of Webots know the scans by the names of their layers.
+    scans = [(f"laser_scan/layer{layer}", layer) for layer in range(layers)]
+    if layers == 1:
+        scans.append(("laser_scan", 0))
+    return image, *(_scan(lidar, name, layer) for name, layer in scans), _cloud(lidar)
+
+
+def _scan(lidar: Lidar, name: str, layer: int) -> Topic:
+    return Topic(
+        name=name,
+        type_name="sensor_msgs/LaserScan",
+        source=_Scan(lidar, layer),
+        constants=lidar.timing,
+        reading="ranges",
+    )
+
+
+def _angles(lidar: Lidar) -> Fields:
+    fov = lidar.info["fov"]
+    return {
+        "angle_min": -fov / 2.0,
+        "angle_max": fov / 2.0,
+        "angle_increment": fov / lidar.info["horizontalResolution"],
+        "range_min": lidar.info["minRange"],
+        "range_max": lidar.info["maxRange"],
+    }
+
+
+def _cloud(lidar: Lidar) -> Topic:
+    count = lidar.info["numberOfLayers"] * lidar.info["horizontalResolution"]
+    constants = {
+        "height": 1,
+        "width": count,
+        "fields": _POINT_FIELDS,
+        "point_step": _POINT.size,
+        "row_step": _POINT.size * count,
+    }
+    return Topic(
+        name="point_cloud",
+        type_name="sensor_msgs/PointCloud2",
+        source=_Cloud(lidar),
+        constants=constants,
+        reading="data",
+        many=True,
+    )
+
+
+LIDAR: Final = Kind(
+    node="Lidar",
+    name="lidar",
+    fields="""tiltAngle SFFloat 0; horizontalResolution SFInt32 512; fieldOfView SFFloat 1.5708;
+        verticalFieldOfView SFFloat 0.2; numberOfLayers SFInt32 4; near SFFloat 0.01;
+        minRange SFFloat 0.01; maxRange SFFloat 1; spherical SFBool TRUE; type SFString fixed;
+        noise SFFloat 0; resolution SFFloat -1; defaultFrequency SFFloat 10; minFrequency SFFloat 1;
+        maxFrequency SFFloat 25; rotatingHead SFNode""",
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+    enabled=Lidar.enabled,
+)

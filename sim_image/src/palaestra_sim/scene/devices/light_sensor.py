@@ -1,0 +1,77 @@
+"""LightSensor: in a world without lights, what its lookup table has for darkness.
+
+The stub simulates no light, so a world with a light is refused: its sensors would measure it in Webots.
+Source: WbLightSensor.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import discrete, table_rows, table_service
+from palaestra_sim.scene.lookup import LookupTable, lookup_table
+from palaestra_sim.seam import Row
+
+_LIGHTS: Final = frozenset(("DirectionalLight", "PointLight", "SpotLight", "TexturedBackgroundLight"))
+_DARKNESS: Final = 0.0  # irradiance in W/m2
+_TABLE: Final = ((0.0, 0.0, 0.0), (1.0, 1000.0, 0.0))  # the default of LightSensor.lookupTable
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class LightSensor:
+    """A light sensor; `value` is in the unit of its lookup table, which is None if it has no rows."""
+
+    name: str
+    model: str
+    table: LookupTable | None
+    resolution: float
+    value: float = math.nan
+
+
+def _read(part: Part) -> LightSensor:
+    *_, root = part.node.ancestors()
+    if any(node.type_name in _LIGHTS for node in root.descendants()):
+        part.lack("a light sensor in a world with lights")
+    rows = table_rows(part, _TABLE)
+    return LightSensor(
+        name=part.name,
+        model=part.text("model"),
+        table=lookup_table(*rows) if rows else None,
+        resolution=part.number("resolution", -1.0),
+    )
+
+
+def _sampler(sensors: Sequence[LightSensor], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for sensor in sensors:
+            value = _DARKNESS if sensor.table is None else sensor.table.response(_DARKNESS, gauss)
+            sensor.value = discrete(value, sensor.resolution)
+
+    return sample
+
+
+def _services(sensor: LightSensor) -> tuple[Row, ...]:
+    return table_service(() if sensor.table is None else sensor.table.rows)
+
+
+def _topics(sensor: LightSensor) -> tuple[Topic, ...]:
+    type_name = "sensor_msgs/Illuminance"
+    return (Topic(name="value", type_name=type_name, source=sensor, reading="illuminance"),)
+
+
+LIGHT_SENSOR: Final = Kind(
+    node="LightSensor",
+    name="light sensor",
+    fields="""lookupTable MFVec3f 0 0 0 1 1000 0; colorFilter SFColor 1 1 1; occlusion SFBool FALSE;
+        resolution SFFloat -1""",
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+)

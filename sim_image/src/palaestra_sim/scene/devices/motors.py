@@ -1,0 +1,115 @@
+"""RotationalMotor and LinearMotor: every setter answers success, even if the motor ignores the value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.scene.motors import Motor, MotorSpec
+from palaestra_sim.seam import Handler, Row, UnsimulatedError
+
+_ROTATIONAL: Final = 0  # what `get_type` answers
+_LINEAR: Final = 1
+_FIELDS: Final = """
+    acceleration SFFloat -1; consumptionFactor SFFloat 10;
+    controlPID SFVec3f 10 0 0; maxVelocity SFFloat 10; minPosition SFFloat 0;
+    maxPosition SFFloat 0; {} SFFloat 10; multiplier SFFloat 1;
+    sound MFString sounds/{}.wav; muscles MFNode"""
+
+
+def _reader(limit: str) -> Callable[[Part], Motor]:
+    """Return the function that reads a motor whose torque or force the field `limit` limits."""
+
+    def read(part: Part) -> Motor:
+        number = part.number
+        return Motor(
+            MotorSpec(
+                name=part.name,
+                max_velocity_rad_s=number("maxVelocity", 10.0),
+                acceleration_rad_s2=number("acceleration", -1.0),
+                min_rad=number("minPosition", 0.0),
+                max_rad=number("maxPosition", 0.0),
+                max_torque_nm=number(limit, 10.0),
+                multiplier=number("multiplier", 1.0),
+                model=part.text("model"),
+            )
+        )
+
+    return read
+
+
+def _services(effort: str, type_number: int) -> Callable[[Motor], tuple[Row, ...]]:
+    """Return the function that lists the services of a motor; `effort` is "torque" or "force"."""
+
+    def services(motor: Motor) -> tuple[Row, ...]:
+        return (
+            *_commands(motor, effort),
+            *_answers(motor, effort),
+            ("get_type", "get_int", lambda _: {"value": type_number}),
+        )
+
+    return services
+
+
+def _commands(motor: Motor, effort: str) -> tuple[Row, ...]:
+    return (
+        ("set_position", "set_float", _setter(motor.set_position)),
+        ("set_velocity", "set_float", _setter(motor.set_velocity)),
+        ("set_acceleration", "set_float", _setter(motor.set_acceleration)),
+        (f"set_{effort}", "set_float", _unable(effort)),
+        (f"set_available_{effort}", "set_float", _setter(motor.set_available_torque)),
+        ("set_control_pid", "motor_set_control_pid", lambda _: {"success": 1}),
+        (f"{effort}_feedback_sensor/enable", "set_int", lambda request: {"success": request.value == 0}),
+        (f"{effort}_feedback_sensor/get_sampling_period", "get_int", lambda _: {"value": 0}),
+    )
+
+
+def _answers(motor: Motor, effort: str) -> tuple[Row, ...]:
+    spec = motor.spec
+    return (
+        ("get_target_position", "get_float", lambda _: {"value": motor.target_rad}),
+        ("get_min_position", "get_float", lambda _: {"value": spec.min_rad}),
+        ("get_max_position", "get_float", lambda _: {"value": spec.max_rad}),
+        ("get_velocity", "get_float", lambda _: {"value": motor.velocity_rad_s}),
+        ("get_max_velocity", "get_float", lambda _: {"value": spec.max_velocity_rad_s}),
+        ("get_acceleration", "get_float", lambda _: {"value": motor.acceleration_rad_s2}),
+        ("get_multiplier", "get_float", lambda _: {"value": spec.multiplier}),
+        (f"get_max_{effort}", "get_float", lambda _: {"value": spec.max_torque_nm}),
+        (f"get_available_{effort}", "get_float", lambda _: {"value": motor.available_torque_nm}),
+    )
+
+
+def _setter(command: Callable[[float], None]) -> Handler:
+    done = {"success": True}
+
+    def handle(request: Any) -> dict[str, Any]:
+        command(request.value)
+        return done
+
+    return handle
+
+
+def _unable(effort: str) -> Handler:
+    def fail(_request: Any) -> dict[str, Any]:
+        raise UnsimulatedError(f"the stub simulates no {effort}s; set a position or velocity")
+
+    return fail
+
+
+ROTATIONAL_MOTOR: Final = Kind(
+    node="RotationalMotor",
+    name="rotational motor",
+    fields=_FIELDS.format("maxTorque", "rotational_motor"),
+    role="motor",
+    read=_reader("maxTorque"),
+    services=_services("torque", _ROTATIONAL),
+)
+LINEAR_MOTOR: Final = Kind(
+    node="LinearMotor",
+    name="linear motor",
+    fields=_FIELDS.format("maxForce", "linear_motor"),
+    role="motor",
+    read=_reader("maxForce"),
+    services=_services("force", _LINEAR),
+)

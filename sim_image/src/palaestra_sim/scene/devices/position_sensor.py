@@ -1,0 +1,67 @@
+"""PositionSensor: the angle of a hinge, or the length of a slider."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Shaft, Topic
+from palaestra_sim.scene.devices.response import discrete
+from palaestra_sim.seam import Row
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class PositionSensor:
+    """The position of a joint in rad, of a slider in m; a joint without a motor stays at 0."""
+
+    name: str
+    shaft: Shaft
+    resolution: float
+    noise: float
+    model: str = ""
+    value: float = math.nan
+
+
+def _read(part: Part) -> PositionSensor:
+    return PositionSensor(
+        name=part.name,
+        shaft=part.shaft or Shaft(),
+        resolution=part.number("resolution", -1.0),
+        noise=part.number("noise", 0.0),
+    )
+
+
+def _sampler(sensors: Sequence[PositionSensor], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for sensor in sensors:
+            motor = sensor.shaft.motor
+            angle_rad = motor.angle_rad if motor is not None else 0.0
+            if sensor.noise:
+                angle_rad += sensor.noise * gauss(0.0, 1.0)
+            sensor.value = discrete(angle_rad, sensor.resolution)
+
+    return sample
+
+
+def _services(sensor: PositionSensor) -> tuple[Row, ...]:
+    return (("get_type", "get_int", lambda _: {"value": sensor.shaft.type_number}),)
+
+
+def _topics(sensor: PositionSensor) -> tuple[Topic, ...]:
+    return (Topic(name="value", type_name="webots_ros/Float64Stamped", source=sensor),)
+
+
+POSITION_SENSOR: Final = Kind(
+    node="PositionSensor",
+    name="position sensor",
+    fields="noise SFFloat 0; resolution SFFloat -1",
+    role="position_sensor",
+    read=_read,
+    sampler=_sampler,
+    services=_services,
+    topics=_topics,
+)

@@ -1,0 +1,105 @@
+"""Joints: the place of what is on one, as its motor turns.
+
+A hinge turns its end about an axis through the anchor, a slider moves it along the axis. The place in the
+world file holds at the joint's `position` in the file.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle, to_axis_angle, turn
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.places import Place
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Joint:
+    """A hinge or a slider, in the frame of the node that it is in.
+
+    Attributes:
+        axis: unit vector.
+        anchor: a point on the axis of a hinge, in meters.
+        slides: whether it is a slider.
+        start: the position in the file, in rad or m.
+        motor: that moves it; None: it stays where it is put.
+        position: where a joint without a motor is, in rad or m.
+    """
+
+    axis: Vector
+    anchor: Vector = (0.0, 0.0, 0.0)
+    slides: bool = False
+    start: float = 0.0
+    motor: Motor | None = None
+    position: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.position = self.start
+
+    @property
+    def now(self) -> float:
+        """Its position, in rad or m."""
+        return self.position if self.motor is None else self.motor.angle_rad
+
+    def put(self, position: float) -> None:
+        """Put it to a position, at rest there; a motor holds it, as in Webots."""
+        if self.motor is None:
+            self.position = position
+        else:
+            self.motor.put(position)
+
+    def carry(self, pose: Pose) -> Pose:
+        """Return where a frame is now that is at `pose` in the world file."""
+        moved = self.now - self.start
+        if moved == 0.0:
+            return pose
+        x, y, z = self.axis
+        if self.slides:
+            return Pose((x * moved, y * moved, z * moved)).after(pose)
+        turned = Pose(rotation=from_axis_angle((x, y, z, moved)))
+        ax, ay, az = self.anchor
+        tx, ty, tz = turn(turned.rotation, self.anchor)
+        return Pose((ax - tx, ay - ty, az - tz), turned.rotation).after(pose)
+
+
+class JointPlace(Place):
+    """The frame of the end of a joint."""
+
+    def __init__(self, parent: Place | None, translation: Vector, rotation: AxisAngle, joint: Joint) -> None:
+        super().__init__(parent, translation, rotation)
+        self.joint = joint
+
+    @property
+    def pose(self) -> Pose:
+        """The frame, in the parent's."""
+        return self.joint.carry(Pose(self._translation, from_axis_angle(self._rotation)))
+
+    @property
+    def translation(self) -> Vector:
+        """X, y, z in meters, in the parent's frame."""
+        return self.pose.position
+
+    @translation.setter
+    def translation(self, value: Vector) -> None:
+        self._translation = value
+
+    @property
+    def rotation(self) -> AxisAngle:
+        """Axis and angle in radians, in the parent's frame."""
+        return to_axis_angle(self.pose.rotation)
+
+    @rotation.setter
+    def rotation(self, value: AxisAngle) -> None:
+        self._rotation = value
+
+    def return_to_start(self) -> None:
+        """Put the joint back; its motor returns to its start by itself."""
+        if self.joint.motor is None:
+            self.joint.put(self.joint.start)
+
+
+def unit(vector: Vector) -> Vector | None:
+    """Return a vector of length 1 in the same direction; None for the zero vector."""
+    length = math.sqrt(sum(part * part for part in vector))
+    return None if length == 0.0 else (vector[0] / length, vector[1] / length, vector[2] / length)

@@ -1,0 +1,88 @@
+"""How a place moves in the world: with its robot, and with the joints that carry it.
+
+Velocities are in world axes, over the last basic step. They come from the speeds of body and motors, as those
+of Webots come from its physics, so a robot that is placed somewhere else has no velocity.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.geometry import Vector, turn
+from palaestra_sim.scene.joints import JointPlace
+from palaestra_sim.scene.places import Place
+
+_REST: Vector = (0.0, 0.0, 0.0)
+
+
+class Motion(NamedTuple):
+    """The velocity of a place's origin in m/s, and its turning in rad/s, in world axes."""
+
+    velocity: Vector = _REST
+    turning: Vector = _REST
+
+
+def motion_of(place: Place, body: Body | None) -> Motion:
+    """Return the motion of a place on a robot; `body` is the robot's."""
+    point = place.world_position
+    velocity, turning = _REST, _REST
+    if body is not None:
+        vx, vy, omega = body.velocity
+        turning = (0.0, 0.0, omega)
+        velocity = _sum((vx, vy, 0.0), _cross(turning, (point[0] - body.x, point[1] - body.y, 0.0)))
+    for link in place.chain():
+        motor = link.joint.motor if isinstance(link, JointPlace) else None
+        if motor is not None and isinstance(link, JointPlace) and motor.speed_rad_s:
+            added = _of_joint(link, motor.speed_rad_s, point)
+            velocity, turning = _sum(velocity, added.velocity), _sum(turning, added.turning)
+    return Motion(velocity, turning)
+
+
+class Trail:
+    """The acceleration of a place in world axes: the change of its velocity over the last basic step."""
+
+    __slots__ = ("_before", "_body", "_place", "_step_s")
+
+    def __init__(self, place: Place, body: Body | None) -> None:
+        self._place = place
+        self._body = body
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the velocity: the place is at rest, and was."""
+        self._before = _REST
+        self._step_s = 0.0
+
+    def begin(self, step_s: float) -> None:
+        """Note the velocity before a basic step."""
+        self._before = motion_of(self._place, self._body).velocity
+        self._step_s = step_s
+
+    def acceleration(self) -> Vector:
+        """Return the acceleration in m/s2; zero before the first step."""
+        if self._step_s == 0.0:
+            return _REST
+        now = motion_of(self._place, self._body).velocity
+        x, y, z = ((after - before) / self._step_s for after, before in zip(now, self._before, strict=True))
+        return x, y, z
+
+
+def _of_joint(end: JointPlace, speed: float, point: Vector) -> Motion:
+    """Return what a motor adds to the motion of a point on the end of its joint."""
+    around = end.parent.world_pose if end.parent is not None else None
+    axis, anchor = end.joint.axis, end.joint.anchor
+    if around is not None:
+        axis, anchor = turn(around.rotation, axis), around.carry(anchor)
+    spin = (axis[0] * speed, axis[1] * speed, axis[2] * speed)
+    if end.joint.slides:
+        return Motion(velocity=spin)
+    return Motion(_cross(spin, (point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2])), spin)
+
+
+def _sum(a: Vector, b: Vector) -> Vector:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

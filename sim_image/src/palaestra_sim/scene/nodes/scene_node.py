@@ -1,0 +1,124 @@
+"""One node of a world that is loaded: its type, its fields as they are now, its place, the nodes inside it.
+
+A node has an identity of its own, `number`. It does not depend on bytes of a file, so that a node of a
+PROTO, a node that is `USE`d, and a node that a client imports each have one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.scene.places import Place
+from palaestra_sim.world import Node
+from palaestra_sim.world.source import Source
+
+Content: TypeAlias = "float | bool | str | SceneNode | None"
+
+
+@dataclass(slots=True, eq=False)
+class FieldContent:
+    """The values of a field: numbers, booleans, strings, nodes, None for NULL.
+
+    Attributes:
+        items: in order; a vector is as many numbers as it has.
+        bracketed: whether the file has them in brackets.
+    """
+
+    items: list[Content]
+    bracketed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a node was written: its node in the tree of a file, and the bytes of that file."""
+
+    node: Node
+    source: Source
+
+    def error(self, fact: str, remedy: str) -> WorldError:
+        """Return an error at this place."""
+        return self.source.error(self.node.span[0], fact, remedy)
+
+
+class SceneNode:
+    """One node of the tree.
+
+    Attributes:
+        number: the answer of `get_id`; 0 is the root.
+        origin: where it was written; None for the root.
+        type_name: of the node, such as "Solid".
+        proto_name: the PROTO that it is an instance of, "" if none.
+        def_name: "" if it has none.
+        parent: None for the root.
+        fields: those that were written or set, by name.
+        twins: this node and those that are the same one in the file, `DEF` and `USE`: a write reaches all.
+        place: its frame; None for a node without one, such as an appearance.
+        outline: whether it, or a twin, is part of a boundingObject.
+        stand_in: whether it is a simple solid in the place of a PROTO.
+        unusable: why its PROTO cannot be expanded; "" if that is not the case.
+        left_out: whether it is not simulated, because the user left it out.
+    """
+
+    def __init__(self, number: int, type_name: str, origin: Origin | None, parent: SceneNode | None) -> None:
+        self.number = number
+        self.origin = origin
+        self.parent = parent
+        self.type_name = type_name
+        self.proto_name = ""
+        self.def_name = ""
+        self.fields: dict[str, FieldContent] = {}
+        self.twins: list[SceneNode] = [self]
+        self.place: Place | None = None
+        self.outline = False
+        self.stand_in = False
+        self.unusable = ""
+        self.left_out = False
+
+    def numbers(self, name: str) -> tuple[float, ...] | None:
+        """Return the numbers of a field; None if it is absent or has another value."""
+        content = self.fields.get(name)
+        if content is None:
+            return None
+        numbers = tuple(item for item in content.items if isinstance(item, float))
+        return numbers if len(numbers) == len(content.items) else None
+
+    def text(self, name: str) -> str | None:
+        """Return the first string of a field; None if there is none."""
+        return next(iter(self.texts(name)), None)
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """Return the strings of a field; () if it is absent."""
+        return tuple(item for item in self._items(name) if isinstance(item, str))
+
+    def flag(self, name: str, default: bool) -> bool:  # noqa: FBT001 - reads as in the world
+        """Return the TRUE or FALSE of a field, or `default` if it has none."""
+        return next((item for item in self._items(name) if isinstance(item, bool)), default)
+
+    def nodes(self, name: str = "children") -> tuple[SceneNode, ...]:
+        """Return the nodes of a field; () if it is absent."""
+        return tuple(item for item in self._items(name) if isinstance(item, SceneNode))
+
+    def inside(self) -> Iterator[SceneNode]:
+        """Yield the nodes in its fields, in the order of the fields."""
+        for content in self.fields.values():
+            yield from (item for item in content.items if isinstance(item, SceneNode))
+
+    def descendants(self) -> Iterator[SceneNode]:
+        """Yield every node inside, parents before children."""
+        for node in self.inside():
+            yield node
+            yield from node.descendants()
+
+    def ancestors(self) -> Iterator[SceneNode]:
+        """Yield the nodes around it, from the inside out, the root last."""
+        node = self.parent
+        while node is not None:
+            yield node
+            node = node.parent
+
+    def _items(self, name: str) -> list[Content]:
+        content = self.fields.get(name)
+        return [] if content is None else content.items

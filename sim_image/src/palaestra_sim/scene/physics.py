@@ -1,0 +1,64 @@
+"""The physics as the scene needs it: bodies that move, rays, and contacts.
+
+The scene reads a world, and gives its robots devices. A physics moves these robots. The stub's is kinematic;
+another one takes its place by implementing this Protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, Protocol
+
+from palaestra_sim.scene.beams import Beam
+from palaestra_sim.scene.bodies import Body, Build
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.shapes import Shape
+
+Cast = Callable[[], Sequence[float]]
+
+
+class Figure(Protocol):
+    """A robot, whether it moves or not.
+
+    Attributes:
+        place: its frame.
+        body: None if nothing moves it and nothing can run into it.
+        powered: whether its motors turn.
+    """
+
+    place: Place
+    body: Body | None
+    powered: bool
+
+
+class ContactPoint(NamedTuple):
+    """A point at which two nodes touch, in meters in the world."""
+
+    point: Vector
+    nodes: tuple[SceneNode, SceneNode]
+
+
+class Physics(Protocol):
+    """The motion of one loaded world."""
+
+    def body(self, build: Build) -> Body:
+        """Return the body of a robot that is being read, at the origin of the world and at rest."""
+        ...
+
+    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape]) -> None:
+        """Take these robots and obstacles as the contents of the world, where they are now."""
+        ...
+
+    def advance(self, step_s: float) -> None:
+        """Move the bodies on by one basic step; one without power comes to rest."""
+        ...
+
+    def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+        """Return a function that returns how far each beam of a robot travels now, in meters."""
+        ...
+
+    def contacts(self) -> Iterable[ContactPoint]:
+        """Return where robots touch obstacles and each other now."""
+        ...

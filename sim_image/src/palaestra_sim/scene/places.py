@@ -1,0 +1,78 @@
+"""The places of a world's nodes, each in the frame of the node around it.
+
+A place has the `translation` and `rotation` that clients read and write. It stays as written, except the
+place of a robot with a body, and the places behind joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle
+
+
+class Place:
+    """The frame of one node.
+
+    Attributes:
+        parent: the place of the node around it; None at the top of the world.
+        translation: x, y, z in meters, in the parent's frame.
+        rotation: axis and angle in radians, in the parent's frame.
+        scale: meters of the world in a meter of this frame.
+    """
+
+    def __init__(
+        self, parent: Place | None, translation: Vector, rotation: AxisAngle, size: float = 1.0
+    ) -> None:
+        self.parent = parent
+        self.scale: float = size if parent is None else size * parent.scale
+        self._translation = translation
+        self._rotation = rotation
+        self._start = (translation, rotation)
+
+    @property
+    def translation(self) -> Vector:
+        """X, y, z in meters, in the parent's frame."""
+        return self._translation
+
+    @translation.setter
+    def translation(self, value: Vector) -> None:
+        self._translation = value
+
+    @property
+    def rotation(self) -> AxisAngle:
+        """Axis and angle in radians, in the parent's frame."""
+        return self._rotation
+
+    @rotation.setter
+    def rotation(self, value: AxisAngle) -> None:
+        self._rotation = value
+
+    @property
+    def pose(self) -> Pose:
+        """The frame, in the parent's."""
+        return Pose(self.translation, from_axis_angle(self.rotation))
+
+    @property
+    def world_pose(self) -> Pose:
+        """The frame, in the world's."""
+        parent, pose = self.parent, self.pose
+        if parent is None:
+            return pose
+        return parent.world_pose.after(pose if parent.scale == 1.0 else pose.scaled(parent.scale))
+
+    @property
+    def world_position(self) -> Vector:
+        """Return the position of its origin in the world, in meters."""
+        return self.translation if self.parent is None else self.world_pose.position
+
+    def chain(self) -> Iterator[Place]:
+        """Yield this place and those around it, up to the top of the world."""
+        place: Place | None = self
+        while place is not None:
+            yield place
+            place = place.parent
+
+    def return_to_start(self) -> None:
+        """Return to the place in the world file."""
+        self.translation, self.rotation = self._start

@@ -1,0 +1,162 @@
+"""Read the simulated contents of a world file.
+
+Nodes that are only drawn are skipped, upright ones with a boundingObject are obstacles, and robots drive. Any
+other node that would act in Webots, such as a PROTO or a loose crate, is refused with its place in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.scene.axes import check_axes
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reading import ELSEWHERE, LeaveOut, Reading
+from palaestra_sim.scene.robot_reader import RobotParts, read_robot
+from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.tree.scene_tree import SceneTree
+
+# Visible to people and cameras only, or read elsewhere (WorldInfo).
+DRAWN_ONLY: Final = frozenset(
+    (
+        "Background",
+        "Billboard",
+        "CadShape",
+        "DirectionalLight",
+        "Fog",
+        "PointLight",
+        "Shape",
+        "SpotLight",
+        "TexturedBackground",
+        "TexturedBackgroundLight",
+        "Viewpoint",
+        "WorldInfo",
+    )
+)
+# A device without a robot is a thing like others.
+_SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
+_FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
+
+
+@dataclass(slots=True, kw_only=True)
+class Scene:
+    """The contents of a world.
+
+    Attributes:
+        physics: moves the robots.
+        basic_step_ms: WorldInfo.basicTimeStep.
+        random_seed: WorldInfo.randomSeed.
+        solids: the obstacles.
+        robots: in the order of the world file.
+        left_out: what the stub lacks and the user left out, each with its place.
+        leave_out: what the user leaves out.
+    """
+
+    physics: Physics
+    basic_step_ms: int = 32
+    random_seed: int = 0
+    solids: list[Shape] = field(default_factory=list)
+    robots: list[RobotParts] = field(default_factory=list)
+    left_out: tuple[WorldError, ...] = ()
+    leave_out: LeaveOut = field(default_factory=LeaveOut)
+
+
+def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = None) -> Scene:
+    """Return the contents of a world, and give its nodes their places; its robots have bodies of `physics`.
+
+    Raises:
+        WorldError: it has things that the stub cannot simulate; the error has all of them.
+    """
+    reading = Reading(tree.refused, leave_out)
+    scene = Scene(physics=physics)
+    # First, because devices read it too, wherever it is in the file.
+    for node in tree.root.nodes():
+        if node.type_name == "WorldInfo":
+            reading.world_info = node
+            _read_world_info(reading, node, scene)
+    first = reading.world_info or next(iter(tree.root.nodes()), None)
+    if first is not None:
+        check_axes(reading, first)
+    for node in tree.root.nodes():
+        _read(reading, node, None, scene)
+    reading.conclude()
+    scene.left_out = tuple(reading.left_out)
+    scene.leave_out = reading.leave_out
+    return scene
+
+
+def read_added(tree: SceneTree, nodes: Iterable[SceneNode], physics: Physics, leave_out: LeaveOut) -> Scene:
+    """Return what nodes add to a world, all inside one parent, and give them their places.
+
+    Raises:
+        WorldError: they have things that the stub cannot simulate.
+    """
+    reading = Reading((), leave_out)
+    reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
+    scene = Scene(physics=physics)
+    for node in nodes:
+        places = (around.place for around in node.ancestors() if around.place is not None)
+        _read(reading, node, next(places, None), scene)
+    reading.conclude()
+    return scene
+
+
+def _read_world_info(reading: Reading, node: SceneNode, scene: Scene) -> None:
+    step_ms = reading.number(node, "basicTimeStep", 32.0)
+    if step_ms < 1.0 or step_ms != int(step_ms):
+        fact = f"basicTimeStep {step_ms:g} is no whole number of milliseconds"
+        reading.refuse(node, fact, "the controller counts whole ones; write one")
+    scene.basic_step_ms = int(step_ms)
+    scene.random_seed = int(reading.number(node, "randomSeed", 0.0))
+
+
+def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+    kind = node.type_name
+    if kind in DRAWN_ONLY:
+        return
+    if kind in {"Group", "Slot"}:
+        _read_children(reading, node, parent, scene)
+    elif kind == "Robot":
+        robot = read_robot(reading, node, parent, scene.physics)
+        scene.robots.append(robot)
+        _stand(reading, robot.standing, scene)
+    elif kind in _FRAMES:
+        place = Place(parent, reading.translation(node), reading.rotation(node), reading.size(node))
+        node.place = place
+        if node.left_out:
+            return
+        if kind in _SOLIDS:
+            _read_solid(reading, node, place, scene)
+        _read_children(reading, node, place, scene)
+    else:
+        reading.lacks(node, node.unusable or f"the stub simulates no {kind}")
+
+
+def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+    for child in node.nodes():
+        _read(reading, child, parent, scene)
+
+
+def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -> None:
+    if node.nodes("physics"):
+        fact = f"a {node.type_name} with physics moves when it is pushed, which the stub does not simulate"
+        reading.lacks(node, fact, f"remove physics, {ELSEWHERE}")
+    if node.type_name == "Track" and node.nodes("device"):
+        reading.lacks(node, "a Track with devices moves what stands on it, which the stub does not simulate")
+    shapes = list(bounding_shapes(reading, node, place))
+    if not node.left_out:
+        _stand(reading, shapes, scene)
+
+
+def _stand(reading: Reading, shapes: Iterable[Shape], scene: Scene) -> None:
+    """Make obstacles of shapes that stand or lie."""
+    for shape in shapes:
+        if not shape.upright:
+            reading.lacks(shape.node, f"a {shape.node.type_name} that neither stands nor lies")
+        if not shape.node.left_out:
+            scene.solids.append(shape)

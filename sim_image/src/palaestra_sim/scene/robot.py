@@ -1,0 +1,144 @@
+"""One simulated robot: its motors, its sensors, and its noise.
+
+The seed of the noise comes in the robot's `customData`, either as a whole number (`"7"`) or as JSON
+(`'{"seed": 7}'`), and is taken when the world is loaded and at each `simulation_reset`. Anything
+else leaves the seed as it was; the first one is WorldInfo.randomSeed. From a reset on, the noise is a
+function of the seed and of the number of steps alone. Every sensor with noise draws at every step, also
+while it is not enabled: types in the order of the table of devices, sensors in that of the world file.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Mapping, Sequence
+
+from palaestra_sim.scene.battery import Battery
+from palaestra_sim.scene.beams import Beam
+from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.devices.kind import Sample, Source
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.motion import Motion, Trail, motion_of
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.nodes.scene_node import FieldContent
+from palaestra_sim.scene.physics import Cast, Physics
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.robot_reader import RobotParts
+
+
+class Robot:
+    """A robot of the world, whether it drives or only watches.
+
+    Attributes:
+        name: Robot.name in the world file.
+        motors: by device name.
+        sensors: by device name; each has a `value` after a step.
+        samplers: give all sensors their values of this moment, in this order.
+        gauss: returns the next number of the robot's noise, from mean and deviation.
+        place: its frame.
+        body: None for a robot that only watches.
+        powered: whether its motors turn; without energy they do not.
+        battery: without energy if the robot has none.
+    """
+
+    def __init__(self, parts: RobotParts, random_seed: int, physics: Physics) -> None:
+        self.parts = parts
+        self._physics = physics
+        self.name = parts.name
+        self.motors: dict[str, Motor] = parts.devices.motors
+        self.sensors: Mapping[str, Source] = parts.devices.sensors
+        self.place: Place = parts.place
+        self.body: Body | None = parts.body
+        self.battery = Battery(parts.node)
+        self.powered = True
+        self._has_battery = self.battery.value >= 0.0
+        self.seed = random_seed
+        self._random = random.Random()  # noqa: S311 - noise, not secrets
+        self.gauss = self._random.gauss
+        self._trails: list[Trail] = []
+        self.samplers: tuple[Sample, ...] = tuple(
+            kind.sampler(devices, self)
+            for kind in DEVICES.values()
+            if kind.sampler is not None and (devices := parts.devices.of(kind))
+        )
+        self._stray_motors = tuple(
+            it for it in self.motors.values() if self.body is None or not self.body.base.has(it)
+        )
+        self.sow()
+
+    @property
+    def custom_data(self) -> str:
+        """The customData field, as it is now."""
+        return self.parts.node.text("customData") or ""
+
+    @custom_data.setter
+    def custom_data(self, text: str) -> None:
+        self.parts.node.fields["customData"] = FieldContent([text])
+
+    def look(self, beams: Sequence[Beam]) -> Cast:
+        """Return a function that returns how far each beam travels now, in meters; see `Carrier`."""
+        return self._physics.look(self, beams)
+
+    def motion(self, place: Place) -> Motion:
+        """Return how a place on the robot moves in the world; see `Carrier`."""
+        return motion_of(place, self.body)
+
+    def follow(self, place: Place) -> Callable[[], Vector]:
+        """Return a function that returns the acceleration of a place; see `Carrier`."""
+        trail = Trail(place, self.body)
+        self._trails.append(trail)
+        return trail.acceleration
+
+    def begin(self, step_s: float) -> None:
+        """Begin a basic step; with an empty battery, stand still."""
+        if self._has_battery:
+            self.powered = not self._exhausted(step_s)
+            if not self.powered:
+                self.halt()
+                return
+        for trail in self._trails:
+            trail.begin(step_s)
+
+    def turn(self, step_s: float) -> None:
+        """Turn the motors that are on no wheel for one basic step."""
+        if self.powered:
+            for motor in self._stray_motors:
+                motor.advance(step_s)
+
+    def _exhausted(self, step_s: float) -> bool:
+        self.battery.drain(step_s)
+        return self.battery.empty
+
+    def reset(self) -> None:
+        """Return to the start of the world file: pose, rest, motors, battery, noise. customData stays."""
+        self.battery.reset()
+        self.powered = True
+        self.place.return_to_start()
+        for motor in self.motors.values():
+            motor.reset()
+        self.halt()
+        for trail in self._trails:
+            trail.reset()
+        self.sow()
+
+    def halt(self) -> None:
+        """Stop all motion."""
+        if self.body is not None:
+            self.body.halt()
+
+    def sow(self) -> None:
+        """Restart the noise with the seed that is now in customData."""
+        self.seed = seed_of(self.custom_data, self.seed)
+        self._random.seed(self.seed)
+
+
+def seed_of(custom_data: str, otherwise: int) -> int:
+    """Return the seed in a robot's customData: `7` or `{"seed": 7}`; else `otherwise`."""
+    try:
+        value = json.loads(custom_data)
+    except (ValueError, RecursionError):
+        return otherwise
+    if isinstance(value, dict):
+        value = value.get("seed")
+    return value if isinstance(value, int) and not isinstance(value, bool) else otherwise

@@ -1,0 +1,335 @@
+"""Read a Robot node: its outline, its joints, its wheels, and its devices.
+
+Hinges and tracks with motors may be wheels (`wheels`). The wheels together are the drive (`drive`).
+Everything else on a joint moves with it, but touches nothing. A robot without an outline and without wheels
+only watches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from palaestra_sim.scene.arguments import Arguments, read_arguments
+from palaestra_sim.scene.base import Base
+from palaestra_sim.scene.bodies import Body, Build
+from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.devices.kind import Devices, Kind, Part, Shaft
+from palaestra_sim.scene.drive import find_drive
+from palaestra_sim.scene.geometry import Vector, turn
+from palaestra_sim.scene.joints import Joint, JointPlace, unit
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.robot_place import RobotPlace
+from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.wheels import Driven, wheels_among
+
+# A SolidReference closes a loop of joints; the solid is read where it is written.
+_INERT: Final = frozenset(
+    (
+        "Shape",
+        "CadShape",
+        "DirectionalLight",
+        "PointLight",
+        "SpotLight",
+        "Slot",
+        "SolidReference",
+        "TrackWheel",
+    )
+)
+_MOUNTED: Final = {name: kind for name, kind in DEVICES.items() if not kind.on_joint}
+_ON_JOINTS: Final = {name: kind for name, kind in DEVICES.items() if kind.on_joint}
+_FRAMES: Final = _MOUNTED.keys() | {"Pose", "Transform", "Solid", "Track"}
+_JOINTS: Final = frozenset(("HingeJoint", "SliderJoint"))
+_LOOSE_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint"))
+
+_STEP_M: Final = 0.005  # lower steps are driven over; robots of real worlds begin a bit inside the floor
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class RobotParts:
+    """A robot of the world file.
+
+    Attributes:
+        body: None if nothing can collide with it.
+        standing: the outline of a robot that cannot move and does not stand upright on the floor.
+        arguments: its controllerArgs; None when its controller is not "ros".
+    """
+
+    node: SceneNode
+    name: str
+    place: Place
+    devices: Devices
+    body: Body | None
+    standing: tuple[Shape, ...] = ()
+    arguments: Arguments | None = None
+
+
+def read_robot(reading: Reading, node: SceneNode, parent: Place | None, physics: Physics) -> RobotParts:
+    """Return the robot at `node`, and give it and its parts their places."""
+    return _RobotReader(reading, node, parent, physics).read()
+
+
+class _RobotReader:
+    def __init__(self, reading: Reading, node: SceneNode, parent: Place | None, physics: Physics) -> None:
+        self._physics = physics
+        self._reading = reading
+        self._node = node
+        self._parent = parent
+        self._by_ros = node.text("controller") == "ros"
+        self._devices = Devices()
+        # Where the robot stands does not matter to its parts: they are read in its own frame.
+        self._frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+        self._outline: list[Shape] = []  # of what is fixed to the robot
+        self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
+        self._driven: list[Driven] = []
+        self._parts: list[tuple[SceneNode, Place]] = []
+
+    def read(self) -> RobotParts:
+        """Return the robot."""
+        reading, node = self._reading, self._node
+        if reading.size(node) != 1.0 or (self._parent is not None and self._parent.scale != 1.0):
+            self._lacks(node, "a robot with a scale")
+        self._outline += bounding_shapes(reading, node, self._frame)
+        self._read_children(node, self._frame)
+        wheels = wheels_among(self._driven)
+        drive = find_drive([found.wheel() for found in wheels])
+        shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
+        moves = drive is not None or self._stands_free(shapes)
+        heights = self._heights(wheels)
+        body = None
+        if moves:
+            base = Base([it.motor for it in wheels], drive)
+            body = self._physics.body(Build(base=base, outline=shapes, heights=heights))
+        place = self._place(body)
+        self._settle(place)
+        return RobotParts(
+            node=node,
+            name=node.text("name") or "robot",
+            place=place,
+            devices=self._devices,
+            body=body,
+            standing=() if moves else tuple(shapes),
+            arguments=read_arguments(reading, node) if self._by_ros else None,
+        )
+
+    def _stands_free(self, shapes: Sequence[Shape]) -> bool:
+        """Return whether a robot without a drive has a body: upright, at the top of the world."""
+        upright = self._reading.pose(self._node).upright
+        return bool(shapes) and self._parent is None and upright
+
+    def _heights(self, wheels: Sequence[Driven]) -> tuple[float, float]:
+        ends = [z for shape in self._outline for z in shape.heights()]
+        if not ends:
+            return 0.0, max((found.top for found in wheels), default=0.0)
+        floor = min((found.bottom for found in wheels), default=min(ends) - _STEP_M)
+        return max(min(ends), floor + _STEP_M), max(ends)
+
+    def _place(self, body: Body | None) -> Place:
+        reading, node = self._reading, self._node
+        translation, rotation = reading.translation(node), reading.rotation(node)
+        if body is None:
+            return Place(self._parent, translation, rotation)
+        if self._parent is not None:
+            self._lacks(node, "a robot that drives inside another node")
+        if not reading.pose(node).upright:
+            self._lacks(node, "a robot that drives, but does not stand upright")
+        return RobotPlace(translation, rotation, body)
+
+    def _settle(self, place: Place) -> None:
+        """Put the parts, read in a frame of their own, on the robot."""
+        self._node.place = place
+        for part, part_place in self._parts:
+            if part_place.parent is self._frame:
+                part_place.parent = place
+            part.place = part_place
+
+    def _lacks(self, node: SceneNode, fact: str) -> None:
+        """Note what cannot be simulated; on a robot that no client can reach, it does not matter."""
+        if self._by_ros:
+            self._reading.lacks(node, fact)
+        else:
+            node.left_out = True
+
+    def _read_children(self, node: SceneNode, place: Place) -> None:
+        for child in (*node.nodes(), *node.nodes("endPoint")):
+            self._read_part(child, place)
+
+    def _read_part(self, node: SceneNode, place: Place) -> None:
+        kind = node.type_name
+        if kind in _JOINTS:
+            self._read_joint(node, place)
+        elif kind in _LOOSE_JOINTS:
+            self._read_loose_joint(node, place)
+        elif kind in {"Group", "Slot"}:
+            self._read_children(node, place)
+        elif kind in _FRAMES:
+            self._read_frame(node, Place(place, *_where(self._reading, node), self._reading.size(node)))
+        elif kind not in _INERT:
+            self._lacks(node, node.unusable or f"the stub simulates no {kind} on a robot")
+
+    def _read_frame(self, node: SceneNode, place: Place) -> None:
+        self._parts.append((node, place))
+        if node.type_name in _MOUNTED:
+            self._read_device(_MOUNTED[node.type_name], node, place)
+        elif node.type_name == "Solid" and not _moves(place):
+            self._outline += bounding_shapes(self._reading, node, place)
+        elif node.type_name == "Track":
+            self._read_track(node, place)
+        self._read_children(node, place)
+
+    def _read_track(self, node: SceneNode, place: Place) -> None:
+        """Take a track as fixed, with a belt that may drive the robot."""
+        shapes = list(bounding_shapes(self._reading, node, place))
+        motor = self._read_devices_of(node, node, place, Joint(axis=(1.0, 0.0, 0.0), slides=True))
+        if _moves(place):
+            return
+        self._outline += shapes
+        if motor is not None and shapes:
+            frame = place.world_pose
+            lowest = min(shapes, key=lambda shape: shape.heights()[0])
+            axle = turn(frame.rotation, (0.0, 1.0, 0.0))
+            self._driven.append(
+                Driven(motor=motor, axle=axle, anchor=frame.position, shape=lowest, belt=True)
+            )
+
+    def _read_joint(self, node: SceneNode, place: Place) -> None:
+        """Take the motor and the sensor of a joint, and what is on it."""
+        reading = self._reading
+        if place.scale != 1.0:
+            self._lacks(node, f"a {node.type_name} in a Transform with a scale")
+        slides = node.type_name == "SliderJoint"
+        parameters = next(iter(node.nodes("jointParameters")), node)
+        axis = unit(
+            _triple(reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0)))
+        )
+        if axis is None:
+            reading.refuse(parameters, "a joint with an axis of length 0", "write its direction")
+            return
+        joint = Joint(
+            axis=axis,
+            anchor=_triple(reading.vector(parameters, "anchor", (0.0, 0.0, 0.0))),
+            slides=slides,
+            start=reading.number(parameters, "position", 0.0),
+        )
+        joint.motor = self._read_devices_of(node, parameters, place, joint)
+        for end in node.nodes("endPoint"):
+            if end.type_name == "Slot":
+                self._read_children(end, place)
+            elif end.type_name in _FRAMES:
+                self._read_end(end, place, joint)
+            else:
+                self._read_part(end, place)
+
+    def _read_end(self, end: SceneNode, place: Place, joint: Joint) -> None:
+        reading = self._reading
+        inner = JointPlace(place, reading.translation(end), reading.rotation(end), joint)
+        if end.type_name == "Solid":
+            shapes = list(bounding_shapes(reading, end, inner))
+            found = self._as_driven(joint, place, shapes, end)
+            if found is not None:
+                self._driven.append(found)
+            if found is not None or joint.motor is None:
+                self._on_joints += shapes
+        self._read_frame(end, inner)
+
+    def _as_driven(
+        self, joint: Joint, place: Place, shapes: Sequence[Shape], end: SceneNode
+    ) -> Driven | None:
+        round_ones = [shape for shape in shapes if shape.kind != "box"]
+        if joint.motor is None or joint.slides or not round_ones or _moves(place):
+            return None
+        frame = place.world_pose
+        return Driven(
+            motor=joint.motor,
+            axle=turn(frame.rotation, joint.axis),
+            anchor=frame.carry(joint.anchor),
+            shape=max(round_ones, key=lambda shape: shape.size[0]),
+            roller=self._lowest_roller(end, JointPlace(place, *_where(self._reading, end), joint)),
+        )
+
+    def _lowest_roller(self, wheel: SceneNode, place: Place) -> Vector | None:
+        """Return the axis of the roller of a wheel that is on the floor; None if it has none."""
+        lowest: tuple[float, Vector] | None = None
+        for node in wheel.nodes():
+            parameters = next(iter(node.nodes("jointParameters")), None)
+            if node.type_name != "HingeJoint" or parameters is None or node.nodes("device"):
+                continue
+            axis = unit(_triple(self._reading.vector(parameters, "axis", (1.0, 0.0, 0.0))))
+            anchor = _triple(self._reading.vector(parameters, "anchor", (0.0, 0.0, 0.0)))
+            height = place.world_pose.carry(anchor)[2]
+            if axis is not None and (lowest is None or height < lowest[0]):
+                lowest = height, turn(place.world_pose.rotation, axis)
+        return None if lowest is None else lowest[1]
+
+    def _read_loose_joint(self, node: SceneNode, place: Place) -> None:
+        """Take a joint without motors, such as a caster, as fixed, with all that is on it."""
+        if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
+            self._lacks(node, f"the stub simulates no {node.type_name} with devices")
+        for end in node.nodes("endPoint"):
+            if end.type_name == "Solid":
+                inner = Place(place, *_where(self._reading, end))
+                self._on_joints += bounding_shapes(self._reading, end, inner)
+                self._parts.append((end, inner))
+                self._read_children(end, inner)
+            else:
+                self._read_part(end, place)
+
+    def _read_devices_of(
+        self, node: SceneNode, parameters: SceneNode, place: Place, joint: Joint
+    ) -> Motor | None:
+        stops = [self._reading.number(parameters, name, 0.0) for name in ("minStop", "maxStop")]
+        shaft = Shaft(slides=joint.slides)
+        for device in node.nodes("device"):
+            kind = _ON_JOINTS.get(device.type_name)
+            if kind is None:
+                self._lacks(device, f"the stub simulates no {device.type_name}")
+                continue
+            found = self._read_device(kind, device, place, shaft)
+            if isinstance(found, Motor) and shaft.motor is None:
+                shaft.motor = found
+                found.join(joint.start, (stops[0], stops[1]))
+        return shaft.motor
+
+    def _read_device(
+        self, kind: Kind[Any], node: SceneNode, place: Place, shaft: Shaft | None = None
+    ) -> object:
+        """Return the device at `node`, now one of the robot's."""
+        name = node.text("name") or kind.name
+        part = Part(
+            reading=self._reading,
+            lacks=self._lacks,
+            node=node,
+            name=name,
+            place=place,
+            shaft=shaft,
+            outline=self._outline,
+        )
+        device: object = kind.read(part)
+        if node.left_out:
+            return None
+        if name in self._devices.rows and self._by_ros:
+            self._reading.refuse(node, f"a second device {name!r}", "give it its own name")
+        self._devices.rows[name] = kind, device
+        self._devices.nodes[name] = node
+        if shaft is not None:
+            self._devices.shafts[name] = shaft
+            shaft.names.setdefault(kind.role, name)
+        return device
+
+
+def _moves(place: Place) -> bool:
+    """Return whether a motor can move a place on its robot."""
+    return any(isinstance(it, JointPlace) and it.joint.motor is not None for it in place.chain())
+
+
+def _where(reading: Reading, node: SceneNode) -> tuple[Vector, tuple[float, float, float, float]]:
+    return reading.translation(node), reading.rotation(node)
+
+
+def _triple(numbers: tuple[float, ...]) -> Vector:
+    return numbers[0], numbers[1], numbers[2]

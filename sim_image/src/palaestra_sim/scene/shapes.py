@@ -1,0 +1,156 @@
+"""From a boundingObject to shapes on the floor.
+
+A capsule counts as a cylinder of its length, a mesh as the box around its points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+
+from palaestra_sim.scene.axes import standing
+from palaestra_sim.scene.geometry import IDENTITY, Pose, Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reading import Reading
+
+_ALONG_AN_AXIS: Final = frozenset(("Capsule", "Cylinder"))
+_FLAT: Final = 0.9999  # cosine of the largest slope of a floor, less than a degree
+_ALONG: Final = 1.0 - 0.5e-6  # of a unit vector: parallel to the vertical, to within a milliradian
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """A box, cylinder or ball in the frame of its place. Meters: `size` is x, y, z or 2 r, 2 r, height."""
+
+    kind: Literal["box", "cylinder", "ball"]
+    size: Vector
+    local: Pose
+    place: Place
+    node: SceneNode
+
+    @property
+    def pose(self) -> Pose:
+        """The shape's frame in the world."""
+        return self.place.world_pose.after(self.local)
+
+    @property
+    def upright(self) -> bool:
+        """Whether one of its axes is vertical, so that it has one outline from below to above.
+
+        A stand-in always has one: its shapes are simple anyway, so one that leans has the outline of one that
+        does not.
+        """
+        rotation = self.pose.rotation
+        return (
+            self.kind == "ball"
+            or any(abs(rotation[6 + axis]) > _ALONG for axis in range(3))
+            or any(around.stand_in for around in self.node.ancestors())
+        )
+
+    def heights(self) -> tuple[float, float]:
+        """Return z of its lower and its upper end."""
+        pose = self.pose
+        z = pose.position[2]
+        if self.kind == "ball":
+            half = self.size[2] / 2.0
+        elif self.kind == "cylinder":
+            along = min(1.0, abs(pose.rotation[8]))
+            half = (self.size[2] * along + self.size[0] * math.sqrt(1.0 - along * along)) / 2.0
+        else:
+            half = sum(abs(pose.rotation[6 + axis]) * self.size[axis] for axis in range(3)) / 2.0
+        return z - half, z + half
+
+
+def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
+    """Yield the shapes of a node's boundingObject that the stub can simulate; the others are refused."""
+    grown = _Grown(Pose(), (place.scale, place.scale, place.scale))
+    for node in owner.nodes("boundingObject"):
+        yield from _shapes(reading, node, place, grown)
+
+
+class _Grown(NamedTuple):
+    """A frame inside a boundingObject, and by how much it makes what is in it larger, along its axes."""
+
+    frame: Pose
+    scale: Vector
+
+    def at(self, position: Vector) -> Pose:
+        """Return the frame around a position in this one."""
+        x, y, z = (at * factor for at, factor in zip(position, self.scale, strict=True))
+        return self.frame.after(Pose((x, y, z)))
+
+    def inside(self, pose: Pose, scale: Vector) -> _Grown:
+        """Return the frame of a node in this one; turned in a distorted frame, it would be none."""
+        x, y, z = (factor * inner for factor, inner in zip(self.scale, scale, strict=True))
+        return _Grown(self.at(pose.position).after(Pose(rotation=pose.rotation)), (x, y, z))
+
+    @property
+    def even(self) -> bool:
+        """Whether it keeps angles."""
+        return self.scale[0] == self.scale[1] == self.scale[2]
+
+
+def _shapes(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
+    match node.type_name:
+        case "Shape":
+            for inner in node.nodes("geometry"):
+                yield from _shapes(reading, inner, place, grown)
+        case "Group" | "Pose" | "Transform":
+            pose, scale = reading.pose(node), reading.scale(node)
+            if min(scale) <= 0.0 or not (grown.even or pose.rotation == IDENTITY):
+                reading.lacks(node, f"a {node.type_name} with a scale that distorts what is in it")
+                return
+            for inner in node.nodes():
+                yield from _shapes(reading, inner, place, grown.inside(pose, scale))
+        case "Plane":
+            # A ceiling is out of the way of everything that stands on the floor.
+            normal = place.world_pose.after(standing(node, grown.frame)).rotation[8]
+            if abs(normal) < _FLAT:
+                reading.lacks(node, "a Plane that is no floor and no ceiling")
+        case "IndexedFaceSet":
+            yield from _mesh(reading, node, place, grown)
+        case _:
+            yield from _solid(reading, node, place, grown)
+
+
+def _solid(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
+    """Yield the shape of a Box, Cylinder, Capsule or Sphere."""
+    kind: Literal["box", "cylinder", "ball"] = "cylinder"
+    local = standing(node, grown.frame) if node.type_name in _ALONG_AN_AXIS else grown.frame
+    if node.type_name == "Box":
+        kind = "box"
+        x, y, z = reading.vector(node, "size", (0.1, 0.1, 0.1))
+    elif node.type_name == "Cylinder":
+        x = y = 2.0 * reading.number(node, "radius", 1.0)
+        z = reading.number(node, "height", 2.0)
+    elif node.type_name == "Capsule":
+        x = y = 2.0 * reading.number(node, "radius", 1.0)
+        z = reading.number(node, "height", 2.0) + x
+    elif node.type_name == "Sphere":
+        kind = "ball"
+        x = y = z = 2.0 * reading.number(node, "radius", 1.0)
+    else:
+        reading.lacks(node, f"the stub simulates no {node.type_name} as a boundingObject")
+        return
+    if kind != "box" and not grown.even:
+        reading.lacks(node, f"a {node.type_name} that a scale distorts")
+        return
+    along, across, up = grown.scale
+    size = (x * along, y * across, z * up)
+    yield Shape(kind=kind, size=size, local=local, place=place, node=node)
+
+
+def _mesh(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> Iterator[Shape]:
+    """Yield the box around the points of a mesh."""
+    points = [number for coordinate in node.nodes("coord") for number in coordinate.numbers("point") or ()]
+    if not points or len(points) % 3:
+        reading.refuse(node, "an IndexedFaceSet without points", "give it a Coordinate with points")
+        return
+    low = [min(points[axis::3]) for axis in range(3)]
+    high = [max(points[axis::3]) for axis in range(3)]
+    middle = ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, (low[2] + high[2]) / 2.0)
+    x, y, z = ((high[axis] - low[axis]) * grown.scale[axis] for axis in range(3))
+    yield Shape(kind="box", size=(x, y, z), local=grown.at(middle), place=place, node=node)

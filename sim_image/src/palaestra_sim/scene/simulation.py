@@ -1,0 +1,330 @@
+"""The simulated world, without ROS: load it, command motors, step it, read sensors.
+
+    simulation = Simulation.load(world_bytes, StubPhysics())
+    robot = simulation.robots[0]
+    robot.motors["wheel0_joint"].set_position(math.inf)
+    robot.motors["wheel0_joint"].set_velocity(2.0)
+    simulation.step(192)
+    robot.sensors["ir1"].value
+
+The same world, commands and seed give the same values, bit for bit. Time advances only by steps; no clock is
+read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from palaestra_sim.errors import SimError, WorldError
+from palaestra_sim.scene.air import Air
+from palaestra_sim.scene.devices.connector import Connector
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.nodes.growing import Descriptions
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reader import Scene, read_added, read_scene
+from palaestra_sim.scene.reading import LeaveOut, Reading
+from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.shapes import bounding_shapes
+from palaestra_sim.scene.states import States, require_joint
+from palaestra_sim.scene.tree.effects import require_removable, require_room
+from palaestra_sim.scene.tree.fields import Field
+from palaestra_sim.scene.tree.scene_tree import SceneTree
+from palaestra_sim.world import World, parse
+
+
+class Simulation:
+    """One loaded world. A reload makes another Simulation.
+
+    Attributes:
+        tree: the nodes of the world.
+        robots: in the order of the world file.
+        time_ms: simulated so far, back to 0 at a reset.
+        mode: for the program that paces the steps; `step` itself works in all three.
+        quit_status: the exit status that `quit` asked for; None before.
+    """
+
+    def __init__(self, tree: SceneTree, scene: Scene, mode: Mode) -> None:
+        self.tree = tree
+        self.scene = scene
+        self.robots = tuple(Robot(parts, scene.random_seed, scene.physics) for parts in scene.robots)
+        self.time_ms = 0
+        self.mode = mode
+        self.quit_status: int | None = None
+        self._pending: list[Callable[[], None]] = []
+        self._reset_asked = False
+        self._added: list[SceneNode] = []
+        self._states = States(tree.nodes.values())
+        self._assemble()
+        self._step_s = scene.basic_step_ms / 1000.0
+        self._solids_moved = False
+        self._arrange()
+
+    @classmethod
+    def load(
+        cls, source: bytes, physics: Physics, name: str = "world", mode: Mode = Mode.REAL_TIME
+    ) -> Simulation:
+        """Return the simulation of a world file that needs no other file.
+
+        Raises:
+            WorldError: the file is wrong, or holds something that the stub cannot simulate.
+        """
+        return cls.of(parse(source, name), physics, name, mode)
+
+    @classmethod
+    def of(
+        cls,
+        world: World,
+        physics: Physics,
+        name: str = "world",
+        mode: Mode = Mode.REAL_TIME,
+        descriptions: Descriptions | None = None,
+        leave_out: LeaveOut | None = None,
+    ) -> Simulation:
+        """Return the simulation of a world.
+
+        Args:
+            world: as read.
+            physics: moves its robots.
+            name: of its file, in errors.
+            mode: how it runs at first.
+            descriptions: of the types that are no base types.
+            leave_out: what may be left out, if it cannot be simulated.
+
+        Raises:
+            WorldError: the world holds something that the stub cannot simulate.
+        """
+        tree = SceneTree(world, name, descriptions)
+        return cls(tree, read_scene(tree, physics, leave_out), mode)
+
+    @property
+    def left_out(self) -> tuple[WorldError, ...]:
+        """What the stub lacks and the user left out, each with its place."""
+        return self.scene.left_out
+
+    @property
+    def basic_step_ms(self) -> int:
+        """WorldInfo.basicTimeStep."""
+        return self.scene.basic_step_ms
+
+    def step(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`, then give the sensors their values.
+
+        Raises:
+            ValueError: the duration is no positive multiple of the basic step.
+        """
+        self.advance(duration_ms)
+        self.sample()
+
+    def advance(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`; the sensors keep their values.
+
+        Raises:
+            ValueError: the duration is no positive multiple of the basic step.
+        """
+        count, rest = divmod(duration_ms, self.scene.basic_step_ms)
+        if rest or count < 1:
+            raise ValueError(
+                f"step: {duration_ms} ms is no multiple of the basic step;"
+                f" use one of {self.scene.basic_step_ms} ms"
+            )
+        for _ in range(count):
+            self._basic_step()
+
+    def sample(self) -> None:
+        """Give every sensor its value of this moment."""
+        for sample in self._samplers:
+            sample()
+
+    def before_next_step(self, change: Callable[[], None]) -> None:
+        """Register a change, such as the write of a field, for the beginning of the next basic step."""
+        self._pending.append(change)
+
+    def reset(self) -> None:
+        """Request a reset of the world within the next basic step.
+
+        Restored: time, poses of all solids and robots, motors, noise (with the seed that is then in
+        customData). Not restored: other fields that were written.
+        """
+        self._reset_asked = True
+
+    def reset_physics(self) -> None:
+        """Stop all motion, at once."""
+        for robot in self.robots:
+            robot.halt()
+
+    def quit(self, status: int) -> None:
+        """Ask for the end of the simulator."""
+        self.quit_status = status
+
+    def robot_of(self, node: SceneNode) -> Robot | None:
+        """Return the robot of a Robot node; None for any other node."""
+        return next((robot for robot in self.robots if robot.parts.node is node), None)
+
+    def changed(self, node: SceneNode, field: str) -> None:
+        """Take the effect of a field that has a new value."""
+        if node.outline:
+            self._resize(node)
+            return
+        if node.place is None or field not in {"translation", "rotation"}:
+            return
+        if field == "translation":
+            x, y, z = node.numbers(field) or (0.0, 0.0, 0.0)
+            node.place.translation = (x, y, z)
+        else:
+            x, y, z, angle_rad = node.numbers(field) or (0.0, 0.0, 1.0, 0.0)
+            node.place.rotation = (x, y, z, angle_rad)
+        self._moved(node.place)
+
+    def add(self, text: str, field: Field, index: int) -> bool:
+        """Insert the nodes of `text` into a field, at once; False if the field has no place at `index`.
+
+        A reset removes them again. `index` counts from 0, or from the end: -1 is after the last one.
+
+        Raises:
+            WorldError: the text is wrong, or has something that the stub cannot simulate.
+            UnsimulatedError: the field takes no such nodes while the simulation runs.
+        """
+        at = field.room(index)
+        if at is None:
+            return False
+        added = self.tree.grow(text, field.node)
+        try:
+            require_room(field.node, field.name, added)
+            read = field.name == "children"  # other fields hold what is drawn
+            physics = self.scene.physics
+            fresh = (
+                read_added(self.tree, added, physics, self.scene.leave_out)
+                if read
+                else Scene(physics=physics)
+            )
+        except SimError:
+            self.tree.forget(added)
+            raise
+        self.tree.attach(added, field.name, at)
+        self._added += added
+        self._states.begin(inside for node in added for inside in (node, *node.descendants()))
+        self.scene.solids += fresh.solids
+        self.scene.robots += fresh.robots
+        self.robots += tuple(
+            Robot(parts, self.scene.random_seed, self.scene.physics) for parts in fresh.robots
+        )
+        self._assemble()
+        self._arrange()
+        return True
+
+    def remove(self, node: SceneNode) -> None:
+        """Remove a node and all inside it, at once; a reset does not bring it back.
+
+        Raises:
+            UnsimulatedError: the simulation cannot go on without it.
+        """
+        require_removable(node)
+        gone = {node, *node.descendants()}
+        self.tree.remove(node)
+        self.scene.solids = [shape for shape in self.scene.solids if shape.node not in gone]
+        self.scene.robots = [parts for parts in self.scene.robots if parts.node not in gone]
+        self.robots = tuple(robot for robot in self.robots if robot.parts.node not in gone)
+        self._assemble()
+        self._arrange()
+
+    def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
+        """Return where a node touches others: points in meters, each with the number of the touching node."""
+        asked = {node, *node.descendants()} if descendants else {node}
+        return [
+            (point, touching.number)
+            for point, nodes in self.scene.physics.contacts()
+            for touching in nodes
+            if touching in asked
+        ]
+
+    def save_state(self, node: SceneNode, name: str) -> None:
+        """Save the places and joints of a node, and of all inside it, under a name."""
+        self._states.save(node, name)
+
+    def load_state(self, node: SceneNode, name: str) -> None:
+        """Return a node to a saved state, at rest; "__init__" is that of the world file.
+
+        Raises:
+            UnsimulatedError: no state of that name was saved.
+        """
+        self._states.load(node, name)
+        for robot in self.robots:
+            if robot.parts.node in {node, *node.descendants(), *node.ancestors()}:
+                robot.halt()
+        self._solids_moved = True
+        self._arrange()
+
+    def set_joint_position(self, node: SceneNode, position: float, index: int) -> None:
+        """Put a joint to a position, in rad or m; its motor holds it there.
+
+        Raises:
+            UnsimulatedError: the node is no joint with an axis `index`, counted from 1.
+        """
+        if math.isfinite(position):
+            require_joint(node, index).joint.put(position)
+
+    def _assemble(self) -> None:
+        """Connect the devices of all robots."""
+        devices = [it for robot in self.robots for _, it in robot.parts.devices.rows.values()]
+        self._air = Air(devices)
+        connectors = tuple(it for it in devices if isinstance(it, Connector))
+        for connector in connectors:
+            connector.others = connectors
+        self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
+
+    def _resize(self, node: SceneNode) -> None:
+        """Read the outline of an obstacle anew, of which a part has another size."""
+        owner = next((around for around in node.ancestors() if around.type_name == "Solid"), None)
+        if owner is not None and owner.place is not None:
+            fresh = bounding_shapes(Reading(), owner, owner.place)
+            solids = self.scene.solids
+            first = next((at for at, shape in enumerate(solids) if shape.place is owner.place), len(solids))
+            kept = [shape for shape in solids if shape.place is not owner.place]
+            self.scene.solids = [*kept[:first], *fresh, *kept[first:]]
+            self._arrange()
+
+    def _moved(self, place: Place) -> None:
+        """Update the places of the solids, if `place` is part of one of them."""
+        if any(place in shape.place.chain() for shape in self.scene.solids):
+            self._solids_moved = True
+            self._arrange()
+
+    def _arrange(self) -> None:
+        self.scene.physics.arrange(self.robots, self.scene.solids)
+
+    def _basic_step(self) -> None:
+        if self._pending:
+            pending, self._pending = self._pending, []
+            for change in pending:
+                change()
+        step_s = self._step_s
+        for robot in self.robots:
+            robot.begin(step_s)
+        self.scene.physics.advance(step_s)
+        for robot in self.robots:
+            robot.turn(step_s)
+        self._air.deliver()
+        if self._reset_asked:
+            self._restore()
+        self.time_ms += self.scene.basic_step_ms
+
+    def _restore(self) -> None:
+        self._reset_asked = False
+        self.time_ms = 0
+        added, self._added = self._added, []
+        for node in added:
+            if self.tree.of_number(node.number) is node:
+                self.remove(node)
+        for node in self.tree.nodes.values():
+            if node.place is not None:
+                node.place.return_to_start()
+        self._air.clear()
+        for robot in self.robots:
+            robot.reset()
+        if self._solids_moved:
+            self._solids_moved = False
+            self._arrange()

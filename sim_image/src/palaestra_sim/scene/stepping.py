@@ -1,0 +1,96 @@
+"""The steps that robots asked for; the world moves once all robots that it waits for have asked.
+
+A robot whose `synchronization` is TRUE holds the world until it asks. Steps of different lengths are
+served piece by piece: the world advances by the shortest that is left. While the simulation is
+paused all of them wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.robot import Robot
+
+Done = Callable[[bool], None]
+
+
+class Simulated(Protocol):
+    """A simulation as its steps need it; another simulator can take the place of the stub's own.
+
+    Attributes:
+        mode: in PAUSE nothing moves.
+        quit_status: None until a client asked for the end; from then on nothing moves.
+    """
+
+    mode: Mode
+    quit_status: int | None
+
+    def advance(self, duration_ms: int) -> None:
+        """Simulate for `duration_ms`; the sensors keep their values."""
+        ...
+
+    def sample(self) -> None:
+        """Give every sensor its value of this moment."""
+        ...
+
+
+@dataclass(slots=True)
+class _Wish:
+    left_ms: int
+    done: Done
+
+
+class Stepping:
+    """The steps that the controllers of one simulation have requested."""
+
+    def __init__(self, simulation: Simulated) -> None:
+        self._simulation = simulation
+        self._awaited: set[Robot] = set()
+        self._wishes: dict[Robot, _Wish] = {}
+
+    def join(self, robot: Robot) -> None:
+        """Let the world wait for this robot from now on."""
+        self._awaited.add(robot)
+
+    def leave(self, robot: Robot) -> None:
+        """Stop waiting for this robot, and drop its request."""
+        self._awaited.discard(robot)
+        self._wishes.pop(robot, None)
+        self.advance()
+
+    def ask(self, robot: Robot, duration_ms: int, done: Done) -> None:
+        """Request a step; `done(True)` is called when the world has advanced by `duration_ms`, maybe at once.
+
+        If the simulator ends before, `done(False)` is called.
+        """
+        self._wishes[robot] = _Wish(duration_ms, done)
+        self.advance()
+
+    def advance(self) -> None:
+        """Advance the world as far as all requests allow."""
+        while self._wishes and self._awaited <= self._wishes.keys() and self._may_move():
+            duration_ms = min(wish.left_ms for wish in self._wishes.values())
+            self._simulation.advance(duration_ms)
+            self._simulation.sample()
+            self._grant(duration_ms)
+
+    def end(self) -> None:
+        """Call back for every pending step: the simulator ends."""
+        wishes, self._wishes = self._wishes, {}
+        for wish in wishes.values():
+            wish.done(False)
+
+    def _may_move(self) -> bool:
+        return self._simulation.mode is not Mode.PAUSE and self._simulation.quit_status is None
+
+    def _grant(self, duration_ms: int) -> None:
+        served = []
+        for robot, wish in self._wishes.items():
+            wish.left_ms -= duration_ms
+            if wish.left_ms <= 0:
+                served.append(robot)
+        for robot in served:
+            self._wishes.pop(robot).done(True)

@@ -1,0 +1,64 @@
+"""What the stub makes of a world, for its author: `palaestra-stub --check`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from palaestra_sim.errors import refusal
+from palaestra_sim.scene.devices.kind import never
+from palaestra_sim.scene.robot import Robot
+from palaestra_sim.scene.simulation import Simulation
+
+_ROLLS_AND_TURNS: Final = 2
+
+
+def summary(simulation: Simulation) -> Iterator[str]:
+    """Yield lines about robots, stand-ins, and all that was left out.
+
+    The world is read with everything left out that the stub lacks, so that the rest can be described.
+    """
+    for robot in simulation.robots:
+        yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'
+    stand_ins = Counter(node.proto_name for node in simulation.tree.nodes.values() if node.stand_in)
+    if stand_ins:
+        yield f"stand-ins, which stand still: {_counted(stand_ins)}"
+    silent = silent_devices(simulation.robots)
+    if silent:
+        yield f"devices without readings, whose enable answers failure: {silent}"
+    error = refusal(simulation.left_out)
+    if error is not None:
+        yield "cannot be simulated; --leave-out leaves it out:"
+        yield from str(error).splitlines()
+
+
+def silent_devices(robots: Iterable[Robot]) -> str:
+    """Return how many devices have no readings here, by type; "" if all have."""
+    return _counted(
+        Counter(
+            kind.node
+            for robot in robots
+            if robot.parts.arguments is not None
+            for kind, _ in robot.parts.devices.rows.values()
+            if kind.enable is never
+        )
+    )
+
+
+def _of_robot(robot: Robot) -> Iterator[str]:
+    controller = robot.parts.node.text("controller") or "<generic>"
+    yield f'controller "{controller}"' + ("" if controller == "ros" else " does not run here")
+    drive = robot.body.base.drive if robot.body is not None else None
+    if drive is None:
+        yield "no wheels"
+    else:
+        kind = "differential" if drive.freedoms == _ROLLS_AND_TURNS else "omnidirectional"
+        yield f"{kind} drive on {len(drive.to_speeds)} wheels"
+    devices = Counter(kind.node for kind, _ in robot.parts.devices.rows.values())
+    if devices:
+        yield _counted(devices)
+
+
+def _counted(names: Counter[str]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in sorted(names.items()))

@@ -1,0 +1,220 @@
+"""Fields of nodes: typed values that a supervisor reads and writes.
+
+The next read answers a written value at once; the simulation sees it when the next basic step begins.
+`translation` and `rotation` move things, `customData` reaches the robot, and a field that only draws has no
+effect in Webots either. Every other write is refused: it would be read back, and change nothing (`effects`).
+
+As in Webots, a value that is invalid for the field is ignored without an error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from palaestra_sim.errors import SimError
+from palaestra_sim.scene.geometry import AxisAngle
+from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
+from palaestra_sim.scene.tree.catalogue import WIDTH, FieldKind, FieldType
+from palaestra_sim.scene.tree.effects import require_effect
+
+
+class NoValueError(SimError, LookupError):
+    """A field has no value of that type at that index; Webots would read a null pointer."""
+
+
+class Changes(Protocol):
+    """The simulation, to which the writes of fields come."""
+
+    def before_next_step(self, change: Callable[[], None], /) -> None:
+        """Call `change` at the beginning of the next basic step."""
+        ...
+
+    def changed(self, node: SceneNode, field: str, /) -> None:
+        """Take the effect of a field that has a new value."""
+        ...
+
+
+class Field:
+    """One field of one node.
+
+    Attributes:
+        node: its node.
+        name: as in the world file.
+        kind: its declaration.
+    """
+
+    def __init__(self, node: SceneNode, name: str, kind: FieldKind, changes: Changes) -> None:
+        self.node = node
+        self.name = name
+        self.kind = kind
+        self._changes = changes
+        self._values = _initial(node, name, kind)
+        self._writes = 0  # written, not yet seen by the simulation
+
+    @property
+    def count(self) -> int:
+        """Return the number of values, like `get_count`: -1 for a field of exactly one."""
+        return len(self._current()) if self.kind.multiple else -1
+
+    def get(self, type_: FieldType, index: int = 0) -> Any:
+        """Return the value at `index` (ignored by a field of exactly one).
+
+        A bool, int, float, str, a tuple of floats, or for `NODE` a SceneNode or None.
+
+        Raises:
+            NoValueError: the field has another type, or no value at that index.
+        """
+        values = self._current()
+        at = index if self.kind.multiple else 0
+        if type_ is not self.kind.type or not -len(values) <= at < len(values):
+            raise NoValueError(f"{self.name} ({self.kind.name}) has no {type_.name} at {index}")
+        return values[at]
+
+    def set(self, type_: FieldType, index: int, value: Any) -> None:
+        """Write a value: visible at once, in effect from the next basic step on.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
+        at = index if self.kind.multiple else 0
+        if type_ is not self.kind.type or not _acceptable(type_, value):
+            return
+        values = list(self._current())
+        if not -len(values) <= at < len(values):
+            return
+        if self.node.outline and not _positive(value):
+            return
+        self._require_effect()
+        values[at] = value
+        self._values = values
+        self._writes += 1
+        self._changes.before_next_step(self._take_effect)
+
+    def room(self, index: int) -> int | None:
+        """Return where a node inserted at `index` comes to be, -1 for the end; None if that is impossible."""
+        size = len(self._current())
+        if self.kind.type is not FieldType.NODE:
+            return None
+        if not self.kind.multiple:
+            return 0 if self._current() == [None] else None
+        return (index if index >= 0 else size + 1 + index) if -size - 1 <= index <= size else None
+
+    def insert(self, type_: FieldType, index: int, value: Any) -> bool:
+        """Insert a value before `index`, -1 for the end; return False if that is impossible.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
+        size = len(self._values)
+        fits = self.kind.multiple and type_ is self.kind.type and -size - 1 <= index <= size
+        if not fits or not _acceptable(type_, value):
+            return False
+        self._require_effect()
+        self._values.insert(index if index >= 0 else size + 1 + index, value)
+        return True
+
+    def remove(self, index: int) -> bool:
+        """Remove the value at `index`; return False if there is none, or if it must stay.
+
+        Raises:
+            UnsimulatedError: it would have no effect.
+        """
+        size = len(self._values)
+        removable = self.kind.multiple and self.kind.type is not FieldType.NODE
+        if not removable or not -size <= index < size:
+            return False
+        self._require_effect()
+        del self._values[index]
+        return True
+
+    def _require_effect(self) -> None:
+        require_effect(self.node, self.name)
+
+    def _current(self) -> list[Any]:
+        """Return the values: those written last, else those of the simulation."""
+        if self.kind.type is FieldType.NODE:
+            return _initial(self.node, self.name, self.kind)
+        if self._writes == 0:
+            place = self.node.place
+            if place is not None and self.name == "translation":
+                return [place.translation]
+            if place is not None and self.name == "rotation":
+                return [place.rotation]
+            if self.name == "customData":
+                return [self.node.text("customData") or ""]
+            if self.name == "battery":
+                return list(self.node.numbers("battery") or ())
+        return self._values
+
+    def _take_effect(self) -> None:
+        """Hand the written values to the simulation; of several writes the last one counts."""
+        self._writes -= 1
+        if self._writes == 0:
+            for twin in self.node.twins:
+                twin.fields[self.name] = FieldContent(_flat(self._values), bracketed=self.kind.multiple)
+                self._changes.changed(twin, self.name)
+
+
+def quaternion_to_axis_angle(x: float, y: float, z: float, w: float) -> AxisAngle:
+    """Return the axis and angle that the controller computes from a quaternion, with its RosMathUtils bug.
+
+    An angle below 1e-4 becomes 0, but the axis is xyz / |xyz| even then. For the exact identity that is NaN,
+    so a zero rotation that was read cannot be written back. If |w| > 1, the angle is NaN.
+    """
+    angle_rad = 2.0 * math.acos(w) if -1.0 <= w <= 1.0 else math.nan
+    if angle_rad < 1e-4:  # noqa: PLR2004 - Source: RosMathUtils
+        angle_rad = 0.0
+    length = math.sqrt(x * x + y * y + z * z)
+    if length == 0.0:
+        return math.nan, math.nan, math.nan, angle_rad
+    return x / length, y / length, z / length, angle_rad
+
+
+def _acceptable(type_: FieldType, value: Any) -> bool:
+    """Return whether libController accepts a value: no NaN, no infinity, no axis without direction."""
+    if type_ is FieldType.ROTATION and not any(value[:3]):
+        return False
+    if isinstance(value, tuple):
+        return all(map(math.isfinite, value))
+    return type_ is not FieldType.FLOAT or math.isfinite(value)
+
+
+def _positive(value: Any) -> bool:
+    """Return whether a size is one; Webots refuses others."""
+    numbers: tuple[float, ...] = value if isinstance(value, tuple) else (value,)
+    return min(numbers) > 0.0
+
+
+def _initial(node: SceneNode, name: str, kind: FieldKind) -> list[Any]:
+    """Return the values that the world file gives, or the default."""
+    written = node.fields.get(name)
+    if kind.type is FieldType.NODE:
+        inside: list[Any] = [] if written is None else list(written.items)
+        return inside if kind.multiple or inside else [None]
+    items = list(written.items) if written is not None else _default(kind)
+    width = WIDTH.get(kind.type, 1)
+    if width > 1:
+        return [tuple(items[at : at + width]) for at in range(0, len(items) - width + 1, width)]
+    return [_scalar(kind.type, item) for item in items]
+
+
+def _default(kind: FieldKind) -> list[Any]:
+    if kind.type is FieldType.STRING:
+        return [] if kind.multiple and not kind.default else [kind.default]
+    if kind.type is FieldType.BOOL:
+        return [kind.default == "TRUE"]
+    return [float(word) for word in kind.default.split()]
+
+
+def _flat(values: list[Any]) -> list[Any]:
+    """Return the values as a world file has them: a vector as its numbers, every number a float."""
+    items: list[Any] = []
+    for value in values:
+        items += value if isinstance(value, tuple) else [value]
+    return [float(item) if type(item) is int else item for item in items]
+
+
+def _scalar(type_: FieldType, item: Any) -> Any:
+    return int(item) if type_ is FieldType.INT32 else item

@@ -1,0 +1,117 @@
+"""The tree of a world that is loaded: nodes found by DEF or number, and their fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.scene.nodes.growing import Descriptions, Grower
+from palaestra_sim.scene.nodes.scene_node import FieldContent, SceneNode
+from palaestra_sim.scene.nodes.scope import Scope
+from palaestra_sim.scene.tree.catalogue import kinds_of
+from palaestra_sim.scene.tree.fields import Changes, Field
+from palaestra_sim.world import World, parse_nodes
+from palaestra_sim.world.source import Source
+
+_TEXT: Final = "node"  # the name of an imported text in errors
+
+
+class SceneTree:
+    """All nodes of one load of a world.
+
+    Args:
+        world: as read.
+        name: of its file, in errors.
+        descriptions: of the types that are no base types.
+
+    Attributes:
+        source: the bytes of the world.
+        nodes: by number.
+        root: a Group that has the nodes of the file as its children.
+        refused: mistakes in the file that make a node impossible, such as `USE` of a missing name.
+    """
+
+    def __init__(self, world: World, name: str = "world", descriptions: Descriptions | None = None) -> None:
+        self.source = world.source
+        self._grower = Grower(descriptions or Descriptions())
+        self.root = self._grower.root(world, name)
+        self.nodes: dict[int, SceneNode] = self._grower.nodes
+        self.refused: list[WorldError] = self._grower.refused
+        self._fields: dict[tuple[int, str], Field] = {}
+        _mark_outlines(self.nodes.values())
+
+    def grow(self, text: str, parent: SceneNode) -> list[SceneNode]:
+        """Return the nodes that `text` describes; they know `parent`, but no field of it has them yet.
+
+        Raises:
+            WorldError: the text is wrong; it has all mistakes.
+        """
+        world = parse_nodes(text, _TEXT)
+        known = len(self.refused)
+        scope = Scope.of(Source(data=world.source, name=_TEXT, headless=True), world.nodes)
+        grown = [it for it in self._grower.grow(world.nodes, scope, parent) if isinstance(it, SceneNode)]
+        mistakes, self.refused[known:] = self.refused[known:], []
+        if error := refusal(mistakes):
+            self.forget(grown)
+            raise error
+        _mark_outlines([inside for node in grown for inside in (node, *node.descendants())])
+        return grown
+
+    def attach(self, nodes: Sequence[SceneNode], field: str, index: int) -> None:
+        """Put nodes into a field of their parent, before `index`."""
+        for node in nodes:
+            content = _of_parent(node).fields.setdefault(field, FieldContent([], bracketed=True))
+            content.items[index:index] = [node]
+            index += 1
+
+    def remove(self, node: SceneNode) -> None:
+        """Take a node, and all inside it, out of the tree."""
+        for content in _of_parent(node).fields.values():
+            content.items = [item for item in content.items if item is not node]
+        self.forget([node])
+
+    def forget(self, nodes: Iterable[SceneNode]) -> None:
+        """Let the numbers of nodes, and of all inside them, mean nothing."""
+        for node in nodes:
+            for gone in (node, *node.descendants()):
+                gone.twins.remove(gone)
+                self.nodes.pop(gone.number, None)
+
+    def field_of(self, node: SceneNode, name: str, changes: Changes) -> Field | None:
+        """Return a node's field; None if a node of this type has none of that name."""
+        found = self._fields.get((node.number, name))
+        kind = kinds_of(node).get(name) if found is None else None
+        if kind is not None:
+            found = self._fields[node.number, name] = Field(node, name, kind, changes)
+        return found
+
+    def of_def(self, path: str) -> SceneNode | None:
+        """Return the first node with a DEF name; dots lead inside, as in "ROBOT.ARM"."""
+        found: SceneNode | None = self.root
+        for name in path.split("."):
+            if found is None or not name:
+                return None
+            found = next(
+                (descendant for descendant in found.descendants() if descendant.def_name == name), None
+            )
+        return found
+
+    def of_number(self, number: int) -> SceneNode | None:
+        """Return the node whose `get_id` is `number`."""
+        return self.nodes.get(number)
+
+
+def _of_parent(node: SceneNode) -> SceneNode:
+    """Return the parent of a node that is not the root."""
+    if node.parent is None:
+        raise ValueError("the root has no parent; change the nodes inside it")
+    return node.parent
+
+
+def _mark_outlines(nodes: Iterable[SceneNode]) -> None:
+    for node in nodes:
+        for outline in node.nodes("boundingObject"):
+            for inner in (outline, *outline.descendants()):
+                for twin in inner.twins:
+                    twin.outline = True

@@ -1,0 +1,92 @@
+"""What may drive a robot: hinges with motors and a round end, and the belts of tracks.
+
+A wheel is found by its geometry: a level axle, a round end with its center on the axle, down to the floor. A
+belt counts as a wheel whose rim runs as many meters as its motor, in the middle of the track.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.drive import Wheel
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.shapes import Shape
+
+_LEVEL: Final = 1e-3  # sine of the largest angle of a level axle to the floor
+_OFF_CENTER: Final = 0.2  # of a wheel's radius: how far its center may be off the axle, its rim off the floor
+
+
+@dataclass(slots=True, kw_only=True)
+class Driven:
+    """A hinge or a track with a motor, which may be a wheel: what touches the floor, in the robot's frame.
+
+    Attributes:
+        anchor: a point on the axle; of a track, its origin.
+        shape: the round end; of a track, the lowest of its shapes.
+        roller: the axis of the roller that stands on the floor; None for a plain tire or a belt.
+        belt: whether it is a track.
+    """
+
+    motor: Motor
+    axle: Vector
+    anchor: Vector
+    shape: Shape
+    roller: Vector | None = None
+    belt: bool = False
+
+    @property
+    def bottom(self) -> float:
+        """Z of its lower end."""
+        return self.shape.heights()[0] if self.belt else self.shape.pose.position[2] - self.radius
+
+    @property
+    def top(self) -> float:
+        """Z of its upper end."""
+        return self.bottom + 2.0 * self.radius
+
+    @property
+    def radius(self) -> float:
+        """Half the height of what touches the floor."""
+        low, high = self.shape.heights()
+        return (high - low) / 2.0 if self.belt else self.shape.size[0] / 2.0
+
+    def may_drive(self) -> bool:
+        """Return whether it turns without stops about a level axle, and about its own center."""
+        stops = self.motor.spec.stops
+        fits = abs(self.axle[2]) < _LEVEL and self.radius > 0.0 and stops[0] == stops[1]
+        return fits and (self.belt or self._turns_about_its_center())
+
+    def wheel(self) -> Wheel:
+        """Return it as a wheel on the floor."""
+        x, y, _ = self.anchor if self.belt else self.shape.pose.position
+        return Wheel(
+            x_m=x,
+            y_m=y,
+            axle=_level(self.axle),
+            radius_m=1.0 if self.belt else self.radius,
+            roller=None if self.roller is None else _level(self.roller),
+        )
+
+    def _turns_about_its_center(self) -> bool:
+        center = self.shape.pose.position
+        offset = (center[0] - self.anchor[0], center[1] - self.anchor[1], center[2] - self.anchor[2])
+        along = sum(a * b for a, b in zip(offset, self.axle, strict=True))
+        square = sum(part * part for part in offset) - along * along
+        return math.sqrt(max(0.0, square)) <= _OFF_CENTER * self.radius
+
+
+def wheels_among(driven: Sequence[Driven]) -> list[Driven]:
+    """Return those that drive: they may, and they reach down to the floor."""
+    possible = [found for found in driven if found.may_drive()]
+    floor = min((found.bottom for found in possible), default=0.0)
+    return [found for found in possible if found.bottom <= floor + _OFF_CENTER * found.radius]
+
+
+def _level(vector: Vector) -> tuple[float, float]:
+    """Return the direction of a vector on the floor."""
+    length = math.hypot(vector[0], vector[1]) or 1.0
+    return vector[0] / length, vector[1] / length

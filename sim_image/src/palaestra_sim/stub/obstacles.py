@@ -1,0 +1,216 @@
+"""The obstacles of robots and rays, seen from above: discs and blocks.
+
+Each shape computes how deep a round robot is inside it, and how far rays travel until they meet it. Heights
+are checked before: every shape here is as high as the robots.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+from palaestra_sim.scene.beams import Ray
+
+# A contact: x and y of the unit normal that points at the robot, depth in meters.
+Contact = tuple[float, float, float]
+
+_SAME_PLACE_M2 = 1e-24  # a square; those of still smaller distances lose their digits
+
+
+class Obstacle(Protocol):
+    """A shape on the floor."""
+
+    def gap(self, x: float, y: float) -> float:
+        """Return the meters from a point to the shape; 0 or less inside it."""
+        ...
+
+    def contact(self, x: float, y: float, radius: float) -> Contact | None:
+        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        ...
+
+    def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
+        """Shorten `reach` (meters, one a ray) to where the rays meet the shape.
+
+        Args:
+            frame: x, y, cos and sin of the robot's heading.
+            rays: in the robot's frame.
+            reach: changed in place.
+        """
+        ...
+
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the shape, in meters along it; enter > leave: it misses."""
+        ...
+
+
+class Disc:
+    """A vertical cylinder, or another robot."""
+
+    __slots__ = ("radius", "x", "y")
+
+    def __init__(self, x: float, y: float, radius: float) -> None:
+        self.x = x
+        self.y = y
+        self.radius = radius
+
+    def gap(self, x: float, y: float) -> float:
+        """Return the meters from a point to the disc; negative inside it."""
+        return math.hypot(x - self.x, y - self.y) - self.radius
+
+    def contact(self, x: float, y: float, radius: float) -> Contact | None:
+        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        dx = x - self.x
+        dy = y - self.y
+        reach = radius + self.radius
+        squared = dx * dx + dy * dy
+        if squared >= reach * reach:
+            return None
+        if squared < _SAME_PLACE_M2:
+            return (1.0, 0.0, reach)
+        distance = math.sqrt(squared)
+        return (dx / distance, dy / distance, reach - distance)
+
+    def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
+        """Shorten `reach` to where the rays of a robot at `frame` meet the disc."""
+        x, y, c, s = frame
+        dx = self.x - x
+        dy = self.y - y
+        mx = dx * c + dy * s
+        my = dy * c - dx * s
+        squared = self.radius * self.radius
+        for i, (px, py, ux, uy) in enumerate(rays):
+            ex = mx - px
+            ey = my - py
+            along = ex * ux + ey * uy
+            aside = ex * uy - ey * ux
+            half = squared - aside * aside
+            if along > 0.0 and half > 0.0:
+                reach[i] = min(reach[i], max(0.0, along - math.sqrt(half)))
+
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the disc, in meters along it; enter > leave: it misses."""
+        x, y, c, s = frame
+        dx = self.x - x
+        dy = self.y - y
+        ex = dx * c + dy * s - ray[0]
+        ey = dy * c - dx * s - ray[1]
+        along = ex * ray[2] + ey * ray[3]
+        aside = ex * ray[3] - ey * ray[2]
+        half = self.radius * self.radius - aside * aside
+        if half <= 0.0:
+            return math.inf, -math.inf
+        return along - math.sqrt(half), along + math.sqrt(half)
+
+
+class Block:
+    """A box with any heading: a wall, a crate."""
+
+    __slots__ = ("c", "half_x", "half_y", "heading_rad", "s", "x", "y")
+
+    def __init__(self, x: float, y: float, heading_rad: float, size: tuple[float, float]) -> None:
+        self.x = x
+        self.y = y
+        self.heading_rad = heading_rad
+        self.c = math.cos(heading_rad)
+        self.s = math.sin(heading_rad)
+        self.half_x = size[0] / 2.0
+        self.half_y = size[1] / 2.0
+
+    def gap(self, x: float, y: float) -> float:
+        """Return the meters from a point to the block; 0 inside it."""
+        lx, ly = self._local(x, y)
+        return math.hypot(max(abs(lx) - self.half_x, 0.0), max(abs(ly) - self.half_y, 0.0))
+
+    def contact(self, x: float, y: float, radius: float) -> Contact | None:
+        """Return how a round robot at x, y is to be pushed out, None if it does not touch."""
+        lx, ly = self._local(x, y)
+        dx = lx - max(-self.half_x, min(self.half_x, lx))
+        dy = ly - max(-self.half_y, min(self.half_y, ly))
+        squared = dx * dx + dy * dy
+        if squared >= radius * radius:
+            return None
+        if squared == 0.0:
+            nx, ny, depth = self._way_out(lx, ly, radius)
+        else:
+            distance = math.sqrt(squared)
+            nx, ny, depth = dx / distance, dy / distance, radius - distance
+        return (nx * self.c - ny * self.s, nx * self.s + ny * self.c, depth)
+
+    def scan(self, frame: tuple[float, float, float, float], rays: Sequence[Ray], reach: list[float]) -> None:
+        """Shorten `reach` to where the rays of a robot at `frame` meet the block."""
+        x, y = self._local(frame[0], frame[1])
+        c = frame[2] * self.c + frame[3] * self.s
+        s = frame[3] * self.c - frame[2] * self.s
+        for i, (px, py, ux, uy) in enumerate(rays):
+            enter_x, leave_x = _slab(x + px * c - py * s, ux * c - uy * s, self.half_x)
+            enter_y, leave_y = _slab(y + px * s + py * c, ux * s + uy * c, self.half_y)
+            enter = max(0.0, enter_x, enter_y)
+            if enter <= leave_x and enter <= leave_y:
+                reach[i] = min(reach[i], enter)
+
+    def crossing(self, frame: tuple[float, float, float, float], ray: Ray) -> tuple[float, float]:
+        """Return where a ray enters and leaves the block, in meters along it; enter > leave: it misses."""
+        x, y = self._local(frame[0], frame[1])
+        c = frame[2] * self.c + frame[3] * self.s
+        s = frame[3] * self.c - frame[2] * self.s
+        px, py, ux, uy = ray
+        enter_x, leave_x = _slab(x + px * c - py * s, ux * c - uy * s, self.half_x)
+        enter_y, leave_y = _slab(y + px * s + py * c, ux * s + uy * c, self.half_y)
+        return max(enter_x, enter_y), min(leave_x, leave_y)
+
+    def _local(self, x: float, y: float) -> tuple[float, float]:
+        dx = x - self.x
+        dy = y - self.y
+        return dx * self.c + dy * self.s, dy * self.c - dx * self.s
+
+    def _way_out(self, x: float, y: float, radius: float) -> Contact:
+        """Return the contact of a robot whose center is inside: through the nearest face."""
+        out_x = self.half_x - abs(x)
+        out_y = self.half_y - abs(y)
+        if out_x < out_y:
+            return (math.copysign(1.0, x), 0.0, out_x + radius)
+        return (0.0, math.copysign(1.0, y), out_y + radius)
+
+
+def _slab(origin: float, direction: float, half: float) -> tuple[float, float]:
+    """Return how far a ray travels until it enters and leaves the range from -half to half."""
+    if direction == 0.0:
+        return (-math.inf, math.inf) if -half <= origin <= half else (math.inf, -math.inf)
+    first = (-half - origin) / direction
+    second = (half - origin) / direction
+    return (first, second) if first < second else (second, first)
+
+
+class Neighborhood:
+    """The obstacles within reach of a point, cached by squares of the floor.
+
+    Most squares have none or one, so the cost of a step does not grow with the world.
+    """
+
+    __slots__ = ("_margin", "_obstacles", "_squares")
+
+    SIDE_M = 0.125
+    LIMIT = 20_000  # squares kept: a robot that escaped to infinity must not fill the memory
+
+    def __init__(self, obstacles: Sequence[Obstacle], reach_m: float) -> None:
+        self._obstacles = tuple(obstacles)
+        self._margin = reach_m + self.SIDE_M * math.sqrt(0.5)
+        self._squares: dict[int, tuple[Obstacle, ...]] = {}
+
+    def near(self, x: float, y: float) -> tuple[Obstacle, ...]:
+        """Return at least all obstacles that are within reach of x, y, in their order."""
+        column = int(x * 8.0 + 4096.0)  # 8 = 1 / SIDE_M; the shift keeps usual floors positive
+        row = int(y * 8.0 + 4096.0)
+        key = column * 65536 + row
+        found = self._squares.get(key)
+        return self._look(key, column, row) if found is None else found
+
+    def _look(self, key: int, column: int, row: int) -> tuple[Obstacle, ...]:
+        x = (column + 0.5) * self.SIDE_M - 512.0
+        y = (row + 0.5) * self.SIDE_M - 512.0
+        found = tuple(obstacle for obstacle in self._obstacles if obstacle.gap(x, y) <= self._margin)
+        if len(self._squares) >= self.LIMIT:
+            self._squares.clear()
+        self._squares[key] = found
+        return found

@@ -1,0 +1,95 @@
+"""Outlines, seen from above: discs and blocks of obstacles, and discs of robots.
+
+A shape has one outline, which holds from its lower to its upper end. That is exact for boxes and cylinders
+that stand or lie. Of a ball, a capsule and a mesh it is the widest outline.
+
+A robot's outline is a set of discs, fixed in its frame. A disc keeps its shape however the robot turns, so a
+contact costs the same at every heading. A box becomes a row of discs, with its length and its width, and with
+round corners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Final, NamedTuple
+
+from palaestra_sim.scene.geometry import Pose
+from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.stub.obstacles import Block, Disc
+
+_Z: Final = 2
+_MOST_DISCS: Final = 16  # of one box; a bar more than eight times as long as wide has gaps between them
+
+
+class RoundPart(NamedTuple):
+    """A disc in the robot's frame: x and y of its center and its radius, in meters."""
+
+    x_m: float
+    y_m: float
+    radius_m: float
+
+
+def discs_of_box(
+    x_m: float, y_m: float, heading_rad: float, length_m: float, width_m: float
+) -> tuple[RoundPart, ...]:
+    """Return discs that cover a box but for its corners, and reach no further than the box.
+
+    The box has its center at x, y and its length along the heading. The discs stand along its longer axis, at
+    most a radius apart, so a long side dips by 7 % of the width at most.
+    """
+    if width_m > length_m:
+        return discs_of_box(x_m, y_m, heading_rad + math.pi / 2.0, width_m, length_m)
+    radius_m = width_m / 2.0
+    row_m = length_m - width_m  # from the first center to the last
+    gaps = _MOST_DISCS - 1
+    if row_m < gaps * radius_m:
+        gaps = math.ceil(row_m / radius_m)
+    c = math.cos(heading_rad)
+    s = math.sin(heading_rad)
+    places = (row_m * (index / gaps - 0.5) if gaps else 0.0 for index in range(gaps + 1))
+    return tuple(RoundPart(x_m + c * place, y_m + s * place, radius_m) for place in places)
+
+
+def obstacle(shape: Shape) -> Disc | Block:
+    """Return the outline of a shape, where it is now."""
+    pose = shape.pose
+    x, y, _ = pose.position
+    vertical = max(range(3), key=lambda axis: abs(pose.rotation[6 + axis]))
+    if shape.kind == "ball" or (shape.kind == "cylinder" and vertical == _Z):
+        return Disc(x, y, shape.size[0] / 2.0)
+    heading_rad, length, width = _footprint(shape, pose, vertical)
+    return Block(x, y, heading_rad, (length, width))
+
+
+def covering(shapes: Iterable[Shape]) -> list[tuple[RoundPart, Shape]]:
+    """Return the discs of a robot's outline with their shapes, without those inside another one."""
+    parts = [(part, shape) for shape in shapes for part in _discs(shape)]
+    return [
+        (part, shape)
+        for index, (part, shape) in enumerate(parts)
+        if not any(
+            _inside(part, other) and (other != part or later > index)
+            for later, (other, _) in enumerate(parts)
+            if later != index
+        )
+    ]
+
+
+def _footprint(shape: Shape, pose: Pose, vertical: int) -> tuple[float, float, float]:
+    """Return the heading of one of its level axes, its extent along this one, and that across."""
+    along, across = (axis for axis in range(3) if axis != vertical)
+    heading_rad = math.atan2(pose.rotation[3 + along], pose.rotation[along])
+    return heading_rad, shape.size[along], shape.size[across]
+
+
+def _inside(inner: RoundPart, outer: RoundPart) -> bool:
+    return math.hypot(inner[0] - outer[0], inner[1] - outer[1]) + inner[2] <= outer[2]
+
+
+def _discs(shape: Shape) -> list[RoundPart]:
+    outline = obstacle(shape)
+    if isinstance(outline, Disc):
+        return [RoundPart(outline.x, outline.y, outline.radius)]
+    length, width = 2.0 * outline.half_x, 2.0 * outline.half_y
+    return list(discs_of_box(outline.x, outline.y, outline.heading_rad, length, width))

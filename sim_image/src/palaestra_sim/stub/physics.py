@@ -1,0 +1,120 @@
+"""The physics of the stub: every robot moves by itself, and sees and touches what is around it.
+
+Heights are checked when the world is arranged; what is left is seen from above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from palaestra_sim.scene.beams import Beam
+from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.physics import Cast, ContactPoint, Figure
+from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.stub.body import StubBody
+from palaestra_sim.stub.contacts import contact_points
+from palaestra_sim.stub.obstacles import Neighborhood
+from palaestra_sim.stub.outline import covering, obstacle
+from palaestra_sim.stub.rays import Fan, SlopedBeams, Upright
+
+
+class _Level(NamedTuple):
+    """The level beams of one robot, and the heights between which they are, in the robot's frame."""
+
+    fan: Fan
+    heights: tuple[float, float]
+
+
+class StubPhysics:
+    """The motion of one world, without masses and forces; see `Physics`."""
+
+    def __init__(self) -> None:
+        self._moving: list[tuple[Figure, StubBody]] = []
+        self._solids: tuple[Shape, ...] = ()
+        self._level: dict[Figure, list[_Level]] = {}
+        self._sloped: dict[Figure, list[SlopedBeams]] = {}
+
+    def body(self, build: Build) -> StubBody:
+        """Return the body of a robot: upright cylinders, between its heights."""
+        parts = covering(build.outline)
+        outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
+        return StubBody(build.base, outline, rim, build.heights)
+
+    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape]) -> None:
+        """Set the obstacles of each robot and of its rays."""
+        self._solids = tuple(solids)
+        self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
+        self._level = {it: beams for it, beams in self._level.items() if it in figures}
+        self._sloped = {it: beams for it, beams in self._sloped.items() if it in figures}
+        for figure in figures:
+            others = [(it, body) for it, body in self._moving if it is not figure and body.radius > 0.0]
+            self._face(figure, [body for _, body in others])
+            uprights = [_upright(shape) for shape in solids] if self._sloped.get(figure) else ()
+            for sloped in self._sloped.get(figure, ()):
+                sloped.face(uprights, [_of_robot(it, body) for it, body in others])
+
+    def advance(self, step_s: float) -> None:
+        """Move the bodies on by one basic step."""
+        for figure, body in self._moving:
+            if figure.powered:
+                body.advance(step_s)
+
+    def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+        """Return a function that returns how far each beam of a robot travels now, in meters."""
+        place, body = figure.place, figure.body
+
+        def frame() -> tuple[float, float, float, float]:
+            if isinstance(body, StubBody):
+                return body.frame
+            pose = place.world_pose
+            return pose.position[0], pose.position[1], pose.rotation[0], pose.rotation[3]
+
+        if any(not beam.level for beam in beams):
+            sloped = SlopedBeams(beams)
+            self._sloped.setdefault(figure, []).append(sloped)
+            return lambda: sloped.cast(frame(), place.translation[2])
+        fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
+        heights = [beam.height_m for beam in beams]
+        self._level.setdefault(figure, []).append(_Level(fan, (min(heights), max(heights))))
+        cast = fan.cast
+        if isinstance(body, StubBody):
+            return lambda: cast((body.x, body.y, body.c, body.s))
+        return lambda: cast(frame())
+
+    def contacts(self) -> Iterable[ContactPoint]:
+        """Return where robots touch obstacles and each other now."""
+        return contact_points(self._moving, self._solids)
+
+    def _face(self, figure: Figure, others: Sequence[StubBody]) -> None:
+        height = figure.place.world_pose.position[2]
+        body = figure.body
+        if isinstance(body, StubBody) and body.radius > 0.0:
+            in_the_way = _between(self._solids, body.heights, height)
+            body.face(_neighborhood(in_the_way, body.radius), others)
+        for fan, heights in self._level.get(figure, ()):
+            fan.face(_neighborhood(_between(self._solids, heights, height), fan.reach_m), others)
+
+
+def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float) -> list[Shape]:
+    """Return the shapes that reach into a range of heights; touching it, like a floor, is not enough."""
+    low, high = heights[0] + shift, heights[1] + shift
+    found = []
+    for shape in solids:
+        bottom, top = shape.heights()
+        if bottom < high and top > low:
+            found.append(shape)
+    return found
+
+
+def _of_robot(figure: Figure, body: StubBody) -> Upright:
+    height = figure.place.world_pose.position[2]
+    return Upright(body, body.heights[0] + height, body.heights[1] + height)
+
+
+def _upright(shape: Shape) -> Upright:
+    return Upright(obstacle(shape), *shape.heights())
+
+
+def _neighborhood(shapes: Sequence[Shape], reach_m: float) -> Neighborhood:
+    return Neighborhood([obstacle(shape) for shape in shapes], reach_m)
