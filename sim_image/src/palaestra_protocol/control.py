@@ -10,6 +10,10 @@ A sidecar with a standby has the same requests for its second simulator at /stan
 
 The answer is a `SimulatorState` with status 200, or 409 if the state does not allow the request. For a wrong
 body it is 400 with {"error": "<field>: <fact>"}.
+
+A simulator may leave out nodes of its world that it cannot simulate, if its user allowed that. Before it
+answers, it then writes the file that the environment variable `LEFT_OUT_FILE` names, whole: UTF-8, with one
+line for each kind of node, such as "the stub simulates no Drone: 1 node left out (collect-0.wbt, line 12)".
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ from palaestra_protocol.fields import (
     ProtocolError,
     clipped,
     decoded,
+    enumerated,
 )
 
 __all__ = [
@@ -37,6 +42,9 @@ __all__ = [
 ]
 
 STANDBY = "/standby"  # prefix of the paths for the second simulator
+LEFT_OUT_FILE = "PALAESTRA_SIMULATOR_LEFT_OUT"
+MOST_LEFT_OUT = 16  # lines
+LONGEST_LEFT_OUT = 200  # characters of such a line
 MOST_DEADLINE_S = 3600.0
 MOST_PATH = 4096
 MOST_ROBOTS = 32
@@ -134,6 +142,8 @@ class SimulatorState:
         last_exit: how it last ended; None: it has not ended yet.
         detail: why it is in this state, in a sentence for people; "": no comment.
         rss_bytes: the memory of its processes, in the answer to GET while it is ready; None: not included.
+        left_out: what the simulator left out of its world at its last start, in lines for people. Absent, not
+            empty.
     """
 
     state: SidecarState
@@ -146,10 +156,11 @@ class SimulatorState:
     last_exit: LastExit | None = None
     detail: str = ""
     rss_bytes: int | None = None
+    left_out: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, with texts cut to the lengths that a reader accepts."""
-        return {
+        content: dict[str, Any] = {
             "state": self.state.value,
             "driver": clipped(self.driver, MOST_NAME),
             "world": clipped(self.world, MOST_PATH),
@@ -161,6 +172,9 @@ class SimulatorState:
             "detail": clipped(self.detail),
             "rss_bytes": self.rss_bytes,
         }
+        if self.left_out:
+            content["left_out"] = enumerated(self.left_out, LONGEST_LEFT_OUT, MOST_LEFT_OUT)
+        return content
 
     @classmethod
     def from_json(cls, content: object, path: str = "") -> Self:
@@ -181,6 +195,7 @@ class SimulatorState:
             last_exit=fields.part("last_exit", LastExit.from_json) if fields.has("last_exit") else None,
             detail=fields.text("detail"),
             rss_bytes=fields.whole("rss_bytes") if fields.has("rss_bytes") else None,
+            left_out=left_out(fields, LONGEST_LEFT_OUT),
         )
 
 
@@ -219,3 +234,12 @@ class PlainRequest:
         """
         Fields(content, path).only()
         return cls()
+
+
+def left_out(fields: Fields, most: int) -> tuple[str, ...]:
+    """Return the field `left_out`, lines of at most `most` characters; () if it is absent.
+
+    Raises:
+        ProtocolError: it is anything else.
+    """
+    return fields.texts("left_out", most, MOST_LEFT_OUT) if fields.has("left_out") else ()

@@ -5,7 +5,7 @@ Each value is read by a method that checks its type and its bounds; any other va
 Unknown fields are ignored in answers, because a newer release may add some. In requests they are refused,
 because there they are mistakes.
 
-Writers keep the same bounds with `clipped` and `known`.
+Writers keep the same bounds with `clipped`, `enumerated` and `known`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from enum import StrEnum
 from typing import TypeVar, cast
@@ -52,6 +52,14 @@ def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
 def clipped(text: str, most: int = MOST_TEXT) -> str:
     """Return the first `most` characters of `text`, with characters that UTF-8 cannot encode replaced."""
     return text[:most].encode("utf-8", "replace").decode()
+
+
+def enumerated(texts: Sequence[str], most: int, most_entries: int) -> list[str]:
+    """Return at most `most_entries` texts, each `clipped`; the last one counts those that are missing."""
+    kept = [clipped(text, most) for text in texts[:most_entries]]
+    if missing := len(texts) - len(kept):
+        kept[-1] = f"and {missing + 1} more"
+    return kept
 
 
 def known(value: float | None) -> float | None:

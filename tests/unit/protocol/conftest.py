@@ -54,6 +54,7 @@ SHAPES = {
         ),
         detail=texts,
         rss_bytes=st.none() | counts,
+        left_out=st.lists(lines, max_size=16).map(tuple),
     ),
     TrainerStatus: st.builds(
         TrainerStatus,
@@ -85,6 +86,7 @@ SHAPES = {
         faults=st.dictionaries(st.sampled_from([kind.value for kind in FaultKind]), counts),
         goodput=st.dictionaries(st.sampled_from([cause.value for cause in Cause]), st.floats(0.0, 1e9)),
         steps_lost=counts,
+        left_out=st.lists(lines, max_size=16).map(tuple),
     ),
     Termination: st.builds(
         Termination,

@@ -92,6 +92,9 @@ def test_no_bytes_break_the_decoder(data) -> None:
         ({"robots": [{}] * 33}, "robots: has 33 entries, more than 32"),
         ({"robots": [7]}, "robots[0]: a number is no object"),
         ({"robots": [{"robot": "r", "ros_name": ""}]}, "robots[0].ros_name: has 0 characters, not 1"),
+        ({"left_out": "Drone"}, "left_out: text is no list"),
+        ({"left_out": ["x" * 201]}, "left_out[0]: has 201 characters, not 0 to 200"),
+        ({"left_out": ["x"] * 17}, "left_out: has 17 entries, more than 16"),
         ({"last_exit": {"code": 256}}, "last_exit.code: is not within 0 to 255"),
         ({"last_exit": {"code": 1, "expected": 1}}, "last_exit.expected: a number is not true or"),
     ],
@@ -166,8 +169,13 @@ def test_the_longest_messages_fit_in_an_answer(state, status) -> None:
         name="\U0001f916" * 300, role="Collect", state="ready", last_fault="\U0001f916" * 600
     )
     longest = [
-        state(robots=(robot,) * 40, world="\U0001f916" * 5000, detail="\U0001f916" * 600),
-        status(simulators=(fault,) * 40),
+        state(
+            robots=(robot,) * 40,
+            world="\U0001f916" * 5000,
+            detail="\U0001f916" * 600,
+            left_out=("\U0001f916" * 300,) * 40,
+        ),
+        status(simulators=(fault,) * 40, left_out=("\U0001f916" * 300,) * 40),
     ]
 
     for message in longest:
@@ -179,6 +187,22 @@ def test_a_text_that_is_too_long_is_cut_by_its_writer(state) -> None:
     read = SimulatorState.from_json(state(detail="x" * 501 + "\ud800").to_json())
 
     assert read.detail == "x" * 500
+
+
+def test_what_was_left_out_is_absent_unless_there_is_some(state, status) -> None:
+    """A trainer or operator of an older release refuses a field that it does not know."""
+    for message in (state(), status()):
+        assert "left_out" not in message.to_json()
+
+
+@pytest.mark.parametrize(("lines", "read"), [(16, "line 15"), (17, "and 2 more")])
+def test_lines_that_do_not_fit_are_counted(state, status, lines, read) -> None:
+    """A list that ends without a word would pass for the whole list."""
+    left_out = tuple(f"line {number}" for number in range(lines))
+
+    for message in (state(left_out=left_out), status(left_out=left_out)):
+        told = type(message).from_json(message.to_json()).left_out
+        assert (len(told), told[0], told[-1]) == (16, "line 0", read)
 
 
 def test_a_number_that_json_cannot_say_is_not_known(status) -> None:

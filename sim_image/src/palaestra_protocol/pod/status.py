@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, Self, TypeVar
 
-from palaestra_protocol.control import SidecarState
+from palaestra_protocol.control import MOST_LEFT_OUT, SidecarState, left_out
 from palaestra_protocol.fields import (
     MOST_COUNT,
     MOST_NAME,
@@ -20,6 +20,7 @@ from palaestra_protocol.fields import (
     ProtocolError,
     clipped,
     decoded,
+    enumerated,
     known,
 )
 from palaestra_protocol.pod.terms import Cause, ExitCode, FaultKind, Role, StandbyState
@@ -189,6 +190,8 @@ class TrainerStatus:
         goodput: seconds spent on each `Cause`, over all attempts.
         steps_lost: valid steps that were lost, over all attempts: after the checkpoint from which an attempt
             resumed, or in an episode of training or evaluation that a fault cut short.
+        left_out: what the simulators leave out of their worlds, in lines that begin with the group. Absent,
+            not empty.
     """
 
     step: int
@@ -207,6 +210,7 @@ class TrainerStatus:
     faults: Mapping[str, int] = field(default_factory=dict)
     goodput: Mapping[str, float] = field(default_factory=dict)
     steps_lost: int = 0
+    left_out: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data; a number that is not finite counts as unknown."""
@@ -230,6 +234,7 @@ class TrainerStatus:
         newer = {
             "success_interval": None if self.success_interval is None else self.success_interval.to_json(),
             "last_progress_age_s": age_s,
+            "left_out": enumerated(self.left_out, MOST_NAME, MOST_LEFT_OUT) or None,
         }
         return content | _without_absent(newer)
 
@@ -258,6 +263,7 @@ class TrainerStatus:
             faults=_table(fields, "faults", FaultKind, Fields.whole),
             goodput=_table(fields, "goodput", Cause, _seconds),
             steps_lost=fields.whole("steps_lost") if fields.has("steps_lost") else 0,
+            left_out=left_out(fields, MOST_NAME),
         )
 
 
