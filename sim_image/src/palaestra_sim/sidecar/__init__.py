@@ -12,6 +12,7 @@ It may have a second simulator as a standby. The two share the process and its p
 - `reaper`: the small program between sidecar and simulator, from which no process can escape
 - `signals`: received by one thread that waits for nothing else
 - `output`: the simulator's output, forwarded line by line
+- `left_out`: the simulator's report on what it leaves out of its world
 - `server`: the routes of the two ports: control, and health with metrics and state
 - `families`: every metric by name, as data
 - `metrics`: the content of /metrics

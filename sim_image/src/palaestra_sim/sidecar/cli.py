@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from palaestra_protocol.control import SidecarState, SimulatorState
+from palaestra_protocol.control import LEFT_OUT_FILE, SidecarState, SimulatorState
 from palaestra_sim.errors import SidecarError, SimError
 from palaestra_sim.sidecar import metrics, preparation, project, signals
 from palaestra_sim.sidecar.drivers import Driver, Launch, command
@@ -110,10 +110,13 @@ def _simulator(given: argparse.Namespace, driver: Driver, slot: str) -> Supervis
     world = _world(given, slot)
     robots = preparation.described(preparation.read(world), str(world))
     launch = Launch(world=world, options=given.option, program=given.program)
-    started = command(driver, launch, os.environ | {"PALAESTRA_SIMULATOR_SLOT": slot})
+    left_out = _left_out(given, world)
+    own = {"PALAESTRA_SIMULATOR_SLOT": slot} | ({LEFT_OUT_FILE: str(left_out)} if left_out else {})
+    started = command(driver, launch, os.environ | own)
     return SupervisedSimulator(
         replace(started, mark=f"{slot}: ") if given.standby else started,
         SimulatorState(state=SidecarState.IDLE, driver=driver.value, world=str(world), robots=robots),
+        left_out,
     )
 
 
@@ -149,6 +152,13 @@ def _world(given: argparse.Namespace, slot: str) -> Path:
     )
     clock = given.clock and slot == preparation.SLOTS[0]
     return preparation.named(given.world, work, identity, clock=clock, as_project=as_project)
+
+
+def _left_out(given: argparse.Namespace, world: Path) -> Path | None:
+    """Return the file for what the simulator leaves out; None if its world is not in the work folder."""
+    if given.work is None or world == Path(given.world).absolute():
+        return None
+    return Path(given.work).absolute() / f"{world.stem}.left-out"
 
 
 def _missing_controllers(given: argparse.Namespace) -> str | None:

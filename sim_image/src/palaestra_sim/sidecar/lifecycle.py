@@ -2,7 +2,7 @@
 
     idle     --start-->    starting   spawn
     idle     --shutdown--> idle       nothing
-    starting --ready-->    ready      nothing
+    starting --ready-->    ready      note
     starting --stop-->     stopping   wait
     starting --exited-->   failed     blame
     starting --shutdown--> stopping   terminate
@@ -52,11 +52,12 @@ class Action(StrEnum):
 
     spawn: start the process. wait: let it end by itself, until the deadline of the request.
     terminate: send SIGTERM to its process group, with a deadline. kill: kill all of its processes.
-    blame: count a fault. accept: record an expected exit.
+    note: read what it left out of its world. blame: count a fault. accept: record an expected exit.
     """
 
     NOTHING = "nothing"
     SPAWN = "spawn"
+    NOTE = "note"
     WAIT = "wait"
     TERMINATE = "terminate"
     KILL = "kill"
@@ -73,7 +74,7 @@ TABLE: MappingProxyType[tuple[SidecarState, Event], Step] = MappingProxyType(
     {
         (_IDLE, Event.START): (_STARTING, Action.SPAWN),
         (_IDLE, Event.SHUTDOWN): (_IDLE, Action.NOTHING),
-        (_STARTING, Event.READY): (_READY, Action.NOTHING),
+        (_STARTING, Event.READY): (_READY, Action.NOTE),
         (_STARTING, Event.STOP): (_STOPPING, Action.WAIT),
         (_STARTING, Event.EXITED): (_FAILED, Action.BLAME),
         (_STARTING, Event.SHUTDOWN): (_STOPPING, Action.TERMINATE),

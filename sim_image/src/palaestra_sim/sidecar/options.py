@@ -25,6 +25,9 @@ With --standby there is a second simulator, slot b, with its own world, ROS name
 (GROUP-INDEXb.wbt; /standby/start and so on), so that one can start while the other works. Lines then begin
 with "a: " or "b: ". A simulator finds its slot in PALAESTRA_SIMULATOR_SLOT.
 
+With --work, PALAESTRA_SIMULATOR_LEFT_OUT names a file in which the simulator may report, before it answers,
+what it leaves out of the world: one line for each kind of node. /state has these lines.
+
 exit codes: 0 after SIGTERM or SIGINT, everything ended; 1 the same, but a process hung and was left;
             2 wrong options or world, a port in use, a missing program: nothing was started
 """

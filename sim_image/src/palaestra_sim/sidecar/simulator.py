@@ -10,9 +10,11 @@ import queue
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from palaestra_protocol.control import LastExit, SidecarState, SimulatorState
 from palaestra_sim.sidecar import lifecycle
+from palaestra_sim.sidecar.left_out import read_left_out
 from palaestra_sim.sidecar.lifecycle import Action, Event
 from palaestra_sim.sidecar.process import Command, Ended, Process, Started, Usage
 
@@ -54,6 +56,7 @@ class SupervisedSimulator:
     Args:
         command: starts the simulator.
         state: the state before the first start.
+        left_out: the file in which the simulator reports what it leaves out; None: it has none.
         clock: returns seconds, from any origin.
     """
 
@@ -61,11 +64,13 @@ class SupervisedSimulator:
         self,
         command: Command,
         state: SimulatorState,
+        left_out: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.state = state
         self.faults: Mapping[str, int] = dict.fromkeys(FAULT_KINDS, 0)
         self._command = command
+        self._left_out = left_out
         self._clock = clock
         self._inbox: queue.SimpleQueue[_Message | Started] = queue.SimpleQueue()
         self._process: Process | None = None
@@ -74,6 +79,7 @@ class SupervisedSimulator:
         self._actions: Mapping[Action, Callable[[SimulatorState, _Message], SimulatorState]] = {
             Action.NOTHING: self._nothing,
             Action.SPAWN: self._spawn,
+            Action.NOTE: self._note,
             Action.WAIT: self._wait,
             Action.TERMINATE: self._terminate,
             Action.KILL: self._kill,
@@ -144,10 +150,15 @@ class SupervisedSimulator:
     def _spawn(self, state: SimulatorState, _: _Message) -> SimulatorState:
         start = state.starts + 1
         try:
+            if self._left_out is not None:
+                self._left_out.unlink(missing_ok=True)
             self._process = Process.start(self._numbered(start), self._report)
         except OSError as error:
             self._report(Ended(problem=f"it could not be run: {error.strerror}"))
-        return replace(state, starts=start)
+        return replace(state, starts=start, left_out=())
+
+    def _note(self, state: SimulatorState, _: _Message) -> SimulatorState:
+        return state if self._left_out is None else replace(state, left_out=read_left_out(self._left_out))
 
     def _numbered(self, start: int) -> Command:
         """Return the command with the number of this start, so that random faults differ each time."""

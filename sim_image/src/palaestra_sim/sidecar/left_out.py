@@ -1,0 +1,25 @@
+"""The file in which a simulator reports what it leaves out of its world.
+
+The simulator may be any program, so the file is read with bounds. A log would be the wrong place: its lines
+are for people, and no two simulators write them alike.
+"""
+
+from pathlib import Path
+
+_MOST_BYTES = 2**16
+
+
+def read_left_out(file: Path) -> tuple[str, ...]:
+    """Return the lines of the file without empty ones; () if there is no file that can be read."""
+    try:
+        if not file.is_file():  # a pipe would block
+            return ()
+        with file.open("rb") as opened:
+            text = opened.read(_MOST_BYTES).decode("utf-8", "replace")
+    except OSError:
+        return ()
+    return tuple(line for line in map(_printable, text.splitlines()) if line)
+
+
+def _printable(line: str) -> str:
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in line).split())
