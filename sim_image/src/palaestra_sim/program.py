@@ -16,9 +16,11 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+from palaestra_protocol.control import LEFT_OUT_FILE
 from palaestra_protocol.numbers import milliseconds
 from palaestra_sim import faults
 from palaestra_sim.errors import SimError, WorldRefusedError
+from palaestra_sim.front.left_out import write_left_out
 from palaestra_sim.front.options import FrontOptions
 from palaestra_sim.front.simulator import Simulator
 from palaestra_sim.ros import Loop, MasterUnreachable, RosNode
@@ -38,7 +40,8 @@ _WRONG_WORLD = 2
 _NO_MASTER = 1
 
 _EPILOG = """\
-Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes nothing.
+Reads the world, and ROS_MASTER_URI and ROS_HOSTNAME as every ROS node does. Writes
+what it leaves out into the file PALAESTRA_SIMULATOR_LEFT_OUT, if that is set; a sidecar sets it.
 
 faults: such as crash:step=2000, or lost:topic=ir1/value,probability=0.01; docs/simulators.md has them all.
 PALAESTRA_STUB_FAULTS takes them with blanks between, PALAESTRA_STUB_FAULT_SEED what --fault-seed does,
@@ -153,14 +156,20 @@ class _Process:
             self._nodes[name].unregister()
 
     def _start(self) -> None:
+        self._report_left_out()  # its sidecar reads the report once the simulator answers
         self._simulator.start()
-        for left_out in self._simulator.simulation.left_out:
-            log.warning("%s", left_out)
         silent = silent_devices(self._simulator.simulation.robots)
         if silent:
             log.warning("devices without readings, whose enable answers failure: %s", silent)
         log.info("%s: %s", self._simulator.world_path.name, ", ".join(self._simulator.controllers))
         self._loop.later(_CHECK_MASTER_S, self._check_master)
+
+    def _report_left_out(self) -> None:
+        left_out = self._simulator.simulation.left_out
+        for each in left_out:
+            log.warning("%s", each)
+        if left_out and (file := os.environ.get(LEFT_OUT_FILE)):
+            write_left_out(left_out, Path(file))
 
     def _start_as_ordered(self, course: faults.Course) -> None:
         """Start with the faults of a course: late, or not at all."""

@@ -1,0 +1,43 @@
+"""What a simulator leaves out of its world, as lines for its sidecar; see `palaestra_protocol.control`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Final
+
+from palaestra_sim.errors import WorldError
+
+_MOST_PLACES: Final = 8  # in one line
+
+
+def write_left_out(left_out: Iterable[WorldError], file: Path) -> None:
+    """Write `file` whole, with one line for each kind of node.
+
+    Raises:
+        OSError: it cannot be written; no partial file is left.
+    """
+    unfinished = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        unfinished.write_text("".join(f"{line}\n" for line in left_out_lines(left_out)), "utf-8")
+        unfinished.replace(file)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def left_out_lines(left_out: Iterable[WorldError]) -> Iterator[str]:
+    """Yield a line for each kind of node, with its places."""
+    kinds: dict[tuple[str, str], list[WorldError]] = {}
+    for error in left_out:
+        kinds.setdefault((error.world, error.fact), []).append(error)
+    for (file, fact), errors in kinds.items():
+        count = "1 node" if len(errors) == 1 else f"{len(errors)} nodes"
+        yield f"{fact}: {count} left out ({file}, {_places(errors)})"
+
+
+def _places(errors: Iterable[WorldError]) -> str:
+    lines = list(dict.fromkeys(error.line for error in errors))
+    named = ", ".join(map(str, lines[:_MOST_PLACES]))
+    more = f" and {len(lines) - _MOST_PLACES} more" if len(lines) > _MOST_PLACES else ""
+    return f"{'line' if len(lines) == 1 else 'lines'} {named}{more}"
