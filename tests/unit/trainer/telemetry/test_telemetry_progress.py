@@ -66,6 +66,24 @@ def test_speed_is_that_of_the_last_half_minute(progress, clock):
     assert progress.steps_per_second() == pytest.approx(10.0)
 
 
+def test_what_simulators_leave_out_is_reported_once_for_their_group():
+    """All simulators of a group have the same world, but lines of its copies may have other numbers."""
+    names = ["big-hall-0", "big-hall-1", "evaluate-0"]
+    progress = Progress(100, [(name, "Collect") for name in names])
+    for number, name in enumerate(names[:2]):
+        lines = (f"no Drone: 1 node left out ({name}.wbt, line {7 + number})", "no Sea: ...")
+        progress.reports_left_out(name, lambda lines=lines: lines)
+    progress.reports_left_out("evaluate-0", lambda: ("no Sea: ...",))
+
+    told = (
+        "big-hall: no Drone: 1 node left out (big-hall-0.wbt, line 7)",
+        "big-hall: no Sea: ...",
+        "evaluate: no Sea: ...",
+    )
+    assert progress.left_out() == told
+    assert progress.status().left_out == told
+
+
 def test_a_fault_is_reported_for_its_simulator(progress):
     """Which one, in which state, and why."""
     progress.started("collect-0")

@@ -31,6 +31,7 @@ class Sidecar:
 
     Attributes:
         address: e.g. http://127.0.0.1:7100
+        left_out: what the simulator left out of its world at its last start, in lines for people.
 
     Args:
         address: see Attributes.
@@ -42,6 +43,7 @@ class Sidecar:
         parts = urlsplit(address)
         self._host, self._port = str(parts.hostname), parts.port
         self.address = address
+        self.left_out: tuple[str, ...] = ()
         self._name = name
         self._above = above
 
@@ -74,7 +76,7 @@ class Sidecar:
 
     def confirm_ready(self) -> None:
         """Report to the sidecar that the simulator has answered a real round trip."""
-        self._ask("POST", "/ready", {})
+        self.left_out = self._ask("POST", "/ready", {}).left_out
 
     def ready(self) -> bool:
         """Return whether the simulator runs and was confirmed as ready."""

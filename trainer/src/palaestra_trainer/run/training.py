@@ -38,7 +38,7 @@ from palaestra_trainer.run.termination import End, end_of, write_last_word
 from palaestra_trainer.run.watchdog import Watchdog, stalled
 from palaestra_trainer.run_directory import RunDirectory, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
-from palaestra_trainer.simulators.member import Member, Spared
+from palaestra_trainer.simulators.member import Member, Reporting, Spared
 from palaestra_trainer.telemetry.display import Display, Lines
 from palaestra_trainer.telemetry.logs import last_lines
 from palaestra_trainer.telemetry.metrics import constants
@@ -184,11 +184,15 @@ class Attempt:
         for member in members:
             if isinstance(member, Spared):
                 progress.has_standby(member.name, member.spare)
+            if isinstance(member, Reporting):
+                progress.reports_left_out(member.name, member.left_out)
         fleet = Fleet(configuration, members, progress)
         progress.figures.meters = fleet.meters()
         stack.callback(fleet.stop)
         learning = self._make_model(fleet, interruption, stack)
         fleet.start(interruption.check, stepped=found is not None)
+        for line in progress.left_out():
+            log.warning("simulators leave out nodes of their world", what=line)
         rest(fleet.evaluating)
         run = Run(
             configuration=configuration,

@@ -68,6 +68,15 @@ class Spared(Protocol):
         ...
 
 
+@runtime_checkable
+class Reporting(Protocol):
+    """A member whose simulator reports what it leaves out of its world."""
+
+    def left_out(self) -> tuple[str, ...]:
+        """Return what it left out at its last start, in lines for people; () before. Never blocks."""
+        ...
+
+
 class Watcher(Protocol):
     """Receives the events of simulators; called from the thread in which they happen."""
 

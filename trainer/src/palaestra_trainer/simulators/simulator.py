@@ -73,6 +73,10 @@ class Simulator:
         """Seconds of simulated time since this object was created, over all restarts."""
         return self.robot.simulation.simulated_s
 
+    def left_out(self) -> tuple[str, ...]:
+        """Return what the simulator left out of its world at its last start, in lines for people."""
+        return self.sidecar.left_out
+
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle it before the next `episodes`, as text; None: no reason."""
         return self.wear.due(self.resets, episodes)

@@ -75,6 +75,10 @@ class Standby:
         """Return the state of the spare; None: it is neither ready nor being started."""
         return self._spare.state
 
+    def left_out(self) -> tuple[str, ...]:
+        """Return what the first simulator left out of its world; the other one has the same world."""
+        return self._both[0].left_out()
+
     def due(self, episodes: int = 1) -> str | None:
         """Return the reason to recycle the active simulator before the next `episodes`; None: no reason."""
         return self._active.simulator.due(episodes)

@@ -29,7 +29,7 @@ from palaestra_trainer.episodes.evaluation import Evaluation
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.telemetry.figures import EPISODES_IN_MEAN, Figures
 from palaestra_trainer.telemetry.goodput import Goodput
-from palaestra_trainer.telemetry.standings import AskStandby, Standings
+from palaestra_trainer.telemetry.standings import AskLeftOut, AskStandby, Standings
 
 SPEED_WINDOW_S = 30.0
 PHASES: Mapping[Cause, str] = MappingProxyType(
@@ -201,6 +201,14 @@ class Progress:
         """Set the function that returns the state of the simulator's spare; any thread may call it."""
         self._standings.has_standby(simulator, ask)
 
+    def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
+        """Set the function that returns what the simulator left out; any thread may call it."""
+        self._standings.reports_left_out(simulator, ask)
+
+    def left_out(self) -> tuple[str, ...]:
+        """Return what the simulators leave out of their worlds, in lines that begin with the group."""
+        return self._standings.left_out()
+
     def started(self, simulator: str) -> None:
         """Mark a simulator as up, for the first time in this attempt."""
         with self._lock:
@@ -329,6 +337,7 @@ class Progress:
                 faults={kind.value: counters.faults[kind] for kind in FaultKind},
                 goodput={cause: round(seconds, 3) for cause, seconds in counters.goodput.items()},
                 steps_lost=counters.steps_lost,
+                left_out=self._standings.left_out(),
             )
 
 

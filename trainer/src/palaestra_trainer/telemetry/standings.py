@@ -12,10 +12,16 @@ from palaestra_trainer.families import RECYCLED
 
 FLAPPING_S = 600.0  # a simulator is steady again this long after the last call of `flaps`
 AskStandby = Callable[[], str | None]
+AskLeftOut = Callable[[], tuple[str, ...]]
 
 
 def _none() -> None:
     """Return the state of a spare that does not exist."""
+
+
+def _nothing() -> tuple[str, ...]:
+    """Return what a simulator left out that does not report it."""
+    return ()
 
 
 @dataclass(slots=True)
@@ -30,6 +36,7 @@ class _Standing:
     flapped: float | None = None
     given_up: bool = False
     standby: AskStandby = _none
+    left_out: AskLeftOut = _nothing
 
 
 class Standings:
@@ -80,6 +87,18 @@ class Standings:
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
         """Set the function that returns the state of the simulator's spare; any thread may call it."""
         self._all[simulator].standby = ask
+
+    def reports_left_out(self, simulator: str, ask: AskLeftOut) -> None:
+        """Set the function that returns what the simulator left out; any thread may call it."""
+        self._all[simulator].left_out = ask
+
+    def left_out(self) -> tuple[str, ...]:
+        """Return the report of one simulator of each group, because all of a group have the same world."""
+        reports: dict[str, tuple[str, ...]] = {}
+        for name, standing in self._all.items():
+            group = name.rpartition("-")[0]
+            reports[group] = reports.get(group) or standing.left_out()
+        return tuple(f"{group}: {line}" for group, lines in reports.items() for line in lines)
 
     def restarts(self) -> int:
         """Return the restarts after faults of all simulators."""
