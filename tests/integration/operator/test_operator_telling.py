@@ -21,6 +21,7 @@ STATUS = TrainerStatus(
     steps_per_second=31.5,
     simulators=(SimulatorStatus(name="collect-0", role="Collect", state="ready", restarts=2),),
     last_checkpoint=CheckpointStatus(step=1000, time="2026-01-31T12:00:00Z"),
+    left_out=("collect: the stub simulates no Drone: 1 node left out (line 7)",),
 )
 
 
@@ -47,6 +48,7 @@ def test_the_numbers_of_a_trainer_come_into_the_status(place, start, trainer):
     assert replica["simulators"][0]["restarts"] == 2
     assert replica["lastCheckpoint"]["step"] == 1000
     assert place.status()["step"] == 1200
+    assert place.status()["leftOut"] == list(STATUS.left_out)
 
 
 def test_the_metrics_count_jobs_by_phase(place, start):

@@ -47,7 +47,12 @@ def replica(index, phase="Running", *, simulators=32, text="x", long=200, kills=
 def whole(replicas):
     """Return a status as it would be written."""
     told = {"type": "Running", "status": "True", "reason": "Training", "message": "x" * 1024}
-    status = {"phase": "Running", "conditions": [told | {"lastTransitionTime": TIME}], "replicas": replicas}
+    status = {
+        "phase": "Running",
+        "conditions": [told | {"lastTransitionTime": TIME}],
+        "leftOut": ["\U0001f600" * 230] * 16,
+        "replicas": replicas,
+    }
     return as_data(Status.model_validate(status, by_alias=True, by_name=False))
 
 

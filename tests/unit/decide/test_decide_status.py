@@ -89,6 +89,22 @@ def test_the_status_lists_simulators(training, simulator):
     )  # fmt: skip
 
 
+def test_what_simulators_leave_out_is_in_the_status_of_the_job(accepted):
+    """All replicas have the same worlds; the report outlives the pod that made it."""
+    scene = accepted(replicas=2)
+    pods = [scene.running_pod(index) for index in range(2)]
+    scene.poll(pods[0])
+    scene.settle()
+    assert scene.status.left_out is None
+    scene.poll(pods[1], left_out=("collect: no Drone:\n1 node left out (line 7)", "x" * 250, " "))
+    scene.settle()
+    scene.polled.clear()
+
+    scene.settle()
+
+    assert scene.status.left_out == ("collect: no Drone: 1 node left out (line 7)", "x" * 227 + "...")
+
+
 def test_the_status_shows_goodput_and_faults(training, simulator):
     """In whole seconds, if the trainer reports them; that of an older release does not."""
     scene, pod = training()

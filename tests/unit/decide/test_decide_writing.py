@@ -54,6 +54,7 @@ def test_active_time_is_written_with_what_else_changes():
         {"faults": {"dead": 1}},
         {"stepsLost": 5},
         {"lastProgress": "2026-01-31T12:00:00Z"},
+        {"phase": "Running", "leftOut": ["collect: no Drone: 1 node left out (line 7)"]},
     ],
 )
 def test_progress_waits_for_half_a_minute(change):

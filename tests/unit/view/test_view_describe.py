@@ -43,6 +43,18 @@ def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
     assert "evaluate-0   Evaluate   given up   0          -         -" in lines
 
 
+def test_what_simulators_leave_out_has_lines_of_its_own():
+    """Whoever reads the numbers of a job has to know that its world was not whole."""
+    line = "collect: the stub simulates no Drone: 1 node left out (line 7)"
+    job = make_job()
+    status = job.status.model_copy(update={"left_out": (line,)})
+
+    lines = told(job.model_copy(update={"status": status}))
+
+    assert lines[lines.index("Left out of the worlds:") + 1] == line
+    assert "Left out of the worlds:" not in told(job)
+
+
 def test_what_is_not_known_is_left_out():
     """A job that nobody has looked at yet has a name and no progress."""
     lines = told(make_job(phase="Pending", step=None, target=None, goodput=None, lastAttempt=None))

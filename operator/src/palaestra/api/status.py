@@ -14,7 +14,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from palaestra.api.fields import KNOWN_ITEMS, Count, Fraction, Image, Listed, Sentence, Word
+from palaestra.api.fields import KNOWN_ITEMS, Count, Fraction, Image, Listed, Sentence, Word, Words
 from palaestra.api.history import Faults, Goodput, LastAttempt, MemoryKills
 from palaestra.api.model import Reported
 from palaestra_protocol.control import SidecarState
@@ -310,6 +310,11 @@ class Status(Reported):
 
     success_rate: Fraction | None = None
     """Lowest success rate of all replicas, 0 to 1; absent: no evaluation yet."""
+
+    left_out: Words | None = None
+    """Nodes that the simulators leave out of their worlds because they cannot simulate them: a line for each
+    group and kind of node. Absent: none is reported. A program of the job's own (`trainer.command`) need not
+    report any."""
 
     replicas: Annotated[
         Listed[ReplicaStatus],

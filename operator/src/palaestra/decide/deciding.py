@@ -26,7 +26,7 @@ from palaestra.decide.preparing import Prepared
 from palaestra.decide.remembering import late_word
 from palaestra.decide.replicas import Decided, decided
 from palaestra.decide.situation import Situation, Verdict
-from palaestra.decide.summary import active, as_first, columns, standing, started
+from palaestra.decide.summary import active, as_first, columns, left_out, standing, started
 from palaestra.decide.suspending import seen_generation
 from palaestra.decide.times import Record, Times, first_of, seconds_to, whole
 from palaestra.observe.reading import MOST_COUNT
@@ -149,6 +149,7 @@ def _status(
         completion_time=now if where.phase in TERMINAL else None,
         active_seconds=min(int(times.active_s(old.active_seconds)), MOST_COUNT),
         active_since=now if active(where.phase, replicas) and not _waits(observed, prepared) else None,
+        left_out=left_out(old, observed),
         replicas=tuple(replicas),
         **columns(job, replicas),
     )

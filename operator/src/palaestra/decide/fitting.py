@@ -87,6 +87,10 @@ def _memory_kills(replica: Data) -> Data:
     return {**replica, "memoryKills": kills}
 
 
+def _left_out(status: Data) -> Data:
+    return _without(status, "leftOut")
+
+
 def _conditions(status: Data) -> Data:
     return {**status, "conditions": [_shortened(condition) for condition in status.get("conditions", ())]}
 
@@ -99,6 +103,7 @@ CUTS: tuple[Cut, ...] = (
     _of_replicas(_simulators, healthy=False),
     _of_replicas(_faults, healthy=False),
     _of_replicas(_log, healthy=False),
+    _left_out,
     _of_replicas(_messages),
     _conditions,
     _of_replicas(_memory_kills),

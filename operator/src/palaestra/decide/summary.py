@@ -6,11 +6,14 @@ from datetime import datetime
 from typing import Any
 
 from palaestra.api import TrainingJob
+from palaestra.api.lines import one_line
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus, Status
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.situation import Verdict
 from palaestra.observe.views import Observed
+
+LONGEST_LEFT_OUT = 230  # of a line: a group's name, and 200 characters of a simulator
 
 
 def standing(replicas: Sequence[ReplicaStatus]) -> Verdict:
@@ -51,6 +54,18 @@ def columns(job: TrainingJob, replicas: Sequence[ReplicaStatus]) -> dict[str, An
         "step": min(steps, default=None),
         "success_rate": min(rates, default=None),
     }
+
+
+def left_out(old: Status, observed: Observed) -> tuple[str, ...] | None:
+    """Return what the simulators leave out of their worlds; the last report stays; None: there is none.
+
+    All replicas have the same worlds and simulators, so one report is enough.
+    """
+    for replica in observed.replicas:
+        if replica.polled is not None and replica.polled.status.left_out:
+            lines = [one_line(line, LONGEST_LEFT_OUT) for line in replica.polled.status.left_out]
+            return tuple(filter(None, lines)) or None
+    return old.left_out
 
 
 def _ended(replicas: Sequence[ReplicaStatus]) -> Verdict:

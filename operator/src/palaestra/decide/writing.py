@@ -12,7 +12,7 @@ from palaestra.api.status import Status
 
 PROGRESS_EVERY_S = 30
 _WITH_OTHERS = frozenset({"activeSeconds", "activeSince"})  # written with other changes, never alone
-_OF_JOB = frozenset({"step", "successRate"})
+_OF_JOB = frozenset({"leftOut", "step", "successRate"})
 _FIRST = frozenset(  # once present, always present
     {"step", "target", "successRate", "successInterval", "lastCheckpoint"}
 )

@@ -17,6 +17,8 @@ Row = tuple[str, str]
 def describe(job: TrainingJob, created: datetime, now: datetime) -> list[str]:
     """Return the lines about a job, without unknown values."""
     lines = lines_of([(f"{name}:", value) for name, value in _facts(job, created, now) if value])
+    if job.status.left_out:
+        lines += ["", "Left out of the worlds:", *_indented(job.status.left_out)]
     lines += ["", "Conditions:", *_indented(_conditions(job.status.conditions, now))]
     for replica in job.status.replicas:
         lines += ["", *_replica(replica, now)]
