@@ -103,11 +103,39 @@ def test_an_image_comes_in_any_format(painter, format_, pixel):
     assert picture.at(0, 0) == (0, 128, 255, 255)
 
 
+def test_bytes_that_an_image_lacks_are_black(painter):
+    """The complete client of webots_ros sends 5 bytes for 50 pixels; Webots reads on behind them."""
+    robot, picture = painter
+    image = robot.get("screen/image_new", width=2, height=1, data=[255, 128], format=3)
+    robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
+
+    assert [picture.at(0, 0), picture.at(1, 0)] == [(0, 128, 255, 255), (0, 0, 0, 255)]
+
+
+@pytest.mark.parametrize(
+    ("service", "request_"),
+    [
+        ("image_new", {"width": 1, "height": 1, "data": [0], "format": 9}),
+        ("image_new", {"width": 0, "height": 1, "data": [0], "format": 3}),
+        ("image_copy", {"x": 0, "y": 0, "width": 2, "height": 0}),
+        ("image_load", {"filename": "logo.png"}),
+    ],
+)
+def test_an_image_that_cannot_be_made_has_the_handle_0(painter, service, request_):
+    """And whatever is done with it succeeds without effect: Webots only prints that it is invalid."""
+    robot, picture = painter
+    image = robot.get(f"screen/{service}", **request_)
+
+    assert image == 0
+    assert robot.get("screen/image_paste", ir=image, x=0, y=0, blend=0) == 1
+    assert robot.get("screen/image_delete", ir=image) == 1
+    assert not any(picture.pixels)
+
+
 @pytest.mark.parametrize(
     ("service", "request_", "fact"),
     [
-        ("image_new", {"width": 2, "height": 1, "data": [0], "format": 3}, "1 bytes for 2 by 1 pixels"),
-        ("image_new", {"width": 1, "height": 1, "data": [0], "format": 9}, "no image format 9"),
+        ("image_new", {"width": 5000, "height": 1, "data": [0], "format": 3}, "width is beyond 4096"),
         ("fill_oval", {"cx": 0, "cy": 0, "a": 1 << 30, "b": 1}, "a is beyond 4096"),
         ("draw_polygon", {"x": [0, 5000], "y": [0, 0], "size": 2}, "x is beyond 4096"),
     ],

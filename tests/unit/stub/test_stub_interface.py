@@ -126,6 +126,7 @@ def test_pictures_and_movies_fail_without_rendering(robot):
 
     assert robot.get("supervisor/movie_start_recording", filename="/tmp/a.mp4") == 0
     assert robot.get("supervisor/movie_failed") == 1
+    assert robot.get("supervisor/movie_stop_recording") is True, "it always is, in the controller"
 
 
 def test_the_harmless_rest_answers_as_webots_does(robot):

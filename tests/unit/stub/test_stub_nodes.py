@@ -51,6 +51,43 @@ def test_a_node_tells_what_it_is(robot, find):
     assert robot.get("supervisor/node/is_proto", node=target) is False
 
 
+@pytest.fixture
+def among_protos(ros, start, world):
+    """A supervisor of the PROTO E-puck, beside a stand-in; and `find`, by DEF name."""
+    arguments = 'controllerArgs [ "--name=puck" "--synchronize" ]'
+    robot = f'DEF PUCK E-puck {{ controller "ros" {arguments} supervisor TRUE }}'
+    start(world("DEF BOX WoodenBox { translation 2 0 0 }", robot=robot))
+    puck = ros.node("puck")
+    return puck, lambda name, **proto: puck.get("supervisor/get_from_def", name=name, **proto)
+
+
+@pytest.mark.parametrize(
+    ("name", "proto", "base", "number"), [("PUCK", "E-puck", "Robot", 34), ("BOX", "WoodenBox", "Solid", 80)]
+)
+def test_an_instance_of_a_proto_has_the_name_of_the_proto(among_protos, name, proto, base, number):
+    """Its base type is that of the node that the PROTO consists of, also where a stand-in takes its place."""
+    puck, find = among_protos
+    node = find(name)
+
+    assert puck.get("supervisor/node/get_type_name", node=node) == proto
+    assert puck.get("supervisor/node/get_base_type_name", node=node) == base
+    assert puck.get("supervisor/node/get_type", node=node) == number
+    assert puck.get("supervisor/node/is_proto", node=node) is True
+
+
+def test_a_proto_is_looked_into_only_through_an_instance(among_protos):
+    """`proto` asks for fields of the node inside of it, and for a DEF in there; others have neither."""
+    puck, find = among_protos
+    number = "supervisor/node/get_number_of_fields"
+    root = puck.get("supervisor/get_root")
+
+    assert puck.get("supervisor/node/get_field", node=find("BOX"), fieldName="translation", proto=True) != 0
+    assert puck.get("supervisor/node/get_field_by_index", node=find("BOX"), index=0, proto=True) != 0
+    assert puck.get(number, node=find("BOX"), proto=True) > 0
+    assert puck.get(number, node=root, proto=True) == -1
+    assert find("BOX", proto=find("PUCK")) == find("BOX", proto=root) == 0
+
+
 def test_ids_lead_back_to_nodes(robot, find):
     """And unknown ones to 0."""
     number = robot.get("supervisor/node/get_id", node=find("TARGET"))

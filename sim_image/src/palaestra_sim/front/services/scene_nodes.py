@@ -42,7 +42,7 @@ class NodeServices:
             ("get_type", "node_get_type", self._get_type),
             ("get_type_name", "node_get_name", self._get_type_name),
             ("get_def", "node_get_name", self._get_def),
-            ("get_base_type_name", "node_get_name", self._get_type_name),
+            ("get_base_type_name", "node_get_name", self._get_base_type_name),
             ("get_parent_node", "node_get_parent_node", self._get_parent),
             ("is_proto", "node_is_proto", self._is_proto),
             ("get_field", "node_get_field", self._get_field),
@@ -96,6 +96,11 @@ class NodeServices:
         return {"type": type_number(self._node(request).type_name)}
 
     def _get_type_name(self, request: Any) -> Fields:
+        """Answer the name of its PROTO, if the node is an instance of one."""
+        node = self._node(request)
+        return {"name": node.proto_name or node.type_name}
+
+    def _get_base_type_name(self, request: Any) -> Fields:
         return {"name": self._node(request).type_name}
 
     def _get_def(self, request: Any) -> Fields:
@@ -105,8 +110,7 @@ class NodeServices:
         return {"node": self._handles.of(self._node(request).parent)}
 
     def _is_proto(self, request: Any) -> Fields:
-        self._node(request)
-        return {"value": False}
+        return {"value": bool(self._node(request).proto_name)}
 
     def _get_position(self, request: Any) -> Fields:
         return {"position": _point(_place(self._node(request)).world_position)}
@@ -164,20 +168,20 @@ class NodeServices:
 
     def _get_field(self, request: Any) -> Fields:
         node = self._node(request)
-        field = self._handles.field_of(node, request.fieldName) if not request.proto else None
+        field = self._handles.field_of(node, request.fieldName) if _has_fields(node, request) else None
         return {"field": self._handles.of(field)}
 
     def _get_field_by_index(self, request: Any) -> Fields:
         node = self._node(request)
         names = list(kinds_of(node))
-        if request.proto or request.index >= len(names):
+        if not _has_fields(node, request) or request.index >= len(names):
             return {"field": 0}
         field = self._handles.field_of(node, names[request.index])
         return {"field": self._handles.of(field)}
 
     def _get_number_of_fields(self, request: Any) -> Fields:
         node = self._node(request)
-        return {"value": -1 if request.proto else len(kinds_of(node))}
+        return {"value": len(kinds_of(node)) if _has_fields(node, request) else -1}
 
     def _export_string(self, request: Any) -> Fields:
         """Answer the node as the world file has it."""
@@ -220,6 +224,11 @@ class NodeServices:
         """Accept a hint that affects only the speed of Webots' answers, or its drawing."""
         self._node(request)
         return {"success": 1}
+
+
+def _has_fields(node: SceneNode, request: Any) -> bool:
+    """Return whether a node has fields of that sort; those inside of a PROTO are only in its instances."""
+    return bool(node.proto_name) or not request.proto
 
 
 def _pose(node: SceneNode) -> Pose:

@@ -49,7 +49,7 @@ class SupervisorServices:
                 ("animation_start_recording", "set_string", _refuse),
                 ("animation_stop_recording", "get_bool", _refuse_get),
                 ("movie_start_recording", "supervisor_movie_start_recording", self._start_movie),
-                ("movie_stop_recording", "get_bool", _refuse_get),
+                ("movie_stop_recording", "get_bool", _accept_get),
                 ("movie_failed", "node_get_status", self._movie_failed),
                 ("movie_is_ready", "node_get_status", _movie_is_ready),
                 ("set_label", "supervisor_set_label", _accept),
@@ -107,8 +107,11 @@ class SupervisorServices:
         return {"value": self._handles.of(self._robot.parts.node)}
 
     def _get_from_def(self, request: Any) -> Fields:
-        """Look for a DEF anywhere; there are no PROTOs here, so inside one (`proto`) there is none."""
-        return {"node": self._handles.of(self._tree.of_def(request.name) if request.proto == 0 else None)}
+        """Look for a DEF anywhere, or inside the instance of a PROTO."""
+        within = self._handles.node(request.proto) if request.proto else None
+        if within is not None and not within.proto_name:
+            return {"node": 0}
+        return {"node": self._handles.of(self._tree.of_def(request.name, within))}
 
     def _get_from_id(self, request: Any) -> Fields:
         return {"node": self._handles.of(self._tree.of_number(request.id))}
@@ -130,6 +133,10 @@ def _refuse(_request: Any) -> Fields:
 
 def _refuse_get(_request: Any) -> Fields:
     return {"value": False}
+
+
+def _accept_get(_request: Any) -> Fields:
+    return {"value": True}
 
 
 def _no_headset(_request: Any) -> Fields:

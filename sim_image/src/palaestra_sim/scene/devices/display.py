@@ -48,11 +48,15 @@ class Display:
         self.images[handle] = image
         return {"ir": handle}
 
-    def image(self, handle: int) -> Raster:
-        """Return a picture by its handle; Webots would read a null pointer for a wrong one."""
-        if handle not in self.images:
+    def image(self, handle: int) -> Raster | None:
+        """Return a picture by its handle; None for 0, the handle of a picture that could not be made.
+
+        Raises:
+            UnsimulatedError: no picture has that handle; Webots would read memory that is not its own.
+        """
+        if handle and handle not in self.images:
             raise UnsimulatedError(f"no image {handle}; make one with image_new or image_copy")
-        return self.images[handle]
+        return self.images.get(handle)
 
 
 def _read(part: Part) -> Display:
@@ -140,21 +144,29 @@ def _require_small(request: Any) -> None:
 def _images(display: Display) -> tuple[Row, ...]:
     def image_copy(request: Any) -> Fields:
         _require_small(request)
-        width, height = max(0, request.width), max(0, request.height)
-        return display.keep(display.picture.copy(request.x, request.y, width, height))
+        if request.width < 1 or request.height < 1:
+            return {"ir": 0}
+        return display.keep(display.picture.copy(request.x, request.y, request.width, request.height))
 
     def image_paste(request: Any) -> Fields:
         _require_small(request)
-        display.picture.paste(display.image(request.ir), request.x, request.y)
+        image = display.image(request.ir)
+        if image is not None:
+            display.picture.paste(image, request.x, request.y)
         return {"success": 1}
 
     def image_delete(request: Any) -> Fields:
-        display.image(request.ir)
-        del display.images[request.ir]
+        if display.image(request.ir) is not None:
+            del display.images[request.ir]
         return {"success": 1}
 
+    def image_new(request: Any) -> Fields:
+        _require_small(request)
+        image = _image_of(request)
+        return {"ir": 0} if image is None else display.keep(image)
+
     return (
-        ("image_new", "display_image_new", lambda request: display.keep(_image_of(request))),
+        ("image_new", "display_image_new", image_new),
         ("image_copy", "display_image_copy", image_copy),
         ("image_paste", "display_image_paste", image_paste),
         ("image_delete", "display_image_delete", image_delete),
@@ -163,22 +175,20 @@ def _images(display: Display) -> tuple[Row, ...]:
     )
 
 
-def _image_of(request: Any) -> Raster:
-    """Return the picture of a request for a new one."""
-    width, height, data = request.width, request.height, bytes(request.data)
-    places = _FORMATS.get(request.format)
-    if places is None:
-        raise UnsimulatedError(
-            f"no image format {request.format}; use one of {', '.join(map(str, _FORMATS))}"
-        )
+def _image_of(request: Any) -> Raster | None:
+    """Return the picture of a request for a new one; None if Webots makes none either.
+
+    Bytes that are missing are 0. Webots takes what lies in its memory behind the others.
+    """
+    width, height, places = request.width, request.height, _FORMATS.get(request.format)
+    if places is None or width < 1 or height < 1:
+        return None
     size = 3 if places[3] is None else 4
-    if width < 1 or height < 1 or len(data) != size * width * height:
-        raise UnsimulatedError(
-            f"{len(data)} bytes for {width} by {height} pixels; send {size} for each pixel"
-        )
-    pixels = bytearray(4 * width * height)
+    count = width * height
+    data = bytes(request.data)[: size * count].ljust(size * count, b"\0")
+    pixels = bytearray(4 * count)
     for channel, place in enumerate(places):
-        pixels[channel::4] = bytes([_OPAQUE]) * (width * height) if place is None else data[place::size]
+        pixels[channel::4] = bytes([_OPAQUE]) * count if place is None else data[place::size]
     return Raster(width=width, height=height, pixels=pixels)
 
 

@@ -31,7 +31,8 @@ _ACTING: Final = DEVICES.keys() | frozenset(
         "WorldInfo",
     )
 )
-_FOR_PEOPLE: Final = frozenset(("description", "info", "model", "recognitionColors", "title"))
+# A running controller has taken the names of its devices already.
+_FOR_PEOPLE: Final = frozenset(("description", "info", "model", "name", "recognitionColors", "title"))
 _ELSEWHERE: Final = "write it into the world file, or use driver webots"
 _HOLDING: Final = frozenset(("Group", "Pose", "Transform"))  # they act only by what is inside
 _PLACING: Final = frozenset(("translation", "rotation"))

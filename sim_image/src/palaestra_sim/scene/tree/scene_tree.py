@@ -86,9 +86,9 @@ class SceneTree:
             found = self._fields[node.number, name] = Field(node, name, kind, changes)
         return found
 
-    def of_def(self, path: str) -> SceneNode | None:
-        """Return the first node with a DEF name; dots lead inside, as in "ROBOT.ARM"."""
-        found: SceneNode | None = self.root
+    def of_def(self, path: str, within: SceneNode | None = None) -> SceneNode | None:
+        """Return the first node with a DEF name, inside `within`; dots lead inside, as in "ROBOT.ARM"."""
+        found: SceneNode | None = within or self.root
         for name in path.split("."):
             if found is None or not name:
                 return None
