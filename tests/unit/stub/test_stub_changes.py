@@ -221,6 +221,23 @@ def test_a_joint_is_put_to_a_position_and_its_motor_holds_it(start, ros, world, 
         )
 
 
+def test_the_sensor_of_a_joint_without_a_motor_measures_where_it_is_put(start, ros, world, simple_robot):
+    """At first, that is its position in the world file."""
+    flap = """DEF FLAP HingeJoint { jointParameters HingeJointParameters { position 0.25 }
+      device [ PositionSensor { name "angle" } ] endPoint Solid { } }"""
+    simulation = start(world(robot=simple_robot.replace("DEF IR", f"{flap} DEF IR"))).simulation
+    sensor = simulation.robots[0].sensors["angle"]
+    node = ros.node("robotino")
+    simulation.step(STEP_MS)
+    assert sensor.value == 0.25
+
+    joint = node.get("supervisor/get_from_def", name="FLAP")
+    node.get("supervisor/node/set_joint_position", node=joint, position=0.6, index=1)
+    simulation.step(STEP_MS)
+
+    assert sensor.value == 0.6
+
+
 def test_a_robot_that_stands_at_a_wall_has_a_contact_point_there(start, ros):
     """With the number of the Solid that touches: the robot's for the robot, the wall's for the wall."""
     simulation = start().simulation

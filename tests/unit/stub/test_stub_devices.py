@@ -106,14 +106,23 @@ def test_its_node_has_the_fields_of_webots(name):
     assert len(kinds) > 1 or name == "Brake", "a Brake has no field of its own"
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if DEVICES[name].fields])
 def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
     """A success without effect would leave a client with a world that is not the one it wrote."""
     tree = stub(name).simulation.tree
     node = next(it for it in tree.nodes.values() if it.type_name == name)
+    *_, field = field_kinds(name)
 
-    with pytest.raises(UnsimulatedError, match=f"the stub cannot change {name}.name"):
-        require_effect(node, "name")
+    with pytest.raises(UnsimulatedError, match=f"the stub cannot change {name}.{field}"):
+        require_effect(node, field)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_name_of_a_device_may_be_written(stub, name):
+    """A running controller keeps the name that the device had at the start, in Webots too."""
+    tree = stub(name).simulation.tree
+
+    require_effect(next(it for it in tree.nodes.values() if it.type_name == name), "name")
 
 
 @pytest.mark.parametrize("name", SENSORS)

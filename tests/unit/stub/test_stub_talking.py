@@ -42,6 +42,18 @@ def test_a_packet_arrives_after_the_next_step(pair):
     assert [message["data"] for message in heard][-1] == "hello"
 
 
+def test_a_robot_does_not_hear_itself(pair):
+    """Webots transmits no packet from a robot to itself, on any channel."""
+    here, there = pair(EMITTER + RECEIVER, RECEIVER)
+    for robot in (here, there):
+        robot.call("ear/enable", value=32)
+    here.call("mouth/send", value="hello")
+    step(here, there)
+
+    assert here.get("ear/get_queue_length") == 0
+    assert there.get("ear/get_queue_length") == 1
+
+
 def test_packets_wait_in_a_queue(pair):
     """`next_packet` drops the oldest; then there is nothing to ask about."""
     here, there = pair(EMITTER, RECEIVER)
@@ -81,7 +93,7 @@ def test_a_channel_is_heard_by_those_who_listen_to_it(pair, emitter, receiver, a
 
 
 def test_a_packet_does_not_reach_beyond_the_range(pair):
-    """A range beyond `maxRange` is ignored."""
+    """A range beyond `maxRange` is that, and so is -1; others below 0 are ignored."""
     here, there = pair(EMITTER, RECEIVER, 3.0)
     there.call("ear/enable", value=32)
     for range_m in (2.0, 4.0, 6.0):
@@ -89,8 +101,11 @@ def test_a_packet_does_not_reach_beyond_the_range(pair):
         here.call("mouth/send", value="hello")
         step(here, there)
 
-    assert here.get("mouth/get_range") == 4.0
+    assert here.get("mouth/get_range") == 5.0
     assert there.get("ear/get_queue_length") == 2
+    for range_m, set_m in ((1.0, 1.0), (-2.0, 1.0), (-1.0, 5.0)):
+        assert here.get("mouth/set_range", value=range_m) is True
+        assert here.get("mouth/get_range") == set_m
 
 
 def test_a_receiver_that_is_not_enabled_hears_nothing(pair):

@@ -11,26 +11,31 @@ from palaestra_sim.scene.geometry import transposed, turn
 
 
 class Air:
-    """Carries packets between the devices of all robots of a world."""
+    """Carries packets from the devices of each robot of a world to those of the others.
 
-    def __init__(self, devices: Iterable[object]) -> None:
-        devices = tuple(devices)
-        self._emitters = tuple(it for it in devices if isinstance(it, Emitter))
-        self._receivers = tuple(it for it in devices if isinstance(it, Receiver))
+    Args:
+        robots: the devices of each.
+    """
+
+    def __init__(self, robots: Iterable[Iterable[object]]) -> None:
+        devices = tuple((number, it) for number, robot in enumerate(robots) for it in robot)
+        self._emitters = tuple((number, it) for number, it in devices if isinstance(it, Emitter))
+        self._receivers = tuple((number, it) for number, it in devices if isinstance(it, Receiver))
 
     def deliver(self) -> None:
         """Deliver what was sent since the last call."""
-        for emitter in self._emitters:
+        for robot, emitter in self._emitters:
             if emitter.outbox:
-                for receiver in self._receivers:
-                    _carry(emitter, receiver)
+                for other, receiver in self._receivers:
+                    if other != robot:
+                        _carry(emitter, receiver)
                 emitter.outbox.clear()
 
     def clear(self) -> None:
         """Forget what is on its way or has not been read."""
-        for emitter in self._emitters:
+        for _, emitter in self._emitters:
             emitter.outbox.clear()
-        for receiver in self._receivers:
+        for _, receiver in self._receivers:
             receiver.queue.clear()
 
 

@@ -283,7 +283,7 @@ class _RobotReader:
         self, node: SceneNode, parameters: SceneNode, place: Place, joint: Joint
     ) -> Motor | None:
         stops = [self._reading.number(parameters, name, 0.0) for name in ("minStop", "maxStop")]
-        shaft = Shaft(slides=joint.slides)
+        shaft = Shaft(joint=joint)
         for device in node.nodes("device"):
             kind = _ON_JOINTS.get(device.type_name)
             if kind is None:

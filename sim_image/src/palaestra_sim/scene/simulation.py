@@ -269,9 +269,9 @@ class Simulation:
 
     def _assemble(self) -> None:
         """Connect the devices of all robots."""
-        devices = [it for robot in self.robots for _, it in robot.parts.devices.rows.values()]
+        devices = [[it for _, it in robot.parts.devices.rows.values()] for robot in self.robots]
         self._air = Air(devices)
-        connectors = tuple(it for it in devices if isinstance(it, Connector))
+        connectors = tuple(it for robot in devices for it in robot if isinstance(it, Connector))
         for connector in connectors:
             connector.others = connectors
         self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)

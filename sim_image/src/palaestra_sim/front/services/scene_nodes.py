@@ -218,7 +218,7 @@ class NodeServices:
         robot = self._robot(self._node(request))
         if robot is not None:
             self._host.restart(robot)
-        return {"success": int(robot is not None)}
+        return {"success": 1}
 
     def _accept(self, request: Any) -> Fields:
         """Accept a hint that affects only the speed of Webots' answers, or its drawing."""

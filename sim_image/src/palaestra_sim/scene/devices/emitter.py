@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -39,9 +40,12 @@ class Emitter:
             self.outbox.append((text, self.channel, self.range_m))
 
     def set_range(self, range_m: float) -> None:
-        """Set the range; one beyond the limit is ignored, as in Webots."""
-        if self.max_range_m == EVERYWHERE or 0.0 <= range_m <= self.max_range_m:
-            self.range_m = range_m
+        """Set the range, up to the limit; a negative one is ignored, except -1, which is the limit."""
+        if range_m == EVERYWHERE:
+            self.range_m = self.max_range_m
+        elif range_m >= 0.0:
+            limit = math.inf if self.max_range_m == EVERYWHERE else self.max_range_m
+            self.range_m = min(range_m, limit)
 
     def set_channel(self, channel: int) -> None:
         """Set the channel; below -1 there is none."""

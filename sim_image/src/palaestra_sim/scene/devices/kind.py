@@ -12,6 +12,7 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.motion import Motion
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -46,19 +47,26 @@ class Shaft:
     """A joint, for the devices on it.
 
     Attributes:
-        slides: whether it is a slider, not a hinge.
+        joint: the joint itself; None for a device that is on none.
         motor: the first motor on it.
         names: of the first device of each role.
     """
 
-    slides: bool = False
+    joint: Joint | None = None
     motor: Motor | None = None
     names: dict[str, str] = field(default_factory=dict)
 
     @property
     def type_number(self) -> int:
         """What `get_type` of its devices answers: 0 for a hinge, 1 for a slider."""
-        return int(self.slides)
+        return int(self.joint is not None and self.joint.slides)
+
+    @property
+    def position(self) -> float:
+        """Where it is, in rad or m."""
+        if self.motor is not None:
+            return self.motor.angle_rad
+        return 0.0 if self.joint is None else self.joint.now
 
 
 @dataclass(slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from palaestra_sim.seam import Row
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class PositionSensor:
-    """The position of a joint in rad, of a slider in m; a joint without a motor stays at 0."""
+    """The position of a joint in rad, of a slider in m; a joint without a motor stays where it is put."""
 
     name: str
     shaft: Shaft
@@ -38,11 +38,10 @@ def _sampler(sensors: Sequence[PositionSensor], robot: Carrier) -> Sample:
 
     def sample() -> None:
         for sensor in sensors:
-            motor = sensor.shaft.motor
-            angle_rad = motor.angle_rad if motor is not None else 0.0
+            position = sensor.shaft.position
             if sensor.noise:
-                angle_rad += sensor.noise * gauss(0.0, 1.0)
-            sensor.value = discrete(angle_rad, sensor.resolution)
+                position += sensor.noise * gauss(0.0, 1.0)
+            sensor.value = discrete(position, sensor.resolution)
 
     return sample
 
