@@ -8,10 +8,13 @@ cd "$(dirname "$0")/.."
 ros_packages=(python3-rospy python3-rosmaster python3-netifaces python3-venv)
 # ROS's command line, and the messages that those of webots_ros hold, as Python modules and as definitions.
 ros_packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
+# A compiler and the headers of roscpp: a test builds a client in C++.
+ros_packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
 
 ros_is_installed() {
-  local modules='ensurepip, netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs'
-  /usr/bin/python3 -c "import $modules" 2>/dev/null && [[ -d /usr/share/sensor_msgs/msg ]]
+  local modules='ensurepip, netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs, gencpp'
+  /usr/bin/python3 -c "import $modules" 2>/dev/null && command -v g++ >/dev/null &&
+    [[ -d /usr/share/sensor_msgs/msg && -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]]
 }
 
 if ! ros_is_installed; then

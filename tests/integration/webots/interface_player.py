@@ -1,0 +1,79 @@
+"""Carries out a plan of the interface with a client, whatever library the client is written with.
+
+A plan has `calls`, a list of [name, path, type, request]; `topics`, type by path; `rounds`, a list of
+[path, type, request] that make topics speak; `last`, calls that end what runs. A string "@name" in a request
+is the first value of the answer to that call, such as the handle of a node.
+
+A client has three functions: `call(path, type, request)` returns the answer as a dictionary, or
+{"failed": text}; `listen(topic, type)` subscribes; `heard()` returns the first message of each topic.
+"""
+
+import time
+
+import genpy
+import genpy.message
+
+DEADLINE_S = 20.0
+PAUSE_S = 0.02
+
+
+def play(plan, client):
+    """Return the `answers` by the names of calls, and the `heard` messages by topic."""
+    answers = {}
+    for name, path, type_name, request in plan["calls"]:
+        answers[name] = client.call(path, type_name, _filled(request, answers))
+    for topic, type_name in plan["topics"].items():
+        client.listen(topic, type_name)
+    heard = _heard(plan, client)
+    for name, path, type_name, request in plan["last"]:
+        answers[name] = _call_again(client, path, type_name, _filled(request, answers))
+    return {"answers": answers, "heard": heard}
+
+
+def request_of(service, fields):
+    """Return the request of a class of genpy with these fields, the others as they are at first."""
+    message = service._request_class()
+    genpy.message.fill_message_args(message, [fields])
+    return message
+
+
+def plain(value):
+    """Return a message, or what is in one, as JSON has it."""
+    if isinstance(value, genpy.Message):
+        return {name: plain(getattr(value, name)) for name in value.__slots__}
+    if isinstance(value, genpy.Time | genpy.Duration):
+        return value.to_sec()
+    if isinstance(value, bytes):
+        return list(value)
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value
+
+
+def _filled(request, answers):
+    """Return a request with the answers that it refers to."""
+    return {
+        name: next(iter(answers[value[1:]].values())) if str(value).startswith("@") else value
+        for name, value in request.items()
+    }
+
+
+def _heard(plan, client):
+    """Return the first message of every topic; those that stay silent are missing."""
+    end = time.monotonic() + DEADLINE_S
+    heard = {}
+    while plan["topics"].keys() - heard.keys() and time.monotonic() < end:
+        for path, type_name, request in plan["rounds"]:
+            client.call(path, type_name, request)
+        heard = client.heard()
+    return heard
+
+
+def _call_again(client, path, type_name, request):
+    """Call until the service answers: a controller that restarts takes its services back for a moment."""
+    end = time.monotonic() + DEADLINE_S
+    while True:
+        answer = client.call(path, type_name, request)
+        if "failed" not in answer or time.monotonic() > end:
+            return answer
+        time.sleep(PAUSE_S)
