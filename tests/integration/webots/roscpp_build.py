@@ -16,7 +16,7 @@ PROGRAM = Path(__file__).with_name("roscpp_client.cpp")
 TEMPLATES = "/usr/share/gencpp"
 MESSAGES = Path("/usr/share")  # Debian's definitions of messages, a folder for each package
 NESTED = ("std_msgs", "geometry_msgs", "sensor_msgs")
-LIBRARIES = ("roscpp", "roscpp_serialization", "rosconsole", "rostime", "boost_thread", "boost_system")
+LIBRARIES = ("roscpp", "roscpp_serialization", "rosconsole", "rostime", "boost_thread")
 DEADLINE_S = 240.0  # of the compiler, on a slow and busy machine
 
 

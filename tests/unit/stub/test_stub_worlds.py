@@ -76,6 +76,15 @@ def test_two_instances_are_nodes_of_their_own():
     assert a.origin.node.span != b.origin.node.span
 
 
+def test_a_def_inside_of_a_proto_is_found_through_its_instance():
+    """Each instance has a node of its own of that name."""
+    tree = load_world("DEF A Stool { } DEF B Stool { }", STOOL).tree
+    seats = [tree.of_def("SEAT", tree.of_def(name)) for name in ("A", "B")]
+
+    assert [seat.type_name for seat in seats] == ["Cylinder", "Cylinder"]
+    assert seats[0] is not seats[1]
+
+
 def test_a_field_that_a_proto_does_not_have_is_refused_where_it_is_written():
     """A typo would be the default."""
     with pytest.raises(WorldError, match=r"my.wbt:2:32: the PROTO Stool has no field colour"):
