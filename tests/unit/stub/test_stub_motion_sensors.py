@@ -398,12 +398,6 @@ def test_a_reset_is_no_acceleration(load):
     assert value_of(simulation, "accelerometer") == pytest.approx((0.0, 0.0, 9.81))
 
 
-def test_an_accelerometer_in_a_world_with_another_up_is_refused(load):
-    """There, gravity pulls along y."""
-    with pytest.raises(WorldError, match=r"accelerometer in a world with WorldInfo\.coordinateSystem 'NUE'"):
-        load("Accelerometer { }", info='coordinateSystem "NUE"')
-
-
 def test_an_inertial_unit_reads_its_rotation_in_the_world(load):
     """Robot and mount are each turned by a quarter about the vertical."""
     simulation = load(f"InertialUnit {{ {NORTH} }}", NORTH)

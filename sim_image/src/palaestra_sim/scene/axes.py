@@ -1,8 +1,9 @@
-"""Axes: the stub simulates worlds whose z axis points up, with the conventions of R2022a and later.
+"""Axes: which axis of a world points up, and the conventions of nodes since R2022a.
 
-Before R2020b the y axis of every world pointed up; since then WorldInfo.coordinateSystem chooses. Before
-R2022a robots looked along -z, cylinders stood along y, and many devices looked along other axes. Webots turns
-the nodes of such files when it loads them; the stub turns the shapes alone, and refuses the rest.
+Before R2020b the y axis of every world pointed up; since then WorldInfo.coordinateSystem chooses, with y as
+the default until R2022a. Before R2022a robots looked along -z, cylinders stood along y, and many devices
+looked along other axes. Webots turns the nodes of such files when it loads them; the stub turns the shapes
+alone, and refuses the rest.
 Source: WbNodeUtilities::fixBackwardCompatibility and WbWorldInfo of Webots.
 """
 
@@ -13,24 +14,31 @@ from typing import Final
 
 from palaestra_sim.scene.geometry import Pose, from_axis_angle
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place, YUp
 from palaestra_sim.scene.reading import Reading
 
 _CONVERT: Final = (
     "convert it (wiki of Webots: How to adapt your world or PROTO to Webots R2022a),"
-    " leave WorldInfo out (--leave-out) to read it as it stands, or run this world with driver webots"
+    " leave WorldInfo out (--leave-out) to read it with the axes of today,"
+    " or run this world with driver webots"
 )
+_UP: Final = {"ENU": "z", "NUE": "y", "EUN": "y"}
 _Z_TO_Y: Final = Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, -math.pi / 2.0)))
 
 
-def check_axes(reading: Reading, node: SceneNode) -> None:
-    """Note that the world has other axes than the stub; `node` is its WorldInfo, or its first node."""
-    system = node.text("coordinateSystem") or "ENU"
+def read_axes(reading: Reading, node: SceneNode) -> Place | None:
+    """Return the frame around a world whose y axis points up, None if it is z; note nodes with other axes.
+
+    `node` is the WorldInfo of the world, or its first node.
+    """
     if of_old_axes(node):
         fact = f"a world of {_release(node)}: before R2022a, robots, devices and shapes had other axes"
         reading.lacks(node, fact, _CONVERT)
-    elif system != "ENU":
-        fact = f'a world with coordinateSystem "{system}", whose y axis points up'
-        reading.lacks(node, fact, _CONVERT)
+    system = node.text("coordinateSystem") or ("NUE" if of_old_axes(node) else "ENU")
+    if system not in _UP:
+        known = ", ".join(_UP)
+        reading.refuse(node, f'coordinateSystem "{system}" is none of {known}', "write one of them")
+    return YUp() if _UP.get(system) == "y" else None
 
 
 def of_old_axes(node: SceneNode) -> bool:
@@ -43,6 +51,11 @@ def standing(node: SceneNode, frame: Pose) -> Pose:
     if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
         return frame
     return frame.after(_Z_TO_Y)
+
+
+def frame_of_shapes(owner: SceneNode) -> Pose:
+    """Return the frame of the shapes of a node; those of a stand-in are of today, also in an old file."""
+    return _Z_TO_Y if owner.stand_in and of_old_axes(owner) else Pose()
 
 
 def _release(node: SceneNode) -> str:

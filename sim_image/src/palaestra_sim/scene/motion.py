@@ -1,7 +1,7 @@
 """How a place moves in the world: with its robot, and with the joints that carry it.
 
-Velocities are in world axes, over the last basic step. They come from the speeds of body and motors, as those
-of Webots come from its physics, so a robot that is placed somewhere else has no velocity.
+Velocities are in the axes of the world file, over the last basic step. They come from the speeds of body and
+motors, as those of Webots come from its physics, so a robot that is placed somewhere else has no velocity.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _REST: Vector = (0.0, 0.0, 0.0)
 
 
 class Motion(NamedTuple):
-    """The velocity of a place's origin in m/s, and its turning in rad/s, in world axes."""
+    """The velocity of a place's origin in m/s, and its turning in rad/s, in the axes of the world file."""
 
     velocity: Vector = _REST
     turning: Vector = _REST
@@ -25,7 +25,7 @@ class Motion(NamedTuple):
 
 def motion_of(place: Place, body: Body | None) -> Motion:
     """Return the motion of a place on a robot; `body` is the robot's."""
-    point = place.world_position
+    point = place.ground_pose.position
     velocity, turning = _REST, _REST
     if body is not None:
         vx, vy, omega = body.velocity
@@ -36,7 +36,7 @@ def motion_of(place: Place, body: Body | None) -> Motion:
         if motor is not None and isinstance(link, JointPlace) and motor.speed_rad_s:
             added = _of_joint(link, motor.speed_rad_s, point)
             velocity, turning = _sum(velocity, added.velocity), _sum(turning, added.turning)
-    return Motion(velocity, turning)
+    return Motion(place.from_ground(velocity), place.from_ground(turning))
 
 
 class Trail:
@@ -69,8 +69,8 @@ class Trail:
 
 
 def _of_joint(end: JointPlace, speed: float, point: Vector) -> Motion:
-    """Return what a motor adds to the motion of a point on the end of its joint."""
-    around = end.parent.world_pose if end.parent is not None else None
+    """Return what a motor adds to the motion of a point on the end of its joint, in axes of the ground."""
+    around = end.parent.ground_pose if end.parent is not None else None
     axis, anchor = end.joint.axis, end.joint.anchor
     if around is not None:
         axis, anchor = turn(around.rotation, axis), around.carry(anchor)

@@ -1,7 +1,8 @@
 """The physics as the scene needs it: bodies that move, rays, and contacts.
 
 The scene reads a world, and gives its robots devices. A physics moves these robots. The stub's is kinematic;
-another one takes its place by implementing this Protocol.
+another one takes its place by implementing this Protocol. It has the axes of the ground, of which z points
+up; the world file may have others.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Figure(Protocol):
 
 
 class ContactPoint(NamedTuple):
-    """A point at which two nodes touch, in meters in the world."""
+    """A point at which two nodes touch, in meters in the axes of the ground."""
 
     point: Vector
     nodes: tuple[SceneNode, SceneNode]

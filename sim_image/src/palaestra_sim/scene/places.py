@@ -2,13 +2,19 @@
 
 A place has the `translation` and `rotation` that clients read and write. It stays as written, except the
 place of a robot with a body, and the places behind joints.
+
+Clients see poses in the axes of the world file, of which z or y points up. Shapes and physics are in the axes
+of the *ground*, of which z points up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
-from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle
+from palaestra_sim.scene.geometry import AxisAngle, Matrix, Pose, Vector, from_axis_angle, transposed, turn
+
+_Y_UP: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)
 
 
 class Place:
@@ -66,6 +72,30 @@ class Place:
         """Return the position of its origin in the world, in meters."""
         return self.translation if self.parent is None else self.world_pose.position
 
+    @property
+    def axes(self) -> Matrix | None:
+        """The rotation from the axes of the world file to those of the ground; None if they are the same."""
+        return None if self.parent is None else self.parent.axes
+
+    def to_ground(self, vector: Vector) -> Vector:
+        """Return a vector in the axes of the world file, in those of the ground."""
+        return vector if self.axes is None else turn(self.axes, vector)
+
+    def from_ground(self, vector: Vector) -> Vector:
+        """Return a vector in the axes of the ground, in those of the world file."""
+        return vector if self.axes is None else turn(transposed(self.axes), vector)
+
+    @property
+    def ground_pose(self) -> Pose:
+        """The frame, in the axes of the ground."""
+        pose = self.world_pose
+        return pose if self.axes is None else Pose(rotation=self.axes).after(pose)
+
+    @property
+    def height_m(self) -> float:
+        """The height of its origin in the world."""
+        return self.ground_pose.position[2]
+
     def chain(self) -> Iterator[Place]:
         """Yield this place and those around it, up to the top of the world."""
         place: Place | None = self
@@ -76,3 +106,15 @@ class Place:
     def return_to_start(self) -> None:
         """Return to the place in the world file."""
         self.translation, self.rotation = self._start
+
+
+class YUp(Place):
+    """The frame around everything in a world whose y axis points up; no node has it."""
+
+    def __init__(self) -> None:
+        super().__init__(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+
+    @property
+    def axes(self) -> Matrix:
+        """The rotation that makes z of y."""
+        return _Y_UP

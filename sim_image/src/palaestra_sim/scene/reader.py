@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from palaestra_sim.errors import WorldError
-from palaestra_sim.scene.axes import check_axes
+from palaestra_sim.scene.axes import read_axes
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
@@ -53,6 +53,7 @@ class Scene:
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
         robots: in the order of the world file.
+        top: the frame around everything; None if z of the world points up.
         left_out: what the stub lacks and the user left out, each with its place.
         leave_out: what the user leaves out.
     """
@@ -62,6 +63,7 @@ class Scene:
     random_seed: int = 0
     solids: list[Shape] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
+    top: Place | None = None
     left_out: tuple[WorldError, ...] = ()
     leave_out: LeaveOut = field(default_factory=LeaveOut)
 
@@ -81,27 +83,30 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
             _read_world_info(reading, node, scene)
     first = reading.world_info or next(iter(tree.root.nodes()), None)
     if first is not None:
-        check_axes(reading, first)
+        reading.top = read_axes(reading, first)
     for node in tree.root.nodes():
-        _read(reading, node, None, scene)
+        _read(reading, node, reading.top, scene)
     reading.conclude()
+    scene.top = reading.top
     scene.left_out = tuple(reading.left_out)
     scene.leave_out = reading.leave_out
     return scene
 
 
-def read_added(tree: SceneTree, nodes: Iterable[SceneNode], physics: Physics, leave_out: LeaveOut) -> Scene:
+def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: Scene) -> Scene:
     """Return what nodes add to a world, all inside one parent, and give them their places.
+
+    `to` has the contents of the world so far.
 
     Raises:
         WorldError: they have things that the stub cannot simulate.
     """
-    reading = Reading((), leave_out)
+    reading = Reading((), to.leave_out)
     reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
-    scene = Scene(physics=physics)
+    scene = Scene(physics=to.physics)
     for node in nodes:
         places = (around.place for around in node.ancestors() if around.place is not None)
-        _read(reading, node, next(places, None), scene)
+        _read(reading, node, next(places, to.top), scene)
     reading.conclude()
     return scene
 

@@ -16,6 +16,7 @@ from typing import Final
 from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
 
 _DRAWN: Final = frozenset(("CadShape", "Shape"))
 _LARGEST: Final = 1e100  # squares of larger ones would overflow
@@ -52,6 +53,7 @@ class Reading:
         leave_out: what the user leaves out.
         left_out: the nodes that were left out, each with its place and the reason.
         world_info: the WorldInfo of the world; None if it has none.
+        top: the frame around everything; None if z of the world points up.
     """
 
     def __init__(self, refused: Iterable[WorldError] = (), leave_out: LeaveOut | None = None) -> None:
@@ -59,6 +61,7 @@ class Reading:
         self.leave_out = leave_out or LeaveOut()
         self.left_out: list[WorldError] = []
         self.world_info: SceneNode | None = None
+        self.top: Place | None = None
 
     def refuse(self, node: SceneNode, fact: str, remedy: str) -> None:
         """Record a mistake in `node`."""

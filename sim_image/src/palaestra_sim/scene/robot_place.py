@@ -3,38 +3,58 @@
 from __future__ import annotations
 
 from palaestra_sim.scene.bodies import Body
-from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle
+from palaestra_sim.scene.geometry import (
+    AxisAngle,
+    Pose,
+    Vector,
+    from_axis_angle,
+    multiply,
+    to_axis_angle,
+    transposed,
+)
 from palaestra_sim.scene.places import Place
 
 
 class RobotPlace(Place):
     """The frame of a robot with a body, which drives upright, at the height at which it was placed.
 
-    Its parent never moves or turns, so the body's pose is the place's.
+    It is at the top of the world, which never moves or turns, so the body's pose is the place's. The body is
+    in the axes of the ground.
     """
 
-    def __init__(self, translation: Vector, rotation: AxisAngle, body: Body) -> None:
-        super().__init__(None, translation, rotation)
+    def __init__(self, top: Place | None, translation: Vector, rotation: AxisAngle, body: Body) -> None:
+        super().__init__(top, translation, rotation)
         self._body = body
+        self._height_m = 0.0
         self.rotation = rotation
         self.translation = translation
 
     @property
     def translation(self) -> Vector:
-        """X and y of the body, and the height of the world file or of the last write."""
-        return (self._body.x, self._body.y, self._translation[2])
+        """X and y of the body, and the height of the world file or of the last write; in the file's axes."""
+        return self.from_ground((self._body.x, self._body.y, self._height_m))
 
     @translation.setter
     def translation(self, value: Vector) -> None:
-        self._translation = value
-        self._body.place(value[0], value[1], self._body.heading_rad)
+        x, y, self._height_m = self.to_ground(value)
+        self._body.place(x, y, self._body.heading_rad)
 
     @property
     def rotation(self) -> AxisAngle:
-        """The heading of the body, about the z axis."""
-        return (0.0, 0.0, 1.0, self._body.heading_rad)
+        """The heading of the body; in a world whose z axis points up, about this axis."""
+        heading = (0.0, 0.0, 1.0, self._body.heading_rad)
+        if self.axes is None:
+            return heading
+        return to_axis_angle(multiply(transposed(self.axes), from_axis_angle(heading)))
 
     @rotation.setter
     def rotation(self, value: AxisAngle) -> None:
-        heading_rad = Pose(rotation=from_axis_angle(value)).heading_rad
-        self._body.place(self._body.x, self._body.y, heading_rad)
+        rotation = from_axis_angle(value)
+        if self.axes is not None:
+            rotation = multiply(self.axes, rotation)
+        self._body.place(self._body.x, self._body.y, Pose(rotation=rotation).heading_rad)
+
+    @property
+    def height_m(self) -> float:
+        """The height of its origin in the world."""
+        return self._height_m

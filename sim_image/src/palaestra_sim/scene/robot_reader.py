@@ -22,7 +22,7 @@ from palaestra_sim.scene.joints import Joint, JointPlace, unit
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
-from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.places import Place, YUp
 from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.robot_place import RobotPlace
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
@@ -119,8 +119,12 @@ class _RobotReader:
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
         """Return whether a robot without a drive has a body: upright, at the top of the world."""
-        upright = self._reading.pose(self._node).upright
-        return bool(shapes) and self._parent is None and upright
+        pose = Place(self._parent, *_where(self._reading, self._node)).ground_pose
+        return bool(shapes) and self._at_top and pose.upright
+
+    @property
+    def _at_top(self) -> bool:
+        return self._parent is None or isinstance(self._parent, YUp)
 
     def _heights(self, wheels: Sequence[Driven]) -> tuple[float, float]:
         ends = [z for shape in self._outline for z in shape.heights()]
@@ -134,11 +138,11 @@ class _RobotReader:
         translation, rotation = reading.translation(node), reading.rotation(node)
         if body is None:
             return Place(self._parent, translation, rotation)
-        if self._parent is not None:
+        if not self._at_top:
             self._lacks(node, "a robot that drives inside another node")
-        if not reading.pose(node).upright:
+        if not Place(self._parent, translation, rotation).ground_pose.upright:
             self._lacks(node, "a robot that drives, but does not stand upright")
-        return RobotPlace(translation, rotation, body)
+        return RobotPlace(self._parent, translation, rotation, body)
 
     def _settle(self, place: Place) -> None:
         """Put the parts, read in a frame of their own, on the robot."""

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
-from palaestra_sim.scene.axes import standing
+from palaestra_sim.scene.axes import frame_of_shapes, standing
 from palaestra_sim.scene.geometry import IDENTITY, Pose, Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
@@ -33,8 +33,8 @@ class Shape:
 
     @property
     def pose(self) -> Pose:
-        """The shape's frame in the world."""
-        return self.place.world_pose.after(self.local)
+        """The shape's frame, in the axes of the ground."""
+        return self.place.ground_pose.after(self.local)
 
     @property
     def upright(self) -> bool:
@@ -66,7 +66,7 @@ class Shape:
 
 def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
     """Yield the shapes of a node's boundingObject that the stub can simulate; the others are refused."""
-    grown = _Grown(Pose(), (place.scale, place.scale, place.scale))
+    grown = _Grown(frame_of_shapes(owner), (place.scale, place.scale, place.scale))
     for node in owner.nodes("boundingObject"):
         yield from _shapes(reading, node, place, grown)
 
@@ -107,7 +107,7 @@ def _shapes(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> I
                 yield from _shapes(reading, inner, place, grown.inside(pose, scale))
         case "Plane":
             # A ceiling is out of the way of everything that stands on the floor.
-            normal = place.world_pose.after(standing(node, grown.frame)).rotation[8]
+            normal = place.ground_pose.after(standing(node, grown.frame)).rotation[8]
             if abs(normal) < _FLAT:
                 reading.lacks(node, "a Plane that is no floor and no ceiling")
         case "IndexedFaceSet":

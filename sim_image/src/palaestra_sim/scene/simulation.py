@@ -195,12 +195,7 @@ class Simulation:
         try:
             require_room(field.node, field.name, added)
             read = field.name == "children"  # other fields hold what is drawn
-            physics = self.scene.physics
-            fresh = (
-                read_added(self.tree, added, physics, self.scene.leave_out)
-                if read
-                else Scene(physics=physics)
-            )
+            fresh = read_added(self.tree, added, self.scene) if read else Scene(physics=self.scene.physics)
         except SimError:
             self.tree.forget(added)
             raise
@@ -235,7 +230,7 @@ class Simulation:
         """Return where a node touches others: points in meters, each with the number of the touching node."""
         asked = {node, *node.descendants()} if descendants else {node}
         return [
-            (point, touching.number)
+            (point if self.scene.top is None else self.scene.top.from_ground(point), touching.number)
             for point, nodes in self.scene.physics.contacts()
             for touching in nodes
             if touching in asked

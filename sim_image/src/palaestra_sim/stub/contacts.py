@@ -37,7 +37,7 @@ def contact_points(
 def _parts(robot: Figure, body: StubBody) -> Iterator[tuple[Disc, SceneNode, float, float]]:
     """Yield each cylinder of a robot, with the node that it is of, its lower and its upper end."""
     low, high = body.heights
-    height = robot.place.world_pose.position[2]
+    height = robot.place.height_m
     for disc, shape in zip(body.discs, body.rim, strict=True):
         yield disc, shape.node, low + height, high + height
 

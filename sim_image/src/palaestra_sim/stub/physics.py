@@ -67,13 +67,13 @@ class StubPhysics:
         def frame() -> tuple[float, float, float, float]:
             if isinstance(body, StubBody):
                 return body.frame
-            pose = place.world_pose
+            pose = place.ground_pose
             return pose.position[0], pose.position[1], pose.rotation[0], pose.rotation[3]
 
         if any(not beam.level for beam in beams):
             sloped = SlopedBeams(beams)
             self._sloped.setdefault(figure, []).append(sloped)
-            return lambda: sloped.cast(frame(), place.translation[2])
+            return lambda: sloped.cast(frame(), place.height_m)
         fan = Fan([beam.ray for beam in beams], [beam.reach_m for beam in beams])
         heights = [beam.height_m for beam in beams]
         self._level.setdefault(figure, []).append(_Level(fan, (min(heights), max(heights))))
@@ -87,7 +87,7 @@ class StubPhysics:
         return contact_points(self._moving, self._solids)
 
     def _face(self, figure: Figure, others: Sequence[StubBody]) -> None:
-        height = figure.place.world_pose.position[2]
+        height = figure.place.height_m
         body = figure.body
         if isinstance(body, StubBody) and body.radius > 0.0:
             in_the_way = _between(self._solids, body.heights, height)
@@ -108,7 +108,7 @@ def _between(solids: Sequence[Shape], heights: tuple[float, float], shift: float
 
 
 def _of_robot(figure: Figure, body: StubBody) -> Upright:
-    height = figure.place.world_pose.position[2]
+    height = figure.place.height_m
     return Upright(body, body.heights[0] + height, body.heights[1] + height)
 
 

@@ -152,18 +152,21 @@ class NodeServices:
 
     def _get_velocity(self, request: Any) -> Fields:
         node = self._node(request)
-        _pose(node)
+        place = _place(node)
         robot = self._robot(node)
         body = robot.body if robot is not None else None
         vx, vy, omega = body.velocity if body is not None else (0.0, 0.0, 0.0)
-        return {"velocity": {"linear": _point((vx, vy, 0.0)), "angular": _point((0.0, 0.0, omega))}}
+        linear, angular = place.from_ground((vx, vy, 0.0)), place.from_ground((0.0, 0.0, omega))
+        return {"velocity": {"linear": _point(linear), "angular": _point(angular)}}
 
     def _set_velocity(self, request: Any) -> Fields:
         """Push a robot; its motors bring it back to their commands within a few basic steps."""
         robot = self._robot(self._node(request))
         if robot is not None and robot.body is not None:
-            wanted = request.velocity
-            robot.body.push(wanted.linear.x, wanted.linear.y, wanted.angular.z)
+            linear, angular = request.velocity.linear, request.velocity.angular
+            vx, vy, _ = robot.place.to_ground((linear.x, linear.y, linear.z))
+            _, _, omega = robot.place.to_ground((angular.x, angular.y, angular.z))
+            robot.body.push(vx, vy, omega)
         return {"success": 1}
 
     def _get_field(self, request: Any) -> Fields:

@@ -32,7 +32,6 @@ class Accelerometer:
 
 
 def _read(part: Part) -> Accelerometer:
-    part.require_enu("accelerometer")
     (gravity,) = part.world_numbers("gravity", (9.81,))
     return Accelerometer(
         name=part.name,
@@ -49,8 +48,8 @@ def _sampler(sensors: Sequence[Accelerometer], robot: Carrier) -> Sample:
 
     def sample() -> None:
         for sensor, acceleration in followed:
-            x, y, z = acceleration()
-            inward = transposed(sensor.place.world_pose.rotation)
+            x, y, z = sensor.place.to_ground(acceleration())
+            inward = transposed(sensor.place.ground_pose.rotation)
             sensor.value = sensor.axes.respond(turn(inward, (x, y, z + sensor.gravity)), gauss)
 
     return sample
