@@ -216,6 +216,21 @@ def test_a_device_without_a_robot_is_a_solid():
     assert obstacles(load_world(tripod)) == [("box", 1.0, 0.0, (0.1, 0.1, 1.0))]
 
 
+DOOR = """Pose { translation 1 0 0 children [ HingeJoint { endPoint Solid { translation 0 2 0 %s
+  boundingObject Box { size 1 0.1 2 } } } ] }"""
+
+
+def test_a_door_on_a_hinge_without_physics_stands_where_it_is():
+    """Nothing moves it in Webots either."""
+    assert obstacles(load_world(DOOR % "")) == [("box", 1.0, 2.0, (1.0, 0.1, 2.0))]
+
+
+def test_a_door_that_swings_is_refused():
+    """A robot would push it open."""
+    with pytest.raises(WorldError, match="a Solid with physics moves when it is pushed"):
+        load_world(DOOR % "physics Physics { }")
+
+
 def test_a_conveyor_belt_is_refused():
     """It would carry away what stands on it."""
     with pytest.raises(WorldError, match="a Track with devices moves what stands on it"):

@@ -31,6 +31,7 @@ DRAWN_ONLY: Final = frozenset(
         "Fog",
         "PointLight",
         "Shape",
+        "SolidReference",
         "SpotLight",
         "TexturedBackground",
         "TexturedBackgroundLight",
@@ -41,6 +42,7 @@ DRAWN_ONLY: Final = frozenset(
 # A device without a robot is a thing like others.
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
+_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint", "HingeJoint", "SliderJoint"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -130,6 +132,10 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
         robot = read_robot(reading, node, parent, scene.physics)
         scene.robots.append(robot)
         _stand(reading, robot.standing, scene)
+    elif kind in _JOINTS:
+        # Without a robot nothing moves it; an end that would swing has physics, and is refused for that.
+        for end in node.nodes("endPoint"):
+            _read(reading, end, parent, scene)
     elif kind in _FRAMES:
         place = Place(parent, reading.translation(node), reading.rotation(node), reading.size(node))
         node.place = place
