@@ -126,6 +126,11 @@ def test_spans_tell_which_bytes_were_read(scene: World, box: Node) -> None:
     assert scene.source[first:last] == b"1 -2.5 0"
 
 
+def test_a_header_may_have_blanks_after_its_hash() -> None:
+    """Webots trims them; PROTOs of published drones have one."""
+    assert parse(b"# VRML_SIM R2022b utf8\nRobot { }").nodes[0].type_name == "Robot"
+
+
 def test_a_header_may_be_the_whole_file() -> None:
     """An empty world is a world, and older releases numbered differently."""
     assert parse(b"#VRML_SIM V8.6.2 utf8").nodes == ()

@@ -60,4 +60,4 @@ def frame_of_shapes(owner: SceneNode) -> Pose:
 
 def _release(node: SceneNode) -> str:
     """Return the release in the first line of the file of a node."""
-    return "" if node.origin is None else node.origin.source.header().split()[1]
+    return "" if node.origin is None else node.origin.source.header().split()[-2]

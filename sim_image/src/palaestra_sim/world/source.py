@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from palaestra_sim.errors import WorldError
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # some editors begin a file in UTF-8 with it
-_RELEASE = re.compile(rb"#VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
-_HEADER = re.compile(rb"#VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
+# Webots takes blanks after the hash, as PROTOs of drones have them.
+_RELEASE = re.compile(rb"#[ \t]*VRML_SIM R(?P<year>[0-9]{4})(?P<letter>[a-z]?)")
+_HEADER = re.compile(rb"#[ \t]*VRML_SIM [VR]?[0-9][^\s]*(?: utf8)?(?=[ \t]*\r?(?:\n|\Z))")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
