@@ -216,6 +216,16 @@ def test_a_device_without_a_robot_is_a_solid():
     assert obstacles(load_world(tripod)) == [("box", 1.0, 0.0, (0.1, 0.1, 1.0))]
 
 
+def test_a_second_device_of_a_name_can_be_left_out():
+    """Webots starts such worlds, and finds the first one by that name."""
+    robot = 'Robot { controller "ros" children [ GPS { } Pose { translation 0 0 1 children [ GPS { } ] } ] }'
+    simulation = load_world(robot, leave_out=LeaveOut(everything=True, names=True))
+
+    assert simulation.robots[0].sensors["gps"].place.translation == (0.0, 0.0, 0.0)
+    assert simulation.robots[0].sensors["gps"].place.height_m == 0.0
+    assert ["a second device 'gps'" in str(it) for it in simulation.left_out] == [True]
+
+
 DOOR = """Pose { translation 1 0 0 children [ HingeJoint { endPoint Solid { translation 0 2 0 %s
   boundingObject Box { size 1 0.1 2 } } } ] }"""
 

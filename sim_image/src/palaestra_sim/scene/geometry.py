@@ -14,6 +14,7 @@ Matrix = tuple[float, float, float, float, float, float, float, float, float]
 AxisAngle = tuple[float, float, float, float]  # x, y, z of the axis, angle in radians
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
+_UPRIGHT: Final = math.cos(math.radians(2.0))
 IDENTITY: Final[Matrix] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -48,8 +49,8 @@ class Pose(NamedTuple):
 
     @property
     def upright(self) -> bool:
-        """Whether the z axis points straight up, to within a milliradian."""
-        return self.rotation[8] > 1.0 - 0.5e-6
+        """Whether the z axis points up, to within two degrees: many worlds were saved while they ran."""
+        return self.rotation[8] > _UPRIGHT
 
 
 def turn(m: Matrix, v: Vector) -> Vector:

@@ -23,7 +23,7 @@ from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place, YUp
-from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.reading import ELSEWHERE, Reading
 from palaestra_sim.scene.robot_place import RobotPlace
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.wheels import Driven, wheels_among
@@ -314,10 +314,10 @@ class _RobotReader:
             outline=self._outline,
         )
         device: object = kind.read(part)
+        if not node.left_out and name in self._devices.rows and self._by_ros:
+            self._reading.lacks(node, f"a second device {name!r}", f"give it its own name, {ELSEWHERE}")
         if node.left_out:
             return None
-        if name in self._devices.rows and self._by_ros:
-            self._reading.refuse(node, f"a second device {name!r}", "give it its own name")
         self._devices.rows[name] = kind, device
         self._devices.nodes[name] = node
         if shaft is not None:
