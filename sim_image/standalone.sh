@@ -18,7 +18,7 @@ rm -rf EXTERNALLY-MANAGED config-* ensurepip idlelib lib2to3 pydoc_data sitecust
 rm -f lib-dynload/_curses* lib-dynload/_dbm* lib-dynload/_sqlite3* lib-dynload/readline*
 
 cp -a "$installed"/prometheus_client* "$installed"/palaestra_protocol "$installed"/palaestra_sim* "$own/"
-rm -rf "$own/palaestra_sim/stub" "$own/palaestra_sim/message_package" "$own/palaestra_protocol/ros"
+rm -rf "$own/palaestra_sim/stub" "$own/palaestra_sim/mujoco" "$own/palaestra_sim/message_package" "$own/palaestra_protocol/ros"
 
 for program in "$target/lib/$name.program" lib-dynload/*.so; do
   ldd "$program"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tools.images import cache, lock, programs
 from tools.images.errors import ImagesError
-from tools.images.recipes import Recipe, digest, digest_of_files, project, sources
+from tools.images.recipes import Recipe, digest, digest_of_files, left_out, project, sources
 
 _FETCH_OPTIONS = (
     *("--disable-pip-version-check", "--progress-bar=off"),
@@ -48,8 +48,11 @@ def contents(root: Path, recipe: Recipe, machine: str) -> Contents:
     Raises:
         ImagesError: the lock is not as `make lock` writes it.
     """
-    names = [project(root, package)["name"] for package in recipe.packages]
-    share = lock.share(_pins(root / "requirements.lock"), names, machine, recipe.without)
+    projects = [project(root, package) for package in recipe.packages]
+    pins = _pins(root / "requirements.lock")
+    for one in projects:
+        pins = lock.unwanted(pins, one["name"], left_out(one, recipe.extras))
+    share = lock.share(pins, [one["name"] for one in projects], machine, recipe.without)
     ours = [path for package in recipe.packages for path in sources(root, package)]
     files = [root / file for file in recipe.files]
     return Contents(

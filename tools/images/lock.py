@@ -6,7 +6,7 @@ Markers are decided for the image, not for the machine that builds it: its Pytho
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from packaging.markers import Marker
 
@@ -58,6 +58,13 @@ def share(pins: Iterable[Pin], packages: Collection[str], machine: str, without:
         needed |= more
     chosen = sorted((pin for pin in here if pin.name in needed), key=lambda pin: pin.name)
     return "".join(f"{pin.requirement()}\n" for pin in chosen)
+
+
+def unwanted(pins: Iterable[Pin], package: str, names: Collection[str]) -> tuple[Pin, ...]:
+    """Return the pins as they would be if `package` did not want those called `names`."""
+    return tuple(
+        replace(pin, wanted_by=pin.wanted_by - {package}) if pin.name in names else pin for pin in pins
+    )
 
 
 def _pin(block: list[str]) -> Pin:

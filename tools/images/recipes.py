@@ -2,9 +2,13 @@
 
 import hashlib
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 REGISTRY = "docker.io/library"  # what a cluster adds to a name without a host
 
@@ -13,14 +17,16 @@ REGISTRY = "docker.io/library"  # what a cluster adds to a name without a host
 class Recipe:
     """One image.
 
-    `packages` are folders of ours, `files` what the Dockerfile runs or copies besides. `without` names
-    locked packages that the image does without, `extra` is a lock of its own that it has whole besides, and
-    `arguments` are those of the Dockerfile.
+    `packages` are folders of ours, of which the image has the optional dependencies that `extras` names, and
+    `files` what the Dockerfile runs or copies besides. `without` names locked packages that the image does
+    without, `extra` is a lock of its own that it has whole besides, and `arguments` are those of the
+    Dockerfile.
     """
 
     name: str
     dockerfile: str
     packages: tuple[str, ...]
+    extras: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     extra: str | None = None
@@ -70,10 +76,21 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
     }
 
 
-def project(root: Path, package: str) -> Mapping[str, str]:
-    """Return name and version of one of our packages."""
-    found: Mapping[str, str] = tomllib.loads((root / package / "pyproject.toml").read_text())["project"]
+def project(root: Path, package: str) -> Mapping[str, Any]:
+    """Return name, version and dependencies of one of our packages, as its pyproject.toml has them."""
+    found: Mapping[str, Any] = tomllib.loads((root / package / "pyproject.toml").read_text())["project"]
     return found
+
+
+def left_out(project: Mapping[str, Any], extras: Collection[str]) -> frozenset[str]:
+    """Return the names that a project wants only for extras other than these."""
+    optional: Mapping[str, Sequence[str]] = project.get("optional-dependencies", {})
+    wanted = [*project["dependencies"], *(each for extra in extras for each in optional.get(extra, ()))]
+    return _names(each for listed in optional.values() for each in listed) - _names(wanted)
+
+
+def _names(requirements: Iterable[str]) -> frozenset[str]:
+    return frozenset(canonicalize_name(Requirement(each).name) for each in requirements)
 
 
 def sources(root: Path, package: str) -> Iterator[Path]:

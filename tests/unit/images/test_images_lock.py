@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tools.images.context import contents
-from tools.images.lock import parse, share
-from tools.images.recipes import project, recipes
+from tools.images.lock import parse, share, unwanted
+from tools.images.recipes import left_out, recipes
 
 ROOT = Path(__file__).parents[3]
 LOCK = parse((ROOT / "requirements.lock").read_text())
@@ -65,6 +65,25 @@ def test_what_is_left_out_takes_along_what_only_it_needs():
     assert names(share(parse(SMALL), ["palaestra"], "x86_64", without=["parent"])) == set()
 
 
+def test_what_a_package_does_not_want_stays_where_another_wants_it():
+    """`parent` is wanted by a stranger, too."""
+    pins = unwanted(parse(SMALL), "palaestra", ["parent"])
+
+    assert names(share(pins, ["palaestra"], "x86_64")) == set()
+    assert "parent" in names(share(pins, ["stranger"], "x86_64"))
+
+
+def test_an_image_without_an_extra_has_nothing_that_only_the_extra_wants():
+    """What the package wants anyway stays."""
+    package = {
+        "dependencies": ["always>=1"],
+        "optional-dependencies": {"camera": ["PyOpenGL>=3", "always"], "sound": ["horn"]},
+    }
+
+    assert left_out(package, ()) == {"pyopengl", "horn"}
+    assert left_out(package, ("camera",)) == {"horn"}
+
+
 def test_a_share_keeps_every_hash():
     """A wheel that is not the locked one is refused by the installer."""
     requirements = share(parse(SMALL), ["palaestra"], "x86_64")
@@ -90,16 +109,22 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
 @pytest.mark.parametrize(
     ("image", "holds", "lacks"),
     [
-        ("stub", {"prometheus-client"}, {"numpy", "pydantic", "torch", "pytest"}),
-        ("operator", {"pydantic", "structlog", "prometheus-client"}, {"numpy", "torch", "pytest"}),
-        ("trainer", {"numpy", "stable-baselines3", "gymnasium", "pydantic"}, {"torch", "triton", "pytest"}),
+        ("stub", {"prometheus-client"}, {"mujoco-core", "numpy", "pydantic", "torch", "pytest"}),
+        (
+            "operator",
+            {"pydantic", "structlog", "prometheus-client"},
+            {"mujoco-core", "numpy", "torch", "pytest"},
+        ),
+        (
+            "trainer",
+            {"numpy", "stable-baselines3", "gymnasium", "pydantic"},
+            {"mujoco-core", "torch", "triton", "pytest"},
+        ),
     ],
 )
 def test_an_image_has_its_own_share_of_the_real_lock(image, holds, lacks):
     """A sidecar stays small, and the trainer for the processor is without 5 GB of CUDA."""
-    recipe = recipes("debian")[image]
-    ours = [project(ROOT, package)["name"] for package in recipe.packages]
-    chosen = names(share(LOCK, ours, "x86_64", recipe.without))
+    chosen = names(contents(ROOT, recipes("debian")[image], "x86_64").requirements.text)
 
     assert holds <= chosen
     assert not lacks & chosen
