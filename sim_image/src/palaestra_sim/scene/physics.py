@@ -56,6 +56,10 @@ class Physics(Protocol):
         """Move the bodies on by one basic step; one without power comes to rest."""
         ...
 
+    def reset(self) -> None:
+        """Forget the past: what follows depends on nothing but the state and the commands."""
+        ...
+
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return a function that returns how far each beam of a robot travels now, in meters."""
         ...

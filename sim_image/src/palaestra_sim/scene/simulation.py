@@ -310,6 +310,7 @@ class Simulation:
     def _restore(self) -> None:
         self._reset_asked = False
         self.time_ms = 0
+        self.scene.physics.reset()
         added, self._added = self._added, []
         for node in added:
             if self.tree.of_number(node.number) is node:

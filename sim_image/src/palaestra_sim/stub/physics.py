@@ -60,6 +60,9 @@ class StubPhysics:
             if figure.powered:
                 body.advance(step_s)
 
+    def reset(self) -> None:
+        """Do nothing: no motion depends on the past."""
+
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return a function that returns how far each beam of a robot travels now, in meters."""
         place, body = figure.place, figure.body

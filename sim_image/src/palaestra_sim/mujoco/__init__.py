@@ -1,0 +1,10 @@
+"""MuJoCo under the scene: masses, forces, contacts, and loose things that move when they are pushed.
+
+- `cli`: `palaestra-mujoco`
+- `physics`: the bodies and obstacles of a world
+- `model`: from robots and shapes to MuJoCo's model
+- `body`: a robot that drives
+- `rays`: how far the beams of sensors travel
+
+Worlds, devices and the interface are those of all simulators: `scene` and `front`.
+"""

@@ -1,0 +1,118 @@
+"""A robot in MuJoCo: three joints on the floor, and three force-limited servos in the robot's own axes.
+
+The speed that the servos aim at comes from the law of the wheels, once a basic step. The wheels themselves
+touch nothing: rollers and capsules as wheels are 4 to 25 times as slow, and drift by decimeters
+(docs/decisions/0017).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+from palaestra_sim.scene.base import ACCELERATIONS
+from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.shapes import Shape
+
+X, Y, HEADING = 0, 1, 2  # of the three joints
+
+
+class MujocoBody:
+    """A robot that drives; see `Body`.
+
+    Attributes:
+        build: what it is made of.
+        base: its wheels.
+        poses: where each shape of its outline is, in its own frame.
+        radius_m: of the circle around its outline.
+        x, y, heading_rad, c, s, velocity, touched: see `Body`.
+    """
+
+    def __init__(self, build: Build) -> None:
+        self.build = build
+        self.base = build.base
+        self.radius_m = max((_reach(shape) for shape in build.outline), default=0.1)
+        # Read now, in the robot's frame; later the places are those in the world.
+        self.poses = tuple(shape.pose for shape in build.outline)
+        self.touched = 0
+        self.velocity = (0.0, 0.0, 0.0)
+        self._joints: Any = None  # views of MuJoCo's arrays, once there is a model
+        self._speeds: Any = None
+        self._controls: Any = None
+        self.x = self.y = self.heading_rad = self.s = 0.0
+        self.c = 1.0
+
+    def attach(self, joints: Any, speeds: Any, controls: Any) -> None:
+        """Take the parts of a new model's arrays that belong to this body, and write its state there."""
+        self._joints, self._speeds, self._controls = joints, speeds, controls
+        self.write()
+
+    def write(self) -> None:
+        """Write its state to MuJoCo's arrays."""
+        self._joints[:] = self.x, self.y, self.heading_rad
+        self._speeds[:] = self.velocity
+
+    def bits(self, outline: Sequence[Shape]) -> int:
+        """Return the parts of the body that these shapes are, as bits of `touched`."""
+        return sum(1 << index for index, shape in enumerate(self.build.outline) if shape in outline)
+
+    def place(self, x: float, y: float, heading_rad: float) -> None:
+        """Place the robot somewhere; its motion continues."""
+        self._stand(x, y, heading_rad)
+        if self._joints is not None:
+            self._joints[:] = x, y, heading_rad
+
+    def halt(self) -> None:
+        """Stop all motion; the motors begin again from rest."""
+        self.base.halt()
+        self.touched = 0
+        self._set_speed(0.0, 0.0, 0.0)
+
+    def push(self, vx: float, vy: float, omega: float) -> None:
+        """Give the body a velocity in world axes; its motors start from there."""
+        self.base.push(vx * self.c + vy * self.s, vy * self.c - vx * self.s, omega)
+        self._set_speed(vx, vy, omega)
+
+    def command(self, step_s: float, *, powered: bool) -> None:
+        """Turn the wheels for one basic step, and set what the servos aim at."""
+        if powered:
+            self.base.turn(step_s)
+        self._controls[:] = self.base.vx, self.base.vy, self.base.omega
+
+    def follow(self, step_s: float) -> None:
+        """Take the pose that MuJoCo has computed."""
+        x, y, turned = self._joints.tolist()
+        heading = math.remainder(turned, 2.0 * math.pi)
+        omega = math.remainder(heading - self.heading_rad, 2.0 * math.pi) / step_s
+        self.velocity = ((x - self.x) / step_s, (y - self.y) / step_s, omega)
+        self._stand(x, y, heading)
+
+    def _set_speed(self, vx: float, vy: float, omega: float) -> None:
+        self.velocity = (vx, vy, omega)
+        if self._speeds is not None:
+            self._speeds[:] = self.velocity
+
+    def _stand(self, x: float, y: float, heading_rad: float) -> None:
+        self.x = x
+        self.y = y
+        self.heading_rad = heading_rad
+        self.c = math.cos(heading_rad)
+        self.s = math.sin(heading_rad)
+
+
+_RESERVE: Final = 2.0  # of the force for the largest acceleration: a servo that lags must catch up
+_GAIN: Final = 500.0  # in 1/s: a servo reaches its speed within a substep of 4 ms or two
+
+
+def servo(axis: int, inertia: float) -> tuple[float, float]:
+    """Return gain and largest force of the servo along an axis, for a mass in kg or an inertia in kg m2."""
+    return _GAIN * inertia, _RESERVE * ACCELERATIONS[axis] * inertia
+
+
+def _reach(shape: Shape) -> float:
+    """Return how far a shape in the robot's frame reaches from its origin, seen from above."""
+    x, y, _ = shape.pose.position
+    return math.hypot(x, y) + (
+        shape.size[0] / 2.0 if shape.kind != "box" else math.hypot(shape.size[0], shape.size[1]) / 2.0
+    )

@@ -1,0 +1,110 @@
+"""The physics of MuJoCo: one model of all robots and obstacles, made anew when one comes or goes.
+
+A basic step is a whole number of MuJoCo's steps. After it, every body has the pose that the scene's devices
+read. Rays are cast when a sensor is sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import mujoco
+
+from palaestra_sim.mujoco.body import MujocoBody
+from palaestra_sim.mujoco.model import Built, build
+from palaestra_sim.mujoco.rays import Beams
+from palaestra_sim.scene.beams import Beam
+from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Cast, ContactPoint, Figure
+from palaestra_sim.scene.shapes import Shape
+
+LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
+
+
+class MujocoPhysics:
+    """The motion of one world; see `Physics`."""
+
+    def __init__(self) -> None:
+        self._figures: tuple[Figure, ...] = ()
+        self._solids: tuple[Shape, ...] = ()
+        self._built: Built = build((), ())
+        self._settled = True
+
+    def body(self, build: Build) -> MujocoBody:
+        """Return the body of a robot that is being read."""
+        return MujocoBody(build)
+
+    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape]) -> None:
+        """Take these robots and obstacles as the contents of the world, where they are now."""
+        if (self._figures, self._solids) == (tuple(figures), tuple(solids)):
+            self._built.put_obstacles()
+        else:
+            self._figures, self._solids = tuple(figures), tuple(solids)
+            self._built = build(figures, solids)
+        self._settled = False
+
+    def advance(self, step_s: float) -> None:
+        """Move the bodies on by one basic step."""
+        built = self._built
+        steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
+        built.model.opt.timestep = step_s / steps
+        for figure, (body, _) in built.figures.items():
+            body.command(step_s, powered=figure.powered)
+        for _ in range(steps):
+            mujoco.mj_step(built.model, built.data)
+            if built.data.ncon:
+                self._feel()
+        for body, _ in built.figures.values():
+            body.follow(step_s)
+        self._settled = False
+
+    def reset(self) -> None:
+        """Forget the past, such as the forces of the last step, from which the solver would start."""
+        mujoco.mj_resetData(self._built.model, self._built.data)
+        for body, _ in self._built.figures.values():
+            body.write()
+        self._settled = False
+
+    def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
+        """Return a function that returns how far each beam of a robot travels now, in meters."""
+        bundle = Beams(figure, beams)
+
+        def cast() -> Sequence[float]:
+            self._settle()
+            return bundle.cast(self._built)
+
+        return cast
+
+    def contacts(self) -> Iterator[ContactPoint]:
+        """Yield where robots touch obstacles and each other now."""
+        self._settle()
+        mujoco.mj_collision(self._built.model, self._built.data)
+        contacts = self._built.data.contact
+        for pair, position in zip(contacts.geom.tolist(), contacts.pos.tolist(), strict=True):
+            sides = [self._built.geoms.get(geom) for geom in pair]
+            if sides[0] is not None and sides[1] is not None:
+                x, y, z = position
+                yield ContactPoint((x, y, z), (_solid(sides[0][0].node), _solid(sides[1][0].node)))
+
+    def _feel(self) -> None:
+        """Note which parts of robots are touched."""
+        geoms = self._built.geoms
+        for pair in self._built.data.contact.geom.tolist():
+            for geom in pair:
+                found = geoms.get(geom)
+                if found is not None and found[1] is not None:
+                    found[1].touched |= found[2]
+
+    def _settle(self) -> None:
+        if not self._settled:
+            self._built.settle()
+            self._settled = True
+
+
+def _solid(node: SceneNode) -> SceneNode:
+    """Return the Solid, Robot or device whose boundingObject has a node."""
+    around = (node, *node.ancestors())
+    return next((it for it in around if it.place is not None and not it.outline), node)

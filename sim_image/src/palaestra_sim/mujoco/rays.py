@@ -1,0 +1,68 @@
+"""Rays of MuJoCo: how far the beams of one robot travel, not counting the robot itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from palaestra_sim.mujoco.model import SEEN, Built
+from palaestra_sim.scene.beams import Beam
+from palaestra_sim.scene.physics import Figure
+
+_GROUPS: Final = np.array([int(group == SEEN) for group in range(mujoco.mjNGROUP)], dtype=np.uint8)
+
+
+class Beams:
+    """The beams of one robot; beams that begin at one point are cast together."""
+
+    def __init__(self, figure: Figure, beams: Sequence[Beam]) -> None:
+        self._figure = figure
+        self._reach = np.array([beam.reach_m for beam in beams])
+        # In the robot's frame.
+        self._origins = np.array([[beam.ray[0], beam.ray[1], beam.height_m] for beam in beams])
+        stretch = [math.hypot(1.0, beam.slope) for beam in beams]
+        self._directions = np.array(
+            [
+                [beam.ray[2] / along, beam.ray[3] / along, beam.slope / along]
+                for beam, along in zip(beams, stretch, strict=True)
+            ]
+        )
+        self._distances = np.empty(len(beams))
+        self._hits = np.empty(len(beams), dtype=np.int32)
+        order = groupby(range(len(beams)), key=lambda index: tuple(self._origins[index]))
+        self._bundles = [(bundle[0], bundle[-1] + 1) for _, indices in order if (bundle := list(indices))]
+
+    def cast(self, built: Built) -> list[float]:
+        """Return how far each beam travels, in meters; its full reach if it meets nothing."""
+        pose = self._figure.place.world_pose
+        turned = np.array(pose.rotation).reshape(3, 3)
+        origins = self._origins @ turned.T + pose.position
+        directions = self._directions @ turned.T
+        own = built.body_of(self._figure)
+        for first, end in self._bundles:
+            self._cast(built, origins[first], directions[first:end].ravel(), own, slice(first, end))
+        distances = self._distances
+        missed = (distances < 0.0) | (distances > self._reach)
+        return np.where(missed, self._reach, distances).tolist()
+
+    def _cast(self, built: Built, origin: Any, directions: Any, own: int, part: slice) -> None:
+        count = part.stop - part.start
+        mujoco.mj_multiRay(
+            built.model,
+            built.data,
+            origin,
+            directions,
+            _GROUPS,
+            True,
+            own,
+            self._hits[part],
+            self._distances[part],
+            None,
+            count,
+            mujoco.mjMAXVAL,
+        )

@@ -1,0 +1,202 @@
+"""Robots, rays and contacts, alike under the stub and MuJoCo."""
+
+import math
+import random
+import re
+
+import pytest
+
+from palaestra_sim.mujoco.physics import MujocoPhysics
+from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.tree.catalogue import FieldType
+from palaestra_sim.stub.physics import StubPhysics
+from palaestra_sim.world import builtin
+
+RADIUS_M = 0.2286  # of the arena's Robotino with its bumper
+WALL_M = 2.0
+OTHER = b"""
+Robot {
+  translation 0.8 0 0.2
+  name "other"
+  controller "<none>"
+  boundingObject Cylinder { radius 0.2 height 0.4 }
+}
+"""
+
+
+def place(simulation, x, y, heading_rad=0.0):
+    """Put the first robot somewhere, as a supervisor does."""
+    robot = simulation.robots[0].place
+    robot.translation = (x, y, robot.translation[2])
+    robot.rotation = (0.0, 0.0, 1.0, heading_rad)
+
+
+def distances(simulation):
+    """Return how far the infra-red sensors see, as voltages."""
+    return [it.value for name, it in simulation.robots[0].sensors.items() if name.startswith("ir")]
+
+
+def test_a_robot_drives_as_it_is_commanded(load, drive):
+    """Half a meter a second ahead is half a meter after a second, but for the start."""
+    body = drive(load(), 0.25, 0.0, 0.0, steps=5)
+
+    assert (body.x, body.y) == pytest.approx((0.25 * 0.96, 0.0), abs=0.02)
+    assert body.velocity == pytest.approx((0.25, 0.0, 0.0), abs=0.005)
+
+
+def test_a_robot_turns_as_it_is_commanded(load, drive):
+    """The heading stays in (-pi, pi]."""
+    body = drive(load(), 0.0, 0.0, 1.5, steps=13)
+
+    assert body.heading_rad == pytest.approx(math.remainder(1.5 * 13 * 0.192, 2.0 * math.pi), abs=0.05)
+
+
+def test_a_wall_holds_a_robot_and_its_bumper_feels_it(load, drive):
+    """Its wheels go on turning."""
+    simulation = load()
+    place(simulation, 1.5, 0.0)
+
+    body = drive(simulation, 0.4, 0.0, 0.0, steps=10)
+    simulation.step(192)
+
+    assert body.x == pytest.approx(WALL_M - RADIUS_M, abs=0.01)
+    assert simulation.robots[0].sensors["touch sensor"].value is True
+
+
+def test_a_robot_slides_along_a_wall(load, drive):
+    """It keeps the part of its motion that the wall leaves free."""
+    simulation = load()
+    place(simulation, 1.7, -0.5)
+
+    body = drive(simulation, 0.2, 0.2, 0.0, steps=10)
+
+    assert body.x < WALL_M - RADIUS_M + 0.01
+    assert body.y > -0.4
+
+
+def test_sensors_see_walls_and_not_their_robot(load):
+    """Every physics gives the voltages of the same distances; noise has the same draws."""
+    simulation = load()
+    place(simulation, 1.6, 0.0)
+    simulation.step(192)
+
+    seen = distances(simulation)
+    assert max(seen) == seen[0]
+    assert len(set(seen)) > 3
+
+
+def test_both_physics_see_alike():
+    """A policy that was trained in one reads the same from the other."""
+    readings = []
+    for physics in (StubPhysics, MujocoPhysics):
+        simulation = Simulation.load(builtin("arena"), physics(), "arena", Mode.FAST)
+        seen = []
+        for x, y, heading in ((0.0, 0.0, 0.0), (1.5, 1.4, 0.7), (-1.2, 0.3, 2.0), (1.6, -1.6, -1.0)):
+            place(simulation, x, y, heading)
+            simulation.step(192)
+            seen += distances(simulation)
+        readings.append(seen)
+
+    assert readings[0] == pytest.approx(readings[1], rel=0.02)
+
+
+def test_an_obstacle_that_a_supervisor_moves_is_met_where_it_is(load, drive):
+    """Layouts are drawn anew in each episode."""
+    simulation = load()
+    node = simulation.tree.of_def("CYLINDER_0")
+    translation = simulation.tree.field_of(node, "translation", simulation)
+    translation.set(FieldType.VEC3F, 0, (0.7, 0.0, 0.2))
+
+    body = drive(simulation, 0.4, 0.0, 0.0, steps=10)
+
+    assert body.x == pytest.approx(0.7 - 0.25 - RADIUS_M, abs=0.02)
+
+
+def test_contact_points_name_both_sides(load, drive):
+    """A supervisor asks which wall it is."""
+    simulation = load()
+    place(simulation, 1.7, 0.0)
+    drive(simulation, 0.4, 0.0, 0.0, steps=5)
+
+    wall = simulation.tree.of_def("WALL_0")
+    points = simulation.contact_points(wall, descendants=False)
+
+    assert points
+    assert {number for _, number in points} == {wall.number}
+    assert points[0][0][0] == pytest.approx(WALL_M, abs=0.01)
+
+
+def test_a_push_fades(load, drive):
+    """The motors bring the robot back to their commands."""
+    simulation = load()
+    body = simulation.robots[0].body
+    body.push(0.5, 0.0, 0.0)
+
+    assert body.velocity == (0.5, 0.0, 0.0)
+    drive(simulation, 0.0, 0.0, 0.0)
+    assert body.velocity == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+
+
+def test_a_reset_forgets_everything(load, drive):
+    """The same commands after it give the same numbers, bit for bit, as in a new simulation."""
+
+    def course(simulation):
+        trace = []
+        for vx, omega in ((0.5, 0.0), (0.3, 1.2), (0.6, -0.5), (0.6, 0.0), (0.6, 0.0)):
+            body = drive(simulation, vx, 0.1, omega, steps=3)
+            trace.append((body.x, body.y, body.heading_rad, *distances(simulation)))
+        return trace
+
+    fresh, used = load(), load()
+    drive(used, 0.6, -0.2, 0.9, steps=7)
+    used.reset()
+    used.advance(used.basic_step_ms)
+    fresh.reset()
+    fresh.advance(fresh.basic_step_ms)
+
+    assert course(used) == course(fresh)
+
+
+def test_an_imported_crate_is_an_obstacle_until_the_reset(load, drive):
+    """The state of everything else survives the import."""
+    simulation = load()
+    drive(simulation, 0.2, 0.0, 0.0, steps=2)
+    before = simulation.robots[0].place.translation
+    crate = "Solid { translation 1 0 0.5 boundingObject Box { size 0.2 0.2 1 } }"
+    children = simulation.tree.field_of(simulation.tree.root, "children", simulation)
+    assert simulation.add(crate, children, -1)
+
+    assert simulation.robots[0].place.translation == before
+    assert drive(simulation, 0.4, 0.0, 0.0, steps=12).x == pytest.approx(0.9 - RADIUS_M, abs=0.02)
+    simulation.reset()
+    simulation.step(192)
+    place(simulation, 0.0, 0.0)
+    assert drive(simulation, 0.4, 0.0, 0.0, steps=12).x > 0.85
+
+
+def test_robots_run_into_each_other(load, drive):
+    """Each is an obstacle of the other, also for its rays."""
+    simulation = load(builtin("arena") + OTHER)
+
+    body = drive(simulation, 0.3, 0.0, 0.0, steps=15)
+
+    assert body.x == pytest.approx(0.8 - 0.2 - RADIUS_M, abs=0.05)
+    assert max(distances(simulation)) == distances(simulation)[0]
+
+
+def test_mujoco_follows_the_stub_in_free_space(drive):
+    """Ten random courses of ten seconds, a new command every 192 ms: within 5 cm and 2 degrees."""
+    source = builtin("arena").decode()
+    for name in ("WALL", "CYLINDER"):
+        source = re.sub(rf"(DEF {name}_\d Solid \{{\s*translation )\S+ \S+ ", r"\g<1>90 90 ", source)
+    for seed in range(10):
+        draw = random.Random(seed)
+        pair = [Simulation.load(source.encode(), it(), "free") for it in (StubPhysics, MujocoPhysics)]
+        for _ in range(52):
+            command = draw.uniform(-0.6, 0.6), draw.uniform(-0.6, 0.6), draw.uniform(-1.5, 1.5)
+            here, there = (drive(simulation, *command) for simulation in pair)
+
+        assert math.hypot(here.x - there.x, here.y - there.y) < 0.05
+        turned = math.remainder(here.heading_rad - there.heading_rad, 2.0 * math.pi)
+        assert abs(math.degrees(turned)) < 2.0
