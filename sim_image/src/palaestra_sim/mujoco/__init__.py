@@ -4,6 +4,7 @@
 - `physics`: the bodies and obstacles of a world
 - `model`: from robots and shapes to MuJoCo's model
 - `body`: a robot that drives
+- `library`: MuJoCo itself
 - `rays`: how far the beams of sensors travel
 
 Worlds, devices and the interface are those of all simulators: `scene` and `front`.

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-import mujoco
 import numpy as np
 
 from palaestra_sim.mujoco.body import MujocoBody, servo
+from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.scene.geometry import Pose, to_quaternion
 from palaestra_sim.scene.physics import Figure
 from palaestra_sim.scene.places import Place
@@ -137,8 +137,8 @@ def _add_robot(
     added.mass = mass
     turning = 0.5 * mass * body.radius_m**2
     added.inertia = [turning, turning, turning]
-    for axis in ([1, 0, 0], [0, 1, 0]):
-        added.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    for direction in ([1, 0, 0], [0, 1, 0]):
+        added.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=direction)
     added.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
     added.add_site(name=f"base {index}")
     for axis, (gear, inertia) in enumerate(((0, mass), (1, mass), (5, turning))):

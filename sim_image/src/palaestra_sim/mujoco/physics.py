@@ -10,9 +10,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-import mujoco
-
 from palaestra_sim.mujoco.body import MujocoBody
+from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import Built, build
 from palaestra_sim.mujoco.rays import Beams
 from palaestra_sim.scene.beams import Beam

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any, Final
 
-import mujoco
 import numpy as np
 
+from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import SEEN, Built
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.physics import Figure
@@ -48,7 +48,8 @@ class Beams:
             self._cast(built, origins[first], directions[first:end].ravel(), own, slice(first, end))
         distances = self._distances
         missed = (distances < 0.0) | (distances > self._reach)
-        return np.where(missed, self._reach, distances).tolist()
+        travelled: list[float] = np.where(missed, self._reach, distances).tolist()
+        return travelled
 
     def _cast(self, built: Built, origin: Any, directions: Any, own: int, part: slice) -> None:
         count = part.stop - part.start
