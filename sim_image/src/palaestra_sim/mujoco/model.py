@@ -7,6 +7,7 @@ for each robot and three for all.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -15,7 +16,9 @@ import numpy as np
 
 from palaestra_sim.mujoco.body import MujocoBody, servo
 from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.loose import LooseBody
 from palaestra_sim.scene.geometry import Pose, to_quaternion
+from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.physics import Figure
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
@@ -28,6 +31,7 @@ _LOOSE: Final = 1 << 1  # loose things touch each other and robots
 _STANDING: Final = 1 << 2  # and whatever stands
 _FIRST_ROBOT: Final = 3
 _BITS: Final = 32
+_LEAST_M3: Final = 1e-9
 _FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
 
 _GEOMS: Final = {
@@ -45,6 +49,7 @@ class Built:
         figures: each robot that moves, with its body and the number of this in the model.
         geoms: by number, the shapes that are obstacles or outlines, with the body of a robot's.
         stands: the number of the body of each place that has obstacles.
+        loose: the loose things.
     """
 
     model: Any
@@ -52,6 +57,7 @@ class Built:
     figures: dict[Figure, tuple[MujocoBody, int]]
     geoms: dict[int, tuple[Shape, MujocoBody | None, int]]
     stands: dict[Place, int]
+    loose: tuple[LooseBody, ...]
 
     def body_of(self, figure: Figure) -> int:
         """Return the number of a robot's body; -1 if it has none."""
@@ -61,67 +67,104 @@ class Built:
     def put_obstacles(self) -> None:
         """Put the obstacles where their places are now."""
         for place, number in self.stands.items():
-            _put(self.model.body_pos[number], self.model.body_quat[number], place.world_pose)
+            mocap = self.model.body_mocapid[number]
+            _put(self.data.mocap_pos[mocap], self.data.mocap_quat[mocap], place.world_pose)
         for figure, (_, number) in self.figures.items():
-            self.model.body_pos[number][2] = figure.place.world_pose.position[2]
+            self.model.body_pos[number][2] = figure.place.height_m
+
+    def put_loose(self) -> bool:
+        """Take what clients did to loose things; return whether they did anything."""
+        changed = [thing for thing in self.loose if thing.place.put or thing.place.speed is not None]
+        for thing in changed:
+            thing.take()
+        return bool(changed)
 
     def settle(self) -> None:
         """Compute where everything is, from the joints and the obstacles."""
         mujoco.mj_kinematics(self.model, self.data)
 
 
-def build(figures: Sequence[Figure], solids: Sequence[Shape]) -> Built:
-    """Return the model of these robots and obstacles, in their present state."""
+def build(figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> Built:
+    """Return the model of these robots, obstacles and loose things, in their present state."""
+    courses = [thing.place.course for thing in loose]  # of the model before, if there was one
     spec = mujoco.MjSpec()
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     moving = [(it, it.body) for it in figures if isinstance(it.body, MujocoBody)]
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=_STANDING, conaffinity=0, friction=_FRICTION
     )
     marks: list[tuple[Any, Shape, MujocoBody | None, int]] = []
     stands = {
-        place: _add_obstacle(spec, place, [shape for shape in solids if shape.place is place], moving, marks)
+        place: _add_obstacle(spec, [shape for shape in solids if shape.place is place], moving, marks)
         for place in dict.fromkeys(shape.place for shape in solids)
     }
     robots = {
         figure: (body, _add_robot(spec, figure, body, index, marks))
         for index, (figure, body) in enumerate(moving)
     }
+    things = [_add_loose(spec, thing, marks) for thing in loose]
     model = spec.compile()
+    data = mujoco.MjData(model)
     built = Built(
         model=model,
-        data=mujoco.MjData(model),
+        data=data,
         figures={figure: (body, added.id) for figure, (body, added) in robots.items()},
         geoms={geom.id: (shape, body, bit) for geom, shape, body, bit in marks},
         stands={place: added.id for place, added in stands.items()},
+        loose=tuple(
+            LooseBody(thing.place, model, data, added.id) for thing, added in zip(loose, things, strict=True)
+        ),
     )
     built.put_obstacles()
     for index, (_, body) in enumerate(moving):
         part = slice(3 * index, 3 * index + 3)
         body.attach(built.data.qpos[part], built.data.qvel[part], built.data.ctrl[part])
+    for thing, course in zip(built.loose, courses, strict=True):
+        thing.begin(course)
     built.settle()
     return built
 
 
 def _add_obstacle(
     spec: Any,
-    place: Place,
     shapes: Iterable[Shape],
     robots: Sequence[tuple[Figure, MujocoBody]],
     marks: list[tuple[Any, Shape, MujocoBody | None, int]],
 ) -> Any:
-    added = spec.worldbody.add_body()
-    _put(added.pos, added.quat, place.world_pose)
+    added = spec.worldbody.add_body(mocap=True)  # MuJoCo looks at the pose of others once
     for shape in shapes:
         low, high = shape.heights()
         bits = _STANDING
         for index, (figure, body) in enumerate(robots):
-            height = figure.place.world_pose.position[2]
+            height = figure.place.height_m
             bottom, top = body.build.heights
             if low < top + height and bottom + height < high:
                 bits |= _own_bit(index)
         marks.append((_add_geom(added, shape, shape.local, contype=bits, conaffinity=0), shape, None, 0))
     return added
+
+
+def _add_loose(spec: Any, thing: Loose, marks: list[tuple[Any, Shape, MujocoBody | None, int]]) -> Any:
+    added = spec.worldbody.add_body()
+    added.add_freejoint()
+    frame = thing.place.world_pose.inverse
+    geoms = [
+        _add_geom(added, shape, frame.after(shape.pose), contype=_LOOSE, conaffinity=_STANDING | _LOOSE)
+        for shape in thing.shapes
+    ]
+    density = thing.density
+    if thing.mass_kg is not None:
+        density = thing.mass_kg / max(sum(map(_volume_m3, thing.shapes)), _LEAST_M3)
+    for geom, shape in zip(geoms, thing.shapes, strict=True):
+        geom.density = density
+        marks.append((geom, shape, None, 0))
+    return added
+
+
+def _volume_m3(shape: Shape) -> float:
+    x, y, z = shape.size
+    return x * y * z * {"box": 1.0, "cylinder": math.pi / 4.0, "ball": math.pi / 6.0}[shape.kind]
 
 
 def _add_robot(
@@ -131,7 +174,7 @@ def _add_robot(
     index: int,
     marks: list[tuple[Any, Shape, MujocoBody | None, int]],
 ) -> Any:
-    added = spec.worldbody.add_body(pos=[0.0, 0.0, figure.place.world_pose.position[2]])
+    added = spec.worldbody.add_body(pos=[0.0, 0.0, figure.place.height_m])
     added.explicitinertial = True
     mass = STANDING_KG if body.base.drive is None else MASS_KG
     added.mass = mass

@@ -16,8 +16,9 @@ from palaestra_sim.mujoco.model import Built, build
 from palaestra_sim.mujoco.rays import Beams
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.physics import Cast, ContactPoint, Figure
+from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure
 from palaestra_sim.scene.shapes import Shape
 
 LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
@@ -26,23 +27,27 @@ LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
 class MujocoPhysics:
     """The motion of one world; see `Physics`."""
 
+    abilities = Abilities(name="MuJoCo", loose=True, leaning=True)
+
     def __init__(self) -> None:
         self._figures: tuple[Figure, ...] = ()
         self._solids: tuple[Shape, ...] = ()
-        self._built: Built = build((), ())
+        self._loose: tuple[Loose, ...] = ()
+        self._built: Built = build((), (), ())
         self._settled = True
 
     def body(self, build: Build) -> MujocoBody:
         """Return the body of a robot that is being read."""
         return MujocoBody(build)
 
-    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape]) -> None:
-        """Take these robots and obstacles as the contents of the world, where they are now."""
-        if (self._figures, self._solids) == (tuple(figures), tuple(solids)):
+    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> None:
+        """Take these robots, obstacles and loose things as the contents of the world, where they are now."""
+        contents = tuple(figures), tuple(solids), tuple(loose)
+        if contents == (self._figures, self._solids, self._loose):
             self._built.put_obstacles()
         else:
-            self._figures, self._solids = tuple(figures), tuple(solids)
-            self._built = build(figures, solids)
+            self._figures, self._solids, self._loose = contents
+            self._built = build(*contents)
         self._settled = False
 
     def advance(self, step_s: float) -> None:
@@ -50,6 +55,7 @@ class MujocoPhysics:
         built = self._built
         steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
         built.model.opt.timestep = step_s / steps
+        built.put_loose()
         for figure, (body, _) in built.figures.items():
             body.command(step_s, powered=figure.powered)
         for _ in range(steps):
@@ -63,6 +69,7 @@ class MujocoPhysics:
     def reset(self) -> None:
         """Forget the past, such as the forces of the last step, from which the solver would start."""
         mujoco.mj_resetData(self._built.model, self._built.data)
+        self._built.put_obstacles()
         for body, _ in self._built.figures.values():
             body.write()
         self._settled = False
@@ -98,7 +105,7 @@ class MujocoPhysics:
                     found[1].touched |= found[2]
 
     def _settle(self) -> None:
-        if not self._settled:
+        if self._built.put_loose() or not self._settled:
             self._built.settle()
             self._settled = True
 

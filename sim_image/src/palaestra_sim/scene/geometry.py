@@ -37,10 +37,21 @@ class Pose(NamedTuple):
             self.position[2] + turned[2],
         )
 
+    def turned(self, vector: Vector) -> Vector:
+        """Return a direction of this pose's frame in the frame around this pose."""
+        return turn(self.rotation, vector)
+
     def scaled(self, factor: float) -> Pose:
         """Return the pose with a position that is `factor` times as far."""
         x, y, z = self.position
         return Pose((x * factor, y * factor, z * factor), self.rotation)
+
+    @property
+    def inverse(self) -> Pose:
+        """The frame around this pose, in this pose's frame."""
+        back = transposed(self.rotation)
+        x, y, z = turn(back, self.position)
+        return Pose((-x, -y, -z), back)
 
     @property
     def heading_rad(self) -> float:
@@ -123,6 +134,22 @@ def to_quaternion(m: Matrix) -> Quaternion:
     w = (m[3 * k + j] - m[3 * j + k]) / (2.0 * root)
     sign = -1.0 if w < 0.0 else 1.0
     return (sign * q[0], sign * q[1], sign * q[2], abs(w))
+
+
+def quaternion_to_matrix(quaternion: Quaternion) -> Matrix:
+    """Return the rotation of a unit quaternion."""
+    x, y, z, w = quaternion
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - z * w),
+        2.0 * (x * z + y * w),
+        2.0 * (x * y + z * w),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - x * w),
+        2.0 * (x * z - y * w),
+        2.0 * (y * z + x * w),
+        1.0 - 2.0 * (x * x + y * y),
+    )
 
 
 def axis_angle_to_quaternion(rotation: AxisAngle) -> Quaternion:

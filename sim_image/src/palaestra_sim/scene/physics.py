@@ -8,11 +8,13 @@ up; the world file may have others.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body, Build
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
@@ -34,6 +36,21 @@ class Figure(Protocol):
     powered: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Abilities:
+    """What a physics simulates of a world; the rest is refused when the world is read.
+
+    Attributes:
+        name: of the simulator, in messages.
+        loose: whether Solids with physics move when they are pushed.
+        leaning: whether shapes may have any rotation.
+    """
+
+    name: str
+    loose: bool = False
+    leaning: bool = False
+
+
 class ContactPoint(NamedTuple):
     """A point at which two nodes touch, in meters in the axes of the ground."""
 
@@ -42,14 +59,20 @@ class ContactPoint(NamedTuple):
 
 
 class Physics(Protocol):
-    """The motion of one loaded world."""
+    """The motion of one loaded world.
+
+    Attributes:
+        abilities: what it simulates.
+    """
+
+    abilities: Abilities
 
     def body(self, build: Build) -> Body:
         """Return the body of a robot that is being read, at the origin of the world and at rest."""
         ...
 
-    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape]) -> None:
-        """Take these robots and obstacles as the contents of the world, where they are now."""
+    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> None:
+        """Take these robots, obstacles and loose things as the contents of the world, where they are now."""
         ...
 
     def advance(self, step_s: float) -> None:

@@ -13,6 +13,7 @@ from typing import Final
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.axes import read_axes
 from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.loose import Loose, LoosePlace
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place
@@ -41,6 +42,7 @@ DRAWN_ONLY: Final = frozenset(
 )
 # A device without a robot is a thing like others.
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
+_DENSITY: Final = 1000.0  # kg/m3, the default of Physics.density
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
 _JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint", "HingeJoint", "SliderJoint"))
 
@@ -54,6 +56,7 @@ class Scene:
         basic_step_ms: WorldInfo.basicTimeStep.
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
+        loose: what moves when it is pushed.
         robots: in the order of the world file.
         top: the frame around everything; None if z of the world points up.
         left_out: what the stub lacks and the user left out, each with its place.
@@ -64,6 +67,7 @@ class Scene:
     basic_step_ms: int = 32
     random_seed: int = 0
     solids: list[Shape] = field(default_factory=list)
+    loose: list[Loose] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
     top: Place | None = None
     left_out: tuple[WorldError, ...] = ()
@@ -135,17 +139,26 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
     elif kind in _JOINTS:
         # Without a robot nothing moves it; an end that would swing has physics, and is refused for that.
         for end in node.nodes("endPoint"):
-            _read(reading, end, parent, scene)
+            if end.type_name in _FRAMES:
+                _read_frame(reading, end, parent, scene)
+            else:
+                _read(reading, end, parent, scene)
+    elif kind in _SOLIDS and scene.physics.abilities.loose and _is_loose(node):
+        _read_loose(reading, node, parent, scene)
     elif kind in _FRAMES:
-        place = Place(parent, reading.translation(node), reading.rotation(node), reading.size(node))
-        node.place = place
-        if node.left_out:
-            return
-        if kind in _SOLIDS:
-            _read_solid(reading, node, place, scene)
-        _read_children(reading, node, place, scene)
+        _read_frame(reading, node, parent, scene)
     else:
-        reading.lacks(node, node.unusable or f"the stub simulates no {kind}")
+        reading.lacks(node, node.unusable or f"{scene.physics.abilities.name} simulates no {kind}")
+
+
+def _read_frame(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+    place = Place(parent, reading.translation(node), reading.rotation(node), reading.size(node))
+    node.place = place
+    if node.left_out:
+        return
+    if node.type_name in _SOLIDS:
+        _read_solid(reading, node, place, scene)
+    _read_children(reading, node, place, scene)
 
 
 def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
@@ -153,12 +166,44 @@ def _read_children(reading: Reading, node: SceneNode, parent: Place | None, scen
         _read(reading, child, parent, scene)
 
 
+def _is_loose(node: SceneNode) -> bool:
+    mass_kg = node.numbers("mass") if node.stand_in else None
+    return bool(node.nodes("physics")) or (mass_kg is not None and mass_kg > (0.0,))
+
+
+def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+    """Read a Solid that moves when it is pushed, with the Solids that are fixed to it."""
+    place = LoosePlace(parent, reading.translation(node), reading.rotation(node), reading.size(node))
+    node.place = place
+    fixed = Scene(physics=scene.physics)
+    _read_children(reading, node, place, fixed)
+    shapes = [*bounding_shapes(reading, node, place), *fixed.solids]
+    # A stand-in has no physics of its own, but the mass of its PROTO.
+    described = next(iter(node.nodes("physics")), node)
+    mass_kg = reading.number(described, "mass", -1.0)
+    density = reading.number(described, "density", _DENSITY)
+    if shapes and not node.left_out:
+        scene.loose.append(
+            Loose(
+                node=node,
+                place=place,
+                shapes=tuple(shapes),
+                mass_kg=mass_kg if mass_kg > 0.0 else None,
+                density=density if density > 0.0 else _DENSITY,
+            )
+        )
+    scene.loose += fixed.loose
+    scene.robots += fixed.robots
+
+
 def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -> None:
+    name = scene.physics.abilities.name
     if node.nodes("physics"):
-        fact = f"a {node.type_name} with physics moves when it is pushed, which the stub does not simulate"
+        fact = f"a {node.type_name} with physics moves when it is pushed, which {name} does not simulate"
         reading.lacks(node, fact, f"remove physics, {ELSEWHERE}")
     if node.type_name == "Track" and node.nodes("device"):
-        reading.lacks(node, "a Track with devices moves what stands on it, which the stub does not simulate")
+        fact = f"a Track with devices moves what stands on it, which {name} does not simulate"
+        reading.lacks(node, fact)
     shapes = list(bounding_shapes(reading, node, place))
     if not node.left_out:
         _stand(reading, shapes, scene)
@@ -167,7 +212,7 @@ def _read_solid(reading: Reading, node: SceneNode, place: Place, scene: Scene) -
 def _stand(reading: Reading, shapes: Iterable[Shape], scene: Scene) -> None:
     """Make obstacles of shapes that stand or lie."""
     for shape in shapes:
-        if not shape.upright:
+        if not (shape.upright or scene.physics.abilities.leaning):
             reading.lacks(shape.node, f"a {shape.node.type_name} that neither stands nor lies")
         if not shape.node.left_out:
             scene.solids.append(shape)

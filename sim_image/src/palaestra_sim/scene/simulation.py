@@ -155,6 +155,8 @@ class Simulation:
         """Stop all motion, at once."""
         for robot in self.robots:
             robot.halt()
+        for thing in self.scene.loose:
+            thing.place.halt()
 
     def quit(self, status: int) -> None:
         """Ask for the end of the simulator."""
@@ -203,6 +205,7 @@ class Simulation:
         self._added += added
         self._states.begin(inside for node in added for inside in (node, *node.descendants()))
         self.scene.solids += fresh.solids
+        self.scene.loose += fresh.loose
         self.scene.robots += fresh.robots
         self.robots += tuple(
             Robot(parts, self.scene.random_seed, self.scene.physics) for parts in fresh.robots
@@ -221,6 +224,7 @@ class Simulation:
         gone = {node, *node.descendants()}
         self.tree.remove(node)
         self.scene.solids = [shape for shape in self.scene.solids if shape.node not in gone]
+        self.scene.loose = [thing for thing in self.scene.loose if thing.node not in gone]
         self.scene.robots = [parts for parts in self.scene.robots if parts.node not in gone]
         self.robots = tuple(robot for robot in self.robots if robot.parts.node not in gone)
         self._assemble()
@@ -289,7 +293,7 @@ class Simulation:
             self._arrange()
 
     def _arrange(self) -> None:
-        self.scene.physics.arrange(self.robots, self.scene.solids)
+        self.scene.physics.arrange(self.robots, self.scene.solids, self.scene.loose)
 
     def _basic_step(self) -> None:
         if self._pending:

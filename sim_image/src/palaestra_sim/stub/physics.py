@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
-from palaestra_sim.scene.physics import Cast, ContactPoint, Figure
+from palaestra_sim.scene.loose import Loose
+from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
@@ -29,6 +30,8 @@ class _Level(NamedTuple):
 class StubPhysics:
     """The motion of one world, without masses and forces; see `Physics`."""
 
+    abilities = Abilities(name="the stub")
+
     def __init__(self) -> None:
         self._moving: list[tuple[Figure, StubBody]] = []
         self._solids: tuple[Shape, ...] = ()
@@ -41,8 +44,9 @@ class StubPhysics:
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         return StubBody(build.base, outline, rim, build.heights)
 
-    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape]) -> None:
+    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> None:
         """Set the obstacles of each robot and of its rays."""
+        del loose  # refused, see `abilities`
         self._solids = tuple(solids)
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
         self._level = {it: beams for it, beams in self._level.items() if it in figures}

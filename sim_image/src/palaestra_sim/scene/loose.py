@@ -1,0 +1,110 @@
+"""Loose things: Solids with physics, which move when they are pushed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, to_axis_angle
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.shapes import Shape
+
+
+class Course(NamedTuple):
+    """Where a thing is in the world, and how it moves: m/s and rad/s in world axes."""
+
+    pose: Pose
+    velocity: Vector = (0.0, 0.0, 0.0)
+    turning: Vector = (0.0, 0.0, 0.0)
+
+
+class LoosePlace(Place):
+    """The frame of a loose thing: where it was put, until the physics moves it.
+
+    Attributes:
+        follow: returns where the physics has moved it; None before there is a physics.
+        put: whether it was put somewhere since the physics looked; the physics sets it back.
+        speed: what a client wants its velocity and turning to be, in world axes, until the physics has taken
+            it; None: no change.
+    """
+
+    def __init__(
+        self, parent: Place | None, translation: Vector, rotation: AxisAngle, size: float = 1.0
+    ) -> None:
+        super().__init__(parent, translation, rotation, size)
+        self.follow: Callable[[], Course] | None = None
+        self.put = False
+        self.speed: tuple[Vector, Vector] | None = None
+
+    @property
+    def translation(self) -> Vector:
+        """X, y, z in meters, in the parent's frame."""
+        return self._translation if self._stays() else self._local().position
+
+    @translation.setter
+    def translation(self, value: Vector) -> None:
+        if not self._stays():
+            self._rotation = to_axis_angle(self._local().rotation)
+        self._translation = value
+        self.put = True
+
+    @property
+    def rotation(self) -> AxisAngle:
+        """Axis and angle in radians, in the parent's frame."""
+        return self._rotation if self._stays() else to_axis_angle(self._local().rotation)
+
+    @rotation.setter
+    def rotation(self, value: AxisAngle) -> None:
+        if not self._stays():
+            self._translation = self._local().position
+        self._rotation = value
+        self.put = True
+
+    @property
+    def course(self) -> Course:
+        """Where it is in the world, and how it moves."""
+        if self._stays() or self.follow is None:
+            return Course(self.world_pose)
+        return self.follow()
+
+    def push(self, velocity: Vector, turning: Vector) -> None:
+        """Give it a velocity in m/s and a turning in rad/s, in world axes."""
+        self.speed = velocity, turning
+
+    def halt(self) -> None:
+        """Stop its motion."""
+        self.push((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    def return_to_start(self) -> None:
+        """Return to the place in the world file, at rest."""
+        super().return_to_start()
+        self.halt()
+
+    def _stays(self) -> bool:
+        return self.put or self.follow is None
+
+    def _local(self) -> Pose:
+        """Return where the physics has moved it, in the parent's frame."""
+        pose = self.course.pose
+        return pose if self.parent is None else self.parent.world_pose.inverse.after(pose)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Loose:
+    """One loose thing.
+
+    Attributes:
+        node: its Solid.
+        place: its frame.
+        shapes: what it and the Solids inside it run into other things with.
+        mass_kg: of all of it; None: from the density.
+        density: in kg/m3.
+    """
+
+    node: SceneNode
+    place: LoosePlace
+    shapes: Sequence[Shape] = field(default_factory=tuple)
+    mass_kg: float | None = None
+    density: float = 1000.0
