@@ -36,7 +36,7 @@ class LooseBody:
         """Take what clients did to it: put it somewhere, or pushed it."""
         place = self.place
         if place.put:
-            self._write(place.world_pose)
+            self._write(place.ground_pose)
             place.put = False
         if place.speed is not None:
             self._move(Course(self._course().pose, *place.speed))

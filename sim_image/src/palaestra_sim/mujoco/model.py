@@ -68,7 +68,7 @@ class Built:
         """Put the obstacles where their places are now."""
         for place, number in self.stands.items():
             mocap = self.model.body_mocapid[number]
-            _put(self.data.mocap_pos[mocap], self.data.mocap_quat[mocap], place.world_pose)
+            _put(self.data.mocap_pos[mocap], self.data.mocap_quat[mocap], place.ground_pose)
         for figure, (_, number) in self.figures.items():
             self.model.body_pos[number][2] = figure.place.height_m
 
@@ -148,7 +148,7 @@ def _add_obstacle(
 def _add_loose(spec: Any, thing: Loose, marks: list[tuple[Any, Shape, MujocoBody | None, int]]) -> Any:
     added = spec.worldbody.add_body()
     added.add_freejoint()
-    frame = thing.place.world_pose.inverse
+    frame = thing.place.ground_pose.inverse
     geoms = [
         _add_geom(added, shape, frame.after(shape.pose), contype=_LOOSE, conaffinity=_STANDING | _LOOSE)
         for shape in thing.shapes

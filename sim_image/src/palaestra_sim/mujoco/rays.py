@@ -39,7 +39,7 @@ class Beams:
 
     def cast(self, built: Built) -> list[float]:
         """Return how far each beam travels, in meters; its full reach if it meets nothing."""
-        pose = self._figure.place.world_pose
+        pose = self._figure.place.ground_pose
         turned = np.array(pose.rotation).reshape(3, 3)
         origins = self._origins @ turned.T + pose.position
         directions = self._directions @ turned.T

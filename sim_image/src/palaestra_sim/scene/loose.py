@@ -13,7 +13,7 @@ from palaestra_sim.scene.shapes import Shape
 
 
 class Course(NamedTuple):
-    """Where a thing is in the world, and how it moves: m/s and rad/s in world axes."""
+    """Where a thing is, and how it moves in m/s and rad/s, in the axes of the ground."""
 
     pose: Pose
     velocity: Vector = (0.0, 0.0, 0.0)
@@ -26,7 +26,7 @@ class LoosePlace(Place):
     Attributes:
         follow: returns where the physics has moved it; None before there is a physics.
         put: whether it was put somewhere since the physics looked; the physics sets it back.
-        speed: what a client wants its velocity and turning to be, in world axes, until the physics has taken
+        speed: what a client wants its velocity and turning to be, in the axes of the ground, until the physics has taken
             it; None: no change.
     """
 
@@ -66,11 +66,11 @@ class LoosePlace(Place):
     def course(self) -> Course:
         """Where it is in the world, and how it moves."""
         if self._stays() or self.follow is None:
-            return Course(self.world_pose)
+            return Course(self.ground_pose)
         return self.follow()
 
     def push(self, velocity: Vector, turning: Vector) -> None:
-        """Give it a velocity in m/s and a turning in rad/s, in world axes."""
+        """Give it a velocity in m/s and a turning in rad/s, in the axes of the ground."""
         self.speed = velocity, turning
 
     def halt(self) -> None:
@@ -88,7 +88,7 @@ class LoosePlace(Place):
     def _local(self) -> Pose:
         """Return where the physics has moved it, in the parent's frame."""
         pose = self.course.pose
-        return pose if self.parent is None else self.parent.world_pose.inverse.after(pose)
+        return pose if self.parent is None else self.parent.ground_pose.inverse.after(pose)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
