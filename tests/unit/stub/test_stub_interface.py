@@ -111,7 +111,7 @@ def test_what_the_stub_cannot_do_fails_with_a_remedy(robot):
     """A success that did nothing would be worse."""
     handle = robot.get("supervisor/get_from_def", name="ROBOTINO")
 
-    with pytest.raises(Exception, match="simulates no forces; use driver webots"):
+    with pytest.raises(Exception, match="simulates no forces; use driver mujoco or webots"):
         robot.call("supervisor/node/add_force", node=handle)
     with pytest.raises(Exception, match="no URDF"):
         robot.call("robot/get_urdf", prefix="")

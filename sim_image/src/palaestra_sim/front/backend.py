@@ -18,6 +18,32 @@ from palaestra_sim.scene.tree.fields import Field
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 
+class Motion(Protocol):
+    """The motion of nodes: m/s, rad/s, N and N m, in the axes of the world file."""
+
+    def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
+        """Return the velocity of a node and its turning."""
+        ...
+
+    def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
+        """Give a node a velocity and a turning; nothing happens to one that does not move."""
+        ...
+
+    def halt(self, node: SceneNode) -> None:
+        """Stop the motion of a node."""
+        ...
+
+    def add_force(
+        self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
+    ) -> None:
+        """Let a force act in the next basic step, at an offset in the node's frame or the center of mass."""
+        ...
+
+    def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
+        """Let a torque act in the next basic step."""
+        ...
+
+
 class Backend(Protocol):
     """One loaded world. A reload makes another Backend.
 
@@ -32,6 +58,11 @@ class Backend(Protocol):
     time_ms: int
     mode: Mode
     quit_status: int | None
+
+    @property
+    def motion(self) -> Motion:
+        """The motion of its nodes."""
+        ...
 
     @property
     def robots(self) -> Sequence[Robot]:

@@ -16,10 +16,12 @@ class LooseBody:
 
     Attributes:
         place: its frame in the scene.
+        number: of its body in the model.
     """
 
     def __init__(self, place: LoosePlace, model: Any, data: Any, number: int) -> None:
         self.place = place
+        self.number = number
         joint = model.body_jntadr[number]
         at, speed = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
         self._where = data.qpos[at : at + _PLACE]

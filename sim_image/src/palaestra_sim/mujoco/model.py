@@ -19,7 +19,7 @@ from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.loose import LooseBody
 from palaestra_sim.scene.geometry import Pose, to_quaternion
 from palaestra_sim.scene.loose import Loose
-from palaestra_sim.scene.physics import Figure
+from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
 
@@ -78,6 +78,16 @@ class Built:
         for thing in changed:
             thing.take()
         return bool(changed)
+
+    def push(self, target: Figure | Loose, push: Push) -> None:
+        """Let a force act on a robot or a loose thing until the forces are cleared."""
+        found = self.figures.get(target) if not isinstance(target, Loose) else None
+        numbers = [it.number for it in self.loose if it.place is target.place]
+        number = numbers[0] if found is None else found[1]
+        torque = np.array(push.torque)
+        if push.point is not None:
+            torque += np.cross(np.array(push.point) - self.data.xipos[number], push.force)
+        self.data.xfrc_applied[number] += np.concatenate((push.force, torque))
 
     def settle(self) -> None:
         """Compute where everything is, from the joints and the obstacles."""

@@ -18,7 +18,7 @@ from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
-from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure
+from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.shapes import Shape
 
 LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
@@ -27,7 +27,7 @@ LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
 class MujocoPhysics:
     """The motion of one world; see `Physics`."""
 
-    abilities = Abilities(name="MuJoCo", loose=True, leaning=True)
+    abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True)
 
     def __init__(self) -> None:
         self._figures: tuple[Figure, ...] = ()
@@ -35,6 +35,7 @@ class MujocoPhysics:
         self._loose: tuple[Loose, ...] = ()
         self._built: Built = build((), (), ())
         self._settled = True
+        self._pushes: list[tuple[Figure | Loose, Push]] = []
 
     def body(self, build: Build) -> MujocoBody:
         """Return the body of a robot that is being read."""
@@ -56,6 +57,8 @@ class MujocoPhysics:
         steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
         built.model.opt.timestep = step_s / steps
         built.put_loose()
+        for target, push in self._pushes:
+            built.push(target, push)
         for figure, (body, _) in built.figures.items():
             body.command(step_s, powered=figure.powered)
         for _ in range(steps):
@@ -64,12 +67,16 @@ class MujocoPhysics:
                 self._feel()
         for body, _ in built.figures.values():
             body.follow(step_s)
+        if self._pushes:
+            self._pushes.clear()
+            built.data.xfrc_applied[:] = 0.0
         self._settled = False
 
     def reset(self) -> None:
         """Forget the past, such as the forces of the last step, from which the solver would start."""
         mujoco.mj_resetData(self._built.model, self._built.data)
         self._built.put_obstacles()
+        self._pushes.clear()
         for body, _ in self._built.figures.values():
             body.write()
         self._settled = False
@@ -83,6 +90,10 @@ class MujocoPhysics:
             return bundle.cast(self._built)
 
         return cast
+
+    def push(self, target: Figure | Loose, push: Push) -> None:
+        """Let a force act on a robot or a loose thing in the next basic step."""
+        self._pushes.append((target, push))
 
     def contacts(self) -> Iterator[ContactPoint]:
         """Yield where robots touch obstacles and each other now."""

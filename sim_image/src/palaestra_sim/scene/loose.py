@@ -26,8 +26,8 @@ class LoosePlace(Place):
     Attributes:
         follow: returns where the physics has moved it; None before there is a physics.
         put: whether it was put somewhere since the physics looked; the physics sets it back.
-        speed: what a client wants its velocity and turning to be, in the axes of the ground, until the physics has taken
-            it; None: no change.
+        speed: the velocity and turning that a client gave it, in the axes of the ground, until the physics
+            takes them; None: no change.
     """
 
     def __init__(

@@ -44,11 +44,24 @@ class Abilities:
         name: of the simulator, in messages.
         loose: whether Solids with physics move when they are pushed.
         leaning: whether shapes may have any rotation.
+        forces: whether a force moves anything.
     """
 
     name: str
     loose: bool = False
     leaning: bool = False
+    forces: bool = False
+
+
+class Push(NamedTuple):
+    """A force in N and a torque in N m for one basic step, in the axes of the ground.
+
+    The force acts at `point`, in meters, or at the center of mass if that is None.
+    """
+
+    force: Vector = (0.0, 0.0, 0.0)
+    torque: Vector = (0.0, 0.0, 0.0)
+    point: Vector | None = None
 
 
 class ContactPoint(NamedTuple):
@@ -85,6 +98,10 @@ class Physics(Protocol):
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
         """Return a function that returns how far each beam of a robot travels now, in meters."""
+        ...
+
+    def push(self, target: Figure | Loose, push: Push) -> None:
+        """Let a force act on a robot or a loose thing in the next basic step."""
         ...
 
     def contacts(self) -> Iterable[ContactPoint]:

@@ -21,6 +21,7 @@ from palaestra_sim.scene.air import Air
 from palaestra_sim.scene.devices.connector import Connector
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.node_motion import NodeMotion
 from palaestra_sim.scene.nodes.growing import Descriptions
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
@@ -45,6 +46,7 @@ class Simulation:
         time_ms: simulated so far, back to 0 at a reset.
         mode: for the program that paces the steps; `step` itself works in all three.
         quit_status: the exit status that `quit` asked for; None before.
+        motion: of robots and loose things, for a supervisor.
     """
 
     def __init__(self, tree: SceneTree, scene: Scene, mode: Mode) -> None:
@@ -57,6 +59,7 @@ class Simulation:
         self._pending: list[Callable[[], None]] = []
         self._reset_asked = False
         self._added: list[SceneNode] = []
+        self.motion = NodeMotion(scene, self.robot_of)
         self._states = States(tree.nodes.values())
         self._assemble()
         self._step_s = scene.basic_step_ms / 1000.0

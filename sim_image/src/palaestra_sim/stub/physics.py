@@ -11,7 +11,7 @@ from typing import NamedTuple
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.loose import Loose
-from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure
+from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
@@ -88,6 +88,9 @@ class StubPhysics:
         if isinstance(body, StubBody):
             return lambda: cast((body.x, body.y, body.c, body.s))
         return lambda: cast(frame())
+
+    def push(self, target: Figure | Loose, push: Push) -> None:
+        """Do nothing: without masses a force moves nothing; see `abilities`."""
 
     def contacts(self) -> Iterable[ContactPoint]:
         """Return where robots touch obstacles and each other now."""

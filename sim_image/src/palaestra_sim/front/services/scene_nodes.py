@@ -1,6 +1,6 @@
 """Services under `supervisor/node/`: a node's type, its place, and changes to it.
 
-A request for something that the stub lacks (forces, torques) fails with a sentence that says
+A request for something that the simulator lacks, such as forces in the stub, fails with a sentence that says
 so, instead of a success that did nothing.
 """
 
@@ -11,13 +11,13 @@ from typing import Any
 from palaestra_sim.front.handles import Handles
 from palaestra_sim.front.host import Host
 from palaestra_sim.ros.node import ServiceFailed
-from palaestra_sim.scene.geometry import Pose, to_quaternion, transposed
+from palaestra_sim.scene.geometry import Pose, Vector, to_quaternion, transposed
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import type_number
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.catalogue import kinds_of
-from palaestra_sim.seam import Handler, Row, Service
+from palaestra_sim.seam import Row, Service
 
 Fields = dict[str, Any]
 
@@ -70,9 +70,9 @@ class NodeServices:
     def _changes(self) -> tuple[Row, ...]:
         return (
             ("set_velocity", "node_set_velocity", self._set_velocity),
-            ("add_force", "node_add_force_or_torque", _unable("forces")),
-            ("add_force_with_offset", "node_add_force_with_offset", _unable("forces")),
-            ("add_torque", "node_add_force_or_torque", _unable("torques")),
+            ("add_force", "node_add_force_or_torque", self._add_force),
+            ("add_force_with_offset", "node_add_force_with_offset", self._add_force_with_offset),
+            ("add_torque", "node_add_force_or_torque", self._add_torque),
             ("move_viewpoint", "node_move_viewpoint", self._accept),
             ("set_visibility", "node_set_visibility", self._accept),
             ("remove", "node_remove", self._remove),
@@ -151,22 +151,35 @@ class NodeServices:
         return {"contact_points": points}
 
     def _get_velocity(self, request: Any) -> Fields:
-        node = self._node(request)
-        place = _place(node)
-        robot = self._robot(node)
-        body = robot.body if robot is not None else None
-        vx, vy, omega = body.velocity if body is not None else (0.0, 0.0, 0.0)
-        linear, angular = place.from_ground((vx, vy, 0.0)), place.from_ground((0.0, 0.0, omega))
+        linear, angular = self._handles.simulation.motion.velocity(self._node(request))
         return {"velocity": {"linear": _point(linear), "angular": _point(angular)}}
 
     def _set_velocity(self, request: Any) -> Fields:
-        """Push a robot; its motors bring it back to their commands within a few basic steps."""
-        robot = self._robot(self._node(request))
-        if robot is not None and robot.body is not None:
-            linear, angular = request.velocity.linear, request.velocity.angular
-            vx, vy, _ = robot.place.to_ground((linear.x, linear.y, linear.z))
-            _, _, omega = robot.place.to_ground((angular.x, angular.y, angular.z))
-            robot.body.push(vx, vy, omega)
+        wanted = request.velocity
+        self._handles.simulation.motion.set_velocity(
+            self._node(request), _vector(wanted.linear), _vector(wanted.angular)
+        )
+        return {"success": 1}
+
+    def _add_force(self, request: Any) -> Fields:
+        self._handles.simulation.motion.add_force(
+            self._node(request), _vector(request.force), relative=bool(request.relative)
+        )
+        return {"success": 1}
+
+    def _add_force_with_offset(self, request: Any) -> Fields:
+        self._handles.simulation.motion.add_force(
+            self._node(request),
+            _vector(request.force),
+            relative=bool(request.relative),
+            offset=_vector(request.offset),
+        )
+        return {"success": 1}
+
+    def _add_torque(self, request: Any) -> Fields:
+        self._handles.simulation.motion.add_torque(
+            self._node(request), _vector(request.force), relative=bool(request.relative)
+        )
         return {"success": 1}
 
     def _get_field(self, request: Any) -> Fields:
@@ -212,9 +225,7 @@ class NodeServices:
         return {"success": True}
 
     def _reset_physics(self, request: Any) -> Fields:
-        robot = self._robot(self._node(request))
-        if robot is not None:
-            robot.halt()
+        self._handles.simulation.motion.halt(self._node(request))
         return {"success": 1}
 
     def _restart_controller(self, request: Any) -> Fields:
@@ -246,6 +257,10 @@ def _place(node: SceneNode) -> Place:
     return node.place
 
 
+def _vector(point: Any) -> Vector:
+    return point.x, point.y, point.z
+
+
 def _point(vector: tuple[float, float, float]) -> Fields:
     return {"x": vector[0], "y": vector[1], "z": vector[2]}
 
@@ -253,12 +268,3 @@ def _point(vector: tuple[float, float, float]) -> Fields:
 def _quaternion(pose: Pose) -> Fields:
     x, y, z, w = to_quaternion(pose.rotation)
     return {"x": x, "y": y, "z": z, "w": w}
-
-
-def _unable(what: str) -> Handler:
-    """Return a handler that fails: the stub has no such thing."""
-
-    def fail(_request: Any) -> Fields:
-        raise ServiceFailed(f"the stub simulates no {what}; use driver webots")
-
-    return fail

@@ -1,0 +1,118 @@
+"""How nodes move, and what pushes them: velocities, forces and torques, as a supervisor has them.
+
+Robots and loose things move. All other nodes are at rest, and nothing happens to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.loose import Loose
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Push
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reader import Scene
+from palaestra_sim.scene.robot import Robot
+from palaestra_sim.seam import UnsimulatedError
+
+NOTHING: Final[Vector] = (0.0, 0.0, 0.0)
+
+
+class NodeMotion:
+    """The motion of the nodes of one world, in the axes of the world file.
+
+    Args:
+        scene: the contents of the world.
+        robot_of: returns the robot of a Robot node; None for any other node.
+    """
+
+    def __init__(self, scene: Scene, robot_of: Callable[[SceneNode], Robot | None]) -> None:
+        self._scene = scene
+        self._robot_of = robot_of
+
+    def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
+        """Return the velocity of a node in m/s and its turning in rad/s.
+
+        Raises:
+            UnsimulatedError: the node has no place.
+        """
+        place = _place(node)
+        robot, thing = self._robot_of(node), self._loose_of(node)
+        velocity = turning = NOTHING
+        if thing is not None:
+            _, velocity, turning = thing.place.course
+        elif robot is not None and robot.body is not None:
+            vx, vy, omega = robot.body.velocity
+            velocity, turning = (vx, vy, 0.0), (0.0, 0.0, omega)
+        return place.from_ground(velocity), place.from_ground(turning)
+
+    def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
+        """Give a node a velocity; a robot's motors bring it back to their commands within a few steps."""
+        robot, thing = self._robot_of(node), self._loose_of(node)
+        if thing is not None:
+            thing.place.push(thing.place.to_ground(velocity), thing.place.to_ground(turning))
+        elif robot is not None and robot.body is not None:
+            vx, vy, _ = robot.place.to_ground(velocity)
+            _, _, omega = robot.place.to_ground(turning)
+            robot.body.push(vx, vy, omega)
+
+    def halt(self, node: SceneNode) -> None:
+        """Stop the motion of a node."""
+        robot, thing = self._robot_of(node), self._loose_of(node)
+        if thing is not None:
+            thing.place.halt()
+        elif robot is not None:
+            robot.halt()
+
+    def add_force(
+        self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
+    ) -> None:
+        """Let a force in N act in the next basic step.
+
+        Args:
+            node: see above.
+            force: in the axes of the node if `relative`.
+            relative: see above.
+            offset: where it acts, in the frame of the node, in meters; None: at the center of mass.
+
+        Raises:
+            UnsimulatedError: no force moves anything here, or the node has no place.
+        """
+        place = self._require_forces(node, "forces")
+        pose = place.ground_pose
+        point = None if offset is None else pose.carry(offset)
+        self._push(node, Push(force=_turned(place, force, relative=relative), point=point))
+
+    def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
+        """Let a torque in N m act in the next basic step; see `add_force`."""
+        place = self._require_forces(node, "torques")
+        self._push(node, Push(torque=_turned(place, torque, relative=relative)))
+
+    def _require_forces(self, node: SceneNode, what: str) -> Place:
+        place = _place(node)
+        abilities = self._scene.physics.abilities
+        if not abilities.forces:
+            raise UnsimulatedError(f"{abilities.name} simulates no {what}; use driver mujoco or webots")
+        return place
+
+    def _push(self, node: SceneNode, push: Push) -> None:
+        target = self._loose_of(node) or self._robot_of(node)
+        if target is not None:
+            self._scene.physics.push(target, push)
+
+    def _loose_of(self, node: SceneNode) -> Loose | None:
+        return next((thing for thing in self._scene.loose if thing.node is node), None)
+
+
+def _place(node: SceneNode) -> Place:
+    """Return the place of a node; in Webots a node without one crashes the controller."""
+    if node.place is None:
+        raise UnsimulatedError(f"a {node.type_name} has no position; ask for a Pose, Solid or Robot")
+    return node.place
+
+
+def _turned(place: Place, vector: Vector, *, relative: bool) -> Vector:
+    """Return a vector in the axes of the ground."""
+    return place.ground_pose.turned(vector) if relative else place.to_ground(vector)
