@@ -11,12 +11,14 @@ Every simulator takes the speed from here, so a robot answers its commands alike
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import sub
 from typing import Final
 
 from palaestra_sim.scene.drive import Drive
 from palaestra_sim.scene.motors import Motor
 
 ACCELERATIONS: Final = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2
+_X, _Y, _TURN = ACCELERATIONS
 
 
 class Base:
@@ -79,12 +81,17 @@ class Base:
     def _approach(self, step_s: float, law: Drive) -> None:
         """Change the speeds of the wheels toward those that their motors demand."""
         wheels = self._wheels
+        speeds = [wheel.speed_rad_s for wheel in wheels]
         demands = [wheel.demand(step_s) for wheel in wheels]
-        changes = [demand - wheel.speed_rad_s for demand, wheel in zip(demands, wheels, strict=True)]
-        twist = law.twist(changes)
-        steps = max(abs(part) / (limit * step_s) for part, limit in zip(twist, ACCELERATIONS, strict=True))
-        for wheel, demand, change in zip(wheels, demands, changes, strict=True):
-            wheel.speed_rad_s = demand if steps <= 1.0 else wheel.speed_rad_s + change / steps
+        vx, vy, omega = law.twist(list(map(sub, demands, speeds)))
+        # In steps of the largest acceleration, which all three axes share.
+        steps = max(abs(vx) / (_X * step_s), abs(vy) / (_Y * step_s), abs(omega) / (_TURN * step_s))
+        if steps > 1.0:
+            demands = [
+                speed + (demand - speed) / steps for demand, speed in zip(demands, speeds, strict=True)
+            ]
+        for wheel, speed in zip(wheels, demands, strict=True):
+            wheel.speed_rad_s = speed
             wheel.changed = not wheel.steady
-        self.vx, self.vy, self.omega = law.twist([wheel.speed_rad_s for wheel in wheels])
+        self.vx, self.vy, self.omega = law.twist(demands)
         self._step_s = step_s
