@@ -35,6 +35,36 @@ def test_the_stub_gets_the_world_and_its_options(path) -> None:
     assert started.environment == {"PATH": folder, "A": "b"}
 
 
+def test_mujoco_gets_the_world_and_its_options(path) -> None:
+    """It has the command line of the stub, so the same job needs no other options."""
+    folder = path("palaestra-mujoco")
+
+    started = command(Driver.MUJOCO, Launch(world=WORLD, options=["--leave-out", "all"]), {"PATH": folder})
+
+    assert started.arguments == (f"{folder}/palaestra-mujoco", str(WORLD), "--leave-out", "all")
+
+
+def test_mujoco_draws_on_one_thread(path) -> None:
+    """Several simulators share the cores."""
+    started = command(Driver.MUJOCO, Launch(world=WORLD), {"PATH": path("palaestra-mujoco")})
+
+    assert started.environment["LP_NUM_THREADS"] == "0"
+
+
+def test_mujoco_is_not_told_how_to_draw(path) -> None:
+    """It would load OpenGL at its start, and not start at all where there is none."""
+    started = command(Driver.MUJOCO, Launch(world=WORLD), {"PATH": path("palaestra-mujoco")})
+
+    assert "MUJOCO_GL" not in started.environment
+
+
+def test_variables_of_the_job_decide_how_mujoco_draws(path) -> None:
+    """An image of one's own may have another library, or a GPU."""
+    given = {"PATH": path("palaestra-mujoco"), "MUJOCO_GL": "osmesa", "LP_NUM_THREADS": "4"}
+
+    assert command(Driver.MUJOCO, Launch(world=WORLD), given).environment == given
+
+
 def test_webots_starts_paused_without_a_screen_and_prints(path) -> None:
     """The trainer sets the mode when it is there to step."""
     folder = path("webots")

@@ -157,7 +157,7 @@ class SimulatorConfiguration(_Section):
         role: Collect gathers experience, Evaluate measures the policy.
         min_simulators: how many simulators of its group the run needs to continue; None: all of them.
         control: address of its sidecar's control port.
-        driver: how it is started: stub, webots or command.
+        driver: how it is started: stub, mujoco, webots or command.
         options: its command-line options.
         world: path of its generated world.
         names_prefix: readable start of the ROS names of its robots; not used.

@@ -1,4 +1,4 @@
-"""The command lines of the simulators: the stub, Webots, and any other program."""
+"""The command lines of the simulators: the stub, MuJoCo, Webots, and any other program."""
 
 import os
 import shutil
@@ -13,6 +13,7 @@ from palaestra_sim.sidecar.process import Command
 
 WORLD = "{world}"  # in a command: the path of the world
 _NOT_ROOT = "palaestra"
+_MESA_THREADS = "LP_NUM_THREADS"
 
 # Source: Webots' guide, "Command Line Arguments". --batch: no dialog waits for a click.
 # --minimize without --mode would start in fast mode.
@@ -23,6 +24,7 @@ class Driver(StrEnum):
     """The program that simulates."""
 
     STUB = "stub"
+    MUJOCO = "mujoco"
     WEBOTS = "webots"
     COMMAND = "command"
 
@@ -51,6 +53,10 @@ def _stub(launch: Launch) -> list[str]:
     return ["palaestra-stub", str(launch.world), *launch.options]
 
 
+def _mujoco(launch: Launch) -> list[str]:
+    return ["palaestra-mujoco", str(launch.world), *launch.options]
+
+
 def _webots(launch: Launch) -> list[str]:
     return ["webots", *_WEBOTS, str(launch.world), *launch.options]
 
@@ -66,6 +72,14 @@ def _nothing(environment: Mapping[str, str]) -> dict[str, str]:
     """Return no variables: the program inherits those of the container."""
     del environment
     return {}
+
+
+def _for_mujoco(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return a variable by which Mesa draws on the simulator's own thread: other simulators share the cores.
+
+    MUJOCO_GL stays unset: with it, MuJoCo loads OpenGL at the import, and fails on a machine without.
+    """
+    return {_MESA_THREADS: environment.get(_MESA_THREADS, "0")}
 
 
 def _for_webots(environment: Mapping[str, str]) -> dict[str, str]:
@@ -87,11 +101,13 @@ def _found(driver: Driver, program: str, environment: Mapping[str, str]) -> str:
 
 _ARGUMENTS: Mapping[Driver, Callable[[Launch], list[str]]] = {
     Driver.STUB: _stub,
+    Driver.MUJOCO: _mujoco,
     Driver.WEBOTS: _webots,
     Driver.COMMAND: _command,
 }
 _ENVIRONMENT: Mapping[Driver, Callable[[Mapping[str, str]], dict[str, str]]] = {
     Driver.STUB: _nothing,
+    Driver.MUJOCO: _for_mujoco,
     Driver.WEBOTS: _for_webots,
     Driver.COMMAND: _nothing,
 }

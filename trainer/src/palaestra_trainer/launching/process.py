@@ -27,7 +27,7 @@ class ProcessLauncher(Sidecar):
 
     Args:
         world: path of the world, or the name of one that ships.
-        driver: stub or webots.
+        driver: stub, mujoco or webots.
         options: command-line options for the simulator.
         names: sidecar options that set the ROS names of the robots.
         suffix: text that is appended to the ROS names in the world.

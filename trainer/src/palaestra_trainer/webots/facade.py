@@ -76,7 +76,7 @@ class Webots:
         supervisor_node_name: the ROS name of the supervisor in the world.
         world_path: the world to load; or the name of a world that ships, e.g. "arena".
         launcher: starts the process; by default on this machine.
-        driver: of that process: "stub", the simulator that ships, or "webots".
+        driver: of that process: "stub", "mujoco" or "webots".
         options: command-line options of that process, e.g. ["--step-sleep-ms=5"].
         start_deadline_s: the longest time until it answers.
 
