@@ -14,7 +14,7 @@ from tests.e2e.namespace import OPERATOR, SYSTEM, named
 pytestmark = pytest.mark.timeout(600)
 
 ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each; tests/cluster/e2e.sh sets it
-MOST_MB = {"stub": 500, "operator": 200, "trainer": 2500, "notebook": 2500}
+MOST_MB = {"stub": 500, "mujoco": 700, "operator": 200, "trainer": 2500, "notebook": 2500}
 LABEL = "org.opencontainers.image."
 NOBODY = "65532:65532"
 

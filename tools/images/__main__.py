@@ -49,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="tools/images.sh", description="Build the container images that have changed.", epilog=EPILOG
     )
     add = parser.add_argument
-    add("names", nargs="*", metavar="NAME", help="of stub, trainer, notebook, operator; default: all")
+    add("names", nargs="*", metavar="NAME", help="of stub, mujoco, trainer, notebook, operator; default: all")
     add(
         "--torch",
         choices=("debian", "cuda"),

@@ -47,6 +47,12 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             packages=("sim_image",),
             files=("sim_image/standalone.sh",),
         ),
+        "mujoco": Recipe(
+            name="mujoco",
+            dockerfile="sim_image/Dockerfile.mujoco",
+            packages=("sim_image",),
+            extras=("mujoco",),
+        ),
         "trainer": Recipe(
             name="trainer",
             dockerfile="trainer/Dockerfile",

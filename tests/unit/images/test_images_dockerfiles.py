@@ -82,12 +82,12 @@ def test_code_is_compiled_in_the_build_and_not_at_run_time(instructions):
     assert all("--compile-bytecode" in run for run in values(instructions, "RUN") if "uv pip" in run)
 
 
-@pytest.mark.parametrize("name", ["stub", "trainer", "notebook"])
+@pytest.mark.parametrize("name", ["stub", "mujoco", "trainer", "notebook"])
 def test_an_image_with_ros_has_the_package_webots_ros(name):
     """Programs of users import it there, beside the messages inside its own."""
     runs = values(parsed(recipes("debian")[name]), "RUN")
 
-    [distribution] = [run for run in runs if "apt-get" in run]
+    distribution, *_ = [run for run in runs if "apt-get" in run]
     [ours] = [run for run in runs if "/context/packages/" in run]
 
     assert "python3-sensor-msgs" in distribution.split()
@@ -107,6 +107,21 @@ def test_the_notebook_begins_with_the_layers_of_the_trainer():
     shared = next(n for n, pair in enumerate(trainer) if "/context/requirements.txt" in pair[1]) + 1
 
     assert notebook[:shared] == trainer[:shared]
+
+
+def test_mujoco_begins_with_the_layers_of_the_stub():
+    """A node that runs both pulls Python and the messages of ROS once."""
+    stub, mujoco = (parsed(recipes("debian")[name]) for name in ("stub", "mujoco"))
+    shared = stub.index(("ENV", "PYTHONDONTWRITEBYTECODE=1")) + 1
+
+    assert mujoco[:shared] == stub[:shared]
+
+
+def test_mujoco_s_image_can_draw():
+    """By EGL and Mesa's driver for the processor, which EGL brings; PyOpenGL loads the other."""
+    install, *_ = [run for run in values(parsed(recipes("debian")["mujoco"]), "RUN") if "libegl1" in run]
+
+    assert "libopengl0" in install.split()
 
 
 def test_the_labels_say_what_is_inside(instructions, recipe):

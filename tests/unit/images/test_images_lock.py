@@ -110,6 +110,7 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
     ("image", "holds", "lacks"),
     [
         ("stub", {"prometheus-client"}, {"mujoco-core", "numpy", "pydantic", "torch", "pytest"}),
+        ("mujoco", {"mujoco-core", "numpy", "pyopengl", "prometheus-client"}, {"pydantic", "torch"}),
         (
             "operator",
             {"pydantic", "structlog", "prometheus-client"},
