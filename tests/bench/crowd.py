@@ -57,7 +57,7 @@ def planned(namespace):
     """Return the objects of one TrainingJob as text, without owner and labels: no operator looks at them."""
     uid = "00000000-0000-0000-0000-000000000000"
     job = identified(validate(training_job(TEMPLATE, namespace)), uid)
-    images = Images(trainer="trainer:bench", stub="stub:bench", webots="webots:bench")
+    images = Images(trainer="trainer:bench", stub="stub:bench", mujoco="mujoco:bench", webots="webots:bench")
     objects = [dict(each) for each in plan(job, ClusterLayout(images=images)).objects]
     for obj in objects:
         obj["metadata"] = {key: held for key, held in obj["metadata"].items() if key != "ownerReferences"}

@@ -3,6 +3,7 @@
 from typing import Any
 
 Values = dict[str, Any]
+PARTS = ("operator", "trainer", "stub", "mujoco", "webots", "notebook")
 DIGEST = "sha256:" + "0" * 64
 
 MODES: dict[str, Values] = {
@@ -20,7 +21,7 @@ MODES: dict[str, Values] = {
     "offline": {
         "images": {
             "registry": "registry.example.com:5000/robots",
-            **{part: {"digest": DIGEST} for part in ("operator", "trainer", "stub", "webots", "notebook")},
+            **{part: {"digest": DIGEST} for part in PARTS},
         },
         "imagePullSecrets": [{"name": "registry"}],
         "tensorboard": {"enabled": True, "existingClaim": "runs"},

@@ -5,9 +5,8 @@ from itertools import combinations
 from math import comb
 from typing import Any
 
-from tests.chart.modes import DIGEST, MODES, Values, merged
+from tests.chart.modes import DIGEST, MODES, PARTS, Values, merged
 
-PARTS = ("operator", "trainer", "stub", "webots", "notebook")
 MONITORS = ("podMonitor", "serviceMonitor", "prometheusRule", "dashboards")
 RESOURCES = {"requests": {"cpu": "1"}, "limits": {"memory": "1Gi"}}
 SPREAD = {"maxSkew": 1, "topologyKey": "zone", "whenUnsatisfiable": "DoNotSchedule"}

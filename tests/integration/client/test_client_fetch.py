@@ -131,7 +131,7 @@ class Scene:
         return job
 
     def _replica(self):
-        images = Images(trainer="trainer:1", stub="stub:1", webots="webots:1")
+        images = Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
         return dict(plan(identified(make_job(), "0d1f"), ClusterLayout(images=images)).replicas[0].job)
 
 

@@ -47,7 +47,7 @@ WORLDS = st.sampled_from(
     ]
 )
 DRIVERS = st.sampled_from(
-    [{"driver": "stub"}, {"driver": "webots", "image": "webots:1"},
+    [{"driver": "stub"}, {"driver": "mujoco"}, {"driver": "webots", "image": "webots:1"},
      {"driver": "command", "image": "mine:1", "command": ["simulate", "no", "5e-4"]}]
 )  # fmt: skip
 

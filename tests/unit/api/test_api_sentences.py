@@ -12,7 +12,7 @@ SENTENCES = [
     ({"simulators.1.role": "Eval"},
      'spec.simulators[1].role: "Eval" is not a role; use Collect or Evaluate'),
     ({"simulators.0.driver": "gazebo"},
-     'spec.simulators[0].driver: "gazebo" is not a driver; use stub, webots or command'),
+     'spec.simulators[0].driver: "gazebo" is not a driver; use stub, mujoco, webots or command'),
     ({"simulators.0.world": {"builtin": "maze"}},
      'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena'),
     ({"trainer.algorithm.name": "TD3"},

@@ -169,9 +169,10 @@ def test_the_operator_s_defaults_are_those_of_its_release(one):
     """Naming them again would hide what `palaestra operator --help` says."""
     chosen, release = options(one("default", "Deployment")), Images.of_release(version("palaestra"))
 
-    assert (chosen.trainer_image, chosen.stub_image, chosen.webots_image) == (
+    assert (chosen.trainer_image, chosen.stub_image, chosen.mujoco_image, chosen.webots_image) == (
         release.trainer,
         release.stub,
+        release.mujoco,
         release.webots,
     )
     assert (chosen.workers, chosen.resync) == (4, 600)
@@ -181,10 +182,10 @@ def test_every_image_comes_from_the_registry_by_its_digest(made, one):
     """Off-line, nothing else can be pulled: not by a test, and not by an option."""
     images = {container["image"] for pod in pods(made("offline")).values() for container in pod["containers"]}
     chosen = options(one("offline", "Deployment"))
-    images |= {chosen.trainer_image, chosen.stub_image, chosen.webots_image}
+    images |= {chosen.trainer_image, chosen.stub_image, chosen.mujoco_image, chosen.webots_image}
 
     assert {image for image in images if not (image.startswith(REGISTRY) and image.endswith(DIGEST))} == set()
-    assert len(images) == 5
+    assert len(images) == 6
 
 
 def test_everything_that_pulls_has_the_secret_of_the_registry(made, one):

@@ -19,7 +19,7 @@ def job():
 @pytest.fixture
 def template(job):
     """The template of its Job, as planned."""
-    images = Images(trainer="trainer:1", stub="stub:1", webots="webots:1")
+    images = Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
     return plan(job, ClusterLayout(images=images)).replicas[0].job["spec"]["template"]
 
 

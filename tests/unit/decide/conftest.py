@@ -62,7 +62,9 @@ class Scene:
         self.record = Record()
         self.behind_s = 0.0  # the node's clock, against that of the API server
         self.server_s = 0.0  # the API server's clock, against START
-        self.layout = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
+        self.layout = ClusterLayout(
+            images=Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
+        )
         self.objects: dict[str, list[dict[str, Any]]] = {
             name: [] for name in (*LISTS.values(), "pods", "events")
         }

@@ -27,6 +27,32 @@ def test_nothing_is_created_before_the_status_holds_the_images(make_scene):
     assert kinds(second) == ["NetworkPolicy", "ConfigMap", "PersistentVolumeClaim", "Job"]
 
 
+MUJOCO = [
+    {"name": "collect", "role": "Collect", "driver": "mujoco"},
+    {"name": "evaluate", "role": "Evaluate"},
+]
+
+
+def test_only_a_job_with_mujoco_holds_its_image(make_scene):
+    """A release that does not know the driver refuses a status with that field."""
+    held, without = make_scene(simulators=MUJOCO).step(), make_scene().step()
+
+    assert held.status.release.mujoco == "mujoco:1"
+    assert without.status.release.mujoco is None
+
+
+def test_a_newer_release_plans_mujoco_with_the_image_of_the_old_one(make_scene):
+    """As every other image of the job."""
+    scene = make_scene(simulators=MUJOCO)
+    scene.step()
+    scene.layout = type(scene.layout)(images=type(scene.layout.images).of_release("2"))
+
+    scene.step()
+
+    _, collect, _ = scene.job()["spec"]["template"]["spec"]["initContainers"]
+    assert collect["image"] == "mujoco:1"
+
+
 def test_a_newer_release_plans_with_the_images_of_the_old_one(make_scene):
     """The job was accepted with them; they are fixed for its whole life."""
     scene = make_scene(replicas=2)

@@ -21,7 +21,9 @@ from palaestra_protocol.pod.status import (
 )
 from tests.unit.decide.conftest import GROUPS
 
-LAYOUT = ClusterLayout(images=Images(trainer="trainer:1", stub="stub:1", webots="webots:1"))
+LAYOUT = ClusterLayout(
+    images=Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
+)
 CLOCK_S = 1000.0
 START = datetime(2026, 1, 31, 12, 0, tzinfo=UTC)
 TERMINAL = {Phase.SUCCEEDED, Phase.FAILED}

@@ -60,9 +60,13 @@ def test_a_sidecar_that_became_an_ordinary_container_is_wrong():
 DIGEST = f"@sha256:{'0' * 64}"
 
 
-def operator(own="operator" + DIGEST, trainer="trainer" + DIGEST, stub="stub" + DIGEST):
-    """Return the operator's container as the chart makes it."""
-    return {"image": own, "command": ["palaestra", f"--trainer-image={trainer}", f"--stub-image={stub}"]}
+PINNED = {part: part + DIGEST for part in ("operator", "trainer", "stub", "mujoco")}
+
+
+def operator(**images):
+    """Return the operator's container as the chart makes it, with these images in place of pinned ones."""
+    own, *given = (PINNED | images).items()
+    return {"image": own[1], "command": ["palaestra", *(f"--{part}-image={image}" for part, image in given)]}
 
 
 def test_images_that_are_named_by_digest_are_right():
@@ -70,7 +74,7 @@ def test_images_that_are_named_by_digest_are_right():
     assert judged_images(operator()).verdict is Verdict.RIGHT
 
 
-@pytest.mark.parametrize("part", ["own", "trainer", "stub"])
+@pytest.mark.parametrize("part", PINNED)
 def test_an_image_that_is_named_by_tag_is_a_warning(part):
     """A run that goes on after an interruption may meet another image under the same tag."""
     found = judged_images(operator(**{part: "registry.example.com/image:1"}))
@@ -86,6 +90,7 @@ def test_images_of_an_operator_that_is_given_none_are_the_releases():
 
     assert found.fact.startswith("palaestra-trainer:")
     assert ", palaestra-stub:" in found.fact
+    assert ", palaestra-mujoco:" in found.fact
 
 
 def test_a_definition_with_more_in_it_is_the_same():

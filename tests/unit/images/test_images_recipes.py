@@ -76,4 +76,5 @@ def test_an_image_has_the_name_that_the_plan_asks_for():
     images = Images.of_release("1.2.3")
 
     assert recipes("debian")["stub"].reference("1.2.3") == f"docker.io/library/{images.stub}"
+    assert recipes("debian")["mujoco"].reference("1.2.3") == f"docker.io/library/{images.mujoco}"
     assert recipes("debian")["trainer"].reference("1.2.3") == f"docker.io/library/{images.trainer}"

@@ -9,7 +9,7 @@ from palaestra.api import TrainingJob, validate
 from palaestra.plan import ClusterLayout, Images, LocalLayout, Plan, Ports, identified, plan
 
 UID = "0d1f3e5a-7c2b-4d68-9a40-c3b2a1908f7e"
-IMAGES = Images(trainer="trainer:1", stub="stub:1", webots="webots:1")
+IMAGES = Images(trainer="trainer:1", stub="stub:1", mujoco="mujoco:1", webots="webots:1")
 
 
 @pytest.fixture

@@ -131,6 +131,33 @@ def test_images_are_the_jobs_or_the_releases(in_cluster):
     assert planned["trainer"]["image"] == planned["ros-master"]["image"] == "trainer:1"
 
 
+def test_mujoco_has_its_image_its_driver_and_memory_for_a_camera(in_cluster):
+    """With a renderer a simulator takes 200 MB, and its sidecar is beside it."""
+    mujoco = {"name": "a", "role": "Collect", "driver": "mujoco", "options": ["--leave-out", "all"]}
+
+    planned = containers(in_cluster(simulators=[mujoco, {"name": "b", "role": "Evaluate"}]))
+
+    assert planned["sim-a-0"]["image"] == "mujoco:1"
+    assert planned["sim-b-0"]["image"] == "stub:1"
+    assert planned["sim-a-0"]["args"][0] == "--driver=mujoco"
+    assert planned["sim-a-0"]["args"][-2:] == ["--option=--leave-out", "--option=all"]
+    assert planned["sim-a-0"]["resources"]["requests"] == {"cpu": "75m", "memory": "256Mi"}
+
+
+def test_the_memory_that_a_job_asks_for_takes_the_place_of_mujoco_s(in_cluster):
+    """A world of many meshes needs more."""
+    mujoco = {
+        "name": "a",
+        "role": "Collect",
+        "driver": "mujoco",
+        "resources": {"requests": {"memory": "1Gi"}},
+    }
+
+    planned = containers(in_cluster(simulators=[mujoco], trainer={"evaluation": {"everySteps": 0}}))
+
+    assert planned["sim-a-0"]["resources"] == {"requests": {"cpu": "75m", "memory": "1Gi"}}
+
+
 COMMAND = [
     {"name": "own", "role": "Collect", "driver": "command", "image": "my:1", "command": ["sim", "{world}"]},
     {"name": "evaluate", "role": "Evaluate"},

@@ -85,13 +85,14 @@ def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
     ("group", "read"),
     [
         ({}, None),
+        ({"driver": "mujoco"}, None),
         ({"driver": "webots", "image": "webots:1"}, Recycle(after_resets=24)),
         ({"driver": "command", "image": "own:1", "command": ["own"]}, Recycle(after_resets=24)),
         ({"recycle": {"afterResets": 24}}, Recycle(after_resets=24)),
     ],
-    ids=["stub", "webots", "command", "stored job"],
+    ids=["stub", "mujoco", "webots", "command", "stored job"],
 )
-def test_the_stub_alone_is_not_recycled_unless_the_job_says_so(make_job, group, read):
+def test_simulators_that_do_not_age_are_recycled_only_if_the_job_says_so(make_job, group, read):
     """Its restarts took a fifth of a training; the paper's simulator ended at the 25th reset."""
     job = make_job(simulators=[COLLECT | group, EVALUATE])
 

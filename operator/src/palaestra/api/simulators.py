@@ -27,6 +27,7 @@ class Driver(StrEnum):
     """The simulator program."""
 
     STUB = "stub"
+    MUJOCO = "mujoco"
     WEBOTS = "webots"
     COMMAND = "command"
 
@@ -146,8 +147,9 @@ class SimulatorGroup(ApiModel):
     """Container image; absent: this release's image for the driver. `palaestra run` ignores it."""
 
     driver: Driver = Field(default=Driver.STUB, strict=False)
-    """`stub`: the simulator that ships with Palaestra. `webots`: Webots; Palaestra has no image for it yet,
-    so set `image` to your own. `command`: any program with the same ROS interface."""
+    """`stub`: the simulator that ships with Palaestra, without masses and pictures. `mujoco`: MuJoCo, with
+    the same worlds, options and ROS interface. `webots`: Webots; Palaestra has no image for it yet, so set
+    `image` to your own. `command`: any program with the same ROS interface."""
 
     command: Words = ()
     """Program and arguments, for driver `command` only."""
@@ -157,7 +159,7 @@ class SimulatorGroup(ApiModel):
 
     recycle: Recycle | None = None
     """When a healthy simulator is restarted between two episodes; absent: after 24 resets. Absent with
-    driver `stub`: never, because the stub neither leaks memory nor slows down."""
+    driver `stub` or `mujoco`: never, because these neither leak memory nor slow down."""
 
     standby: bool = False
     """`true` runs a second simulator in the same container, which takes over at once when the first is
@@ -177,7 +179,8 @@ class SimulatorGroup(ApiModel):
     """Environment variables of the simulator's container."""
 
     resources: Resources = Resources()
-    """CPU and memory of one simulator; a standby doubles the memory."""
+    """CPU and memory of one simulator; a standby doubles the memory. If memory is absent, the request is
+    160Mi, with driver `mujoco` 256Mi, and the limit is 2Gi."""
 
     rules = (
         Rule(

@@ -257,6 +257,9 @@ class Release(Reported):
     stub: Image
     """Image of the stub simulator."""
 
+    mujoco: Image | None = None
+    """Image of MuJoCo; absent: the job has no simulator with driver `mujoco`."""
+
     webots: Image
     """Image of Webots, which Palaestra does not build yet."""
 

@@ -132,14 +132,19 @@ def _add_cluster(parser: argparse.ArgumentParser) -> None:
 
 def _add_images(parser: argparse.ArgumentParser) -> None:
     release = Images.of_release(version("palaestra"))
-    for name in ("trainer", "stub", "webots"):
+    for name in ("trainer", "stub", "mujoco", "webots"):
         image = getattr(release, name)
         meaning = f"image for jobs that name none; default: {image}"
         parser.add_argument(f"--{name}-image", metavar="IMAGE", default=image, help=meaning)
 
 
 def _operator(options: argparse.Namespace) -> int:
-    images = Images(trainer=options.trainer_image, stub=options.stub_image, webots=options.webots_image)
+    images = Images(
+        trainer=options.trainer_image,
+        stub=options.stub_image,
+        mujoco=options.mujoco_image,
+        webots=options.webots_image,
+    )
     return run(
         Options(
             images=images,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from palaestra.api import TrainingJob
+from palaestra.api import Driver, TrainingJob
 from palaestra.api.reasons import Reason, say
 from palaestra.api.status import TERMINAL, Phase, Release, ReplicaStatus, Status
 from palaestra.decide.acting import actions
@@ -143,7 +143,7 @@ def _status(
     return Status(
         observed_generation=old.observed_generation if prepared.closed else seen_generation(job, observed),
         phase=where.phase,
-        release=old.release or _release(prepared),
+        release=old.release or _release(job, prepared),
         conditions=conditions(old, current, generation, now),
         start_time=started(old, observed),
         completion_time=now if where.phase in TERMINAL else None,
@@ -177,8 +177,15 @@ def _accepted(job: TrainingJob, prepared: Prepared) -> ConditionState:
     )
 
 
-def _release(prepared: Prepared) -> Release | None:
+def _release(job: TrainingJob, prepared: Prepared) -> Release | None:
     images = prepared.images if prepared.plan is not None else None
     if images is None:
         return None
-    return Release(trainer=images.trainer, stub=images.stub, webots=images.webots)
+    # An older release refuses a status with a field that it does not know, so only jobs that need it have it.
+    needs_mujoco = any(group.driver is Driver.MUJOCO for group in job.spec.simulators)
+    return Release(
+        trainer=images.trainer,
+        stub=images.stub,
+        mujoco=images.mujoco if needs_mujoco else None,
+        webots=images.webots,
+    )

@@ -221,7 +221,13 @@ def _at_acceptance(job: TrainingJob, layout: ClusterLayout) -> ClusterLayout:
     release = job.status.release
     if release is None:
         return layout
-    return replace(layout, images=Images(trainer=release.trainer, stub=release.stub, webots=release.webots))
+    images = Images(
+        trainer=release.trainer,
+        stub=release.stub,
+        mujoco=release.mujoco or layout.images.mujoco,
+        webots=release.webots,
+    )
+    return replace(layout, images=images)
 
 
 def _worlds(job: TrainingJob, observed: Observed) -> dict[tuple[str, str], bytes]:

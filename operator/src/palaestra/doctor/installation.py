@@ -19,6 +19,7 @@ ROLES = "install the roles of this release, for this namespace too"
 LOGS = "read `kubectl logs -n {namespace} deploy/{name}`"
 TRAINER_IMAGE = "--trainer-image="
 STUB_IMAGE = "--stub-image="
+MUJOCO_IMAGE = "--mujoco-image="
 DIGEST = "@sha256:"
 NOT_ELECTED = "--no-leader-elect"
 PORT_NAME = "metrics"
@@ -56,6 +57,7 @@ def judged_images(container: Object) -> Finding:
         container["image"],
         _chosen(container, TRAINER_IMAGE, release.trainer),
         _chosen(container, STUB_IMAGE, release.stub),
+        _chosen(container, MUJOCO_IMAGE, release.mujoco),
     )
     tags = [image for image in named if DIGEST not in image]
     if not tags:

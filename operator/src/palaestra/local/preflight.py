@@ -101,6 +101,8 @@ def _simulator_program(group: SimulatorGroup) -> str:
     match group.driver:
         case Driver.STUB:
             return "palaestra-stub"
+        case Driver.MUJOCO:
+            return "palaestra-mujoco"
         case Driver.WEBOTS:
             return "webots"
         case Driver.COMMAND:

@@ -52,7 +52,7 @@ def sidecar(replica: Replica, simulator: PlannedSimulator, worlds: Mapping[str, 
     """Return the sidecar of one simulator, which starts it when the trainer asks."""
     group, places = simulator.group, replica.places(simulator.container)
     ports = replica.layout.ports
-    quantities = planned.resources(group.resources, planned.SIMULATOR)
+    quantities = planned.resources(group.resources, _least(group.driver))
     if group.standby:
         quantities = planned.for_two(quantities)
     common = _common(replica, simulator.container, quantities, group.env)
@@ -202,9 +202,14 @@ def _identity(simulator: PlannedSimulator) -> tuple[str, ...]:
 
 
 def _simulator_image(replica: Replica, simulator: PlannedSimulator) -> str:
-    images = replica.layout.images
-    release = images.webots if simulator.group.driver is Driver.WEBOTS else images.stub
+    images, driver = replica.layout.images, simulator.group.driver
+    release = {Driver.MUJOCO: images.mujoco, Driver.WEBOTS: images.webots}.get(driver, images.stub)
     return simulator.group.image or release
+
+
+def _least(driver: Driver) -> Resources:
+    """Return the resources of a simulator whose job asks for none."""
+    return planned.MUJOCO if driver is Driver.MUJOCO else planned.SIMULATOR
 
 
 def _trainer_image(replica: Replica) -> str:

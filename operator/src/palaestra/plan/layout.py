@@ -31,6 +31,7 @@ class Images:
 
     trainer: str
     stub: str
+    mujoco: str
     webots: str
 
     @classmethod
@@ -39,6 +40,7 @@ class Images:
         return cls(
             trainer=f"palaestra-trainer:{version}",
             stub=f"palaestra-stub:{version}",
+            mujoco=f"palaestra-mujoco:{version}",
             webots=f"palaestra-webots:{version}",
         )
 

@@ -21,6 +21,8 @@ Planned = dict[str, dict[str, str]]
 
 ROS_MASTER = Resources(requests={"cpu": "25m", "memory": "64Mi"}, limits={"memory": "256Mi"})
 SIMULATOR = Resources(requests={"cpu": "75m", "memory": "160Mi"}, limits={"memory": "2Gi"})
+# 100 MB without a camera, 200 MB with one, beside the sidecar.
+MUJOCO = Resources(requests={"cpu": "75m", "memory": "256Mi"}, limits={"memory": "2Gi"})
 TRAINER = Resources(requests={"cpu": "250m", "memory": "768Mi"}, limits={"cpu": "1", "memory": "2Gi"})
 
 

@@ -13,6 +13,7 @@ from palaestra_sim.world import name_prefix
 FILE = "training.yaml"
 LOOPBACK = "127.0.0.1"
 NEVER = Recycle(after_resets=0)
+DO_NOT_AGE = (Driver.STUB, Driver.MUJOCO)
 AFTER_24_RESETS = Recycle(after_resets=24)  # Source: the paper's simulator ended there with a bus error
 
 
@@ -84,7 +85,7 @@ def recycling(group: SimulatorGroup) -> Recycle:
     """Return when the simulators of a group are recycled, also where the job does not say."""
     if group.recycle is not None:
         return group.recycle
-    return NEVER if group.driver is Driver.STUB else AFTER_24_RESETS
+    return NEVER if group.driver in DO_NOT_AGE else AFTER_24_RESETS
 
 
 def _limits(recycle: Recycle) -> dict[str, int]:
