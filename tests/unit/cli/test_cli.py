@@ -142,18 +142,31 @@ def test_world_can_be_checked_by_each_simulator(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "stub: starts as it is"
     assert lines[1].startswith('  robot "robotino": controller "ros", omnidirectional drive on 3 wheels')
-    assert lines[2].startswith("webots: ")
+    assert lines[2] == "mujoco: starts as it is"
+    assert lines[3].startswith('  robot "robotino": controller "ros", ')
+    assert lines[4].startswith("webots: ")
 
     path.write_text("#VRML_SIM R2023b utf8\nColosseum { }\n")
     assert main(["world", str(path), "--check"]) == 2
     assert "  my.wbt:2:1: the stub simulates no Colosseum; left out" in capsys.readouterr().out.splitlines()
 
 
+def test_mujoco_is_asked_only_where_it_is_installed(tmp_path, capsys, monkeypatch):
+    """It is an extra; a world for the stub is right without it."""
+    path = tmp_path / "my.wbt"
+    path.write_bytes(builtin("arena"))
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+
+    assert main(["world", str(path), "--check"]) == 0
+    assert "mujoco:" not in capsys.readouterr().out
+
+
 def test_a_simulator_that_is_not_installed_says_so(tmp_path, capsys, monkeypatch):
     """An operator's image has none."""
     path = tmp_path / "my.wbt"
     path.write_bytes(builtin("arena"))
-    monkeypatch.setattr("palaestra.local.world_check.program_path", lambda: str(tmp_path))
+    for module in ("simulators", "world_check"):
+        monkeypatch.setattr(f"palaestra.local.{module}.program_path", lambda: str(tmp_path))
 
     assert main(["world", str(path), "--check"]) == 2
     assert "  palaestra-stub is not installed on this machine" in capsys.readouterr().out.splitlines()

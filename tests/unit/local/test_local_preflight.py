@@ -70,6 +70,33 @@ def test_a_program_that_does_not_exist_is_named_with_its_field(request_for, spec
     assert any(each.startswith(problem) for each in preflight.programs_exist(request_for(**spec)))
 
 
+def test_a_job_with_mujoco_runs_where_it_is_installed(request_for):
+    """`make setup` installs it."""
+    assert not list(preflight.programs_exist(request_for(**collecting(driver="mujoco"))))
+
+
+def test_the_error_for_a_missing_mujoco_names_the_package_and_the_extra(request_for, monkeypatch):
+    """Its program is always there, its library is an extra; a simulator's log would be read much later."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+
+    [problem] = preflight.programs_exist(request_for(**collecting(driver="mujoco")))
+
+    assert problem == (
+        "spec.simulators[0]: palaestra-mujoco needs the Python package mujoco, which is not installed; "
+        "install palaestra-sim[mujoco] (`make setup` does)"
+    )
+
+
+def test_the_error_for_a_missing_program_of_mujoco_names_the_package(request_for, monkeypatch, tmp_path):
+    """That of an installation without simulators."""
+    monkeypatch.setattr("palaestra.local.simulators.program_path", lambda: str(tmp_path))
+
+    assert (
+        "spec.simulators[0]: palaestra-mujoco is not a program on this machine; "
+        "install palaestra-sim[mujoco] (`make setup` does)"
+    ) in preflight.programs_exist(request_for(**collecting(driver="mujoco")))
+
+
 def test_the_error_for_a_broken_world_file_has_line_and_column(request_for, tmp_path):
     """Its sidecar would find it too, but in a log."""
     world = tmp_path / "broken.wbt"

@@ -11,6 +11,7 @@ from pathlib import Path
 from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import Refused
 from palaestra.local.process import program_path
+from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_sim import world
 from palaestra_sim.errors import WorldError
 
@@ -56,7 +57,7 @@ def nothing_is_put_off(request: Request) -> Iterator[str]:
 
 
 def programs_exist(request: Request) -> Iterator[str]:
-    """The program of every container exists."""
+    """The program of every container exists, with the library that it needs."""
     spec = request.job.spec
     own = spec.trainer.command[:1]
     programs = {"palaestra-sidecar": INSTALLATION}
@@ -64,8 +65,8 @@ def programs_exist(request: Request) -> Iterator[str]:
     for index, group in enumerate(spec.simulators):
         programs[_simulator_program(group)] = f"spec.simulators[{index}]"
     for program, field in programs.items():
-        if shutil.which(program, path=program_path()) is None:
-            yield f"{field}: {program} is not a program on this machine; install it"
+        if (problem := lack(program)) is not None:
+            yield f"{field}: {problem}"
 
 
 def worlds_are_right(request: Request) -> Iterator[str]:
@@ -98,15 +99,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def _simulator_program(group: SimulatorGroup) -> str:
-    match group.driver:
-        case Driver.STUB:
-            return "palaestra-stub"
-        case Driver.MUJOCO:
-            return "palaestra-mujoco"
-        case Driver.WEBOTS:
-            return "webots"
-        case Driver.COMMAND:
-            return group.command[0]
+    return group.command[0] if group.driver is Driver.COMMAND else PROGRAMS[group.driver]
 
 
 def _problems(path: Path) -> Iterator[str]:

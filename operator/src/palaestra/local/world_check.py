@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from palaestra.api import Driver
 from palaestra.local.process import NOT_RUNNABLE, Process, program_path
+from palaestra.local.simulators import PROGRAMS, lack
 
-_CHECKERS: Final = {"stub": "palaestra-stub"}
+_CHECKERS: Final = (Driver.STUB, Driver.MUJOCO)
 _DEADLINE_S: Final = 60.0
 _TIMED_OUT: Final = 124
 
@@ -36,11 +38,16 @@ class Answer:
 
 
 def check_world(world: Path) -> tuple[Answer, ...]:
-    """Return the answer of each simulator that can check a world; without an answer it cannot start it."""
-    return tuple(asyncio.run(_ask(driver, program, world)) for driver, program in _CHECKERS.items())
+    """Return the answer of each simulator that can check a world; without an answer it cannot start it.
+
+    The stub is always asked, others if they are installed.
+    """
+    asked = [driver for driver in _CHECKERS if driver is Driver.STUB or lack(PROGRAMS[driver]) is None]
+    return tuple(asyncio.run(_ask(driver, world)) for driver in asked)
 
 
-async def _ask(driver: str, program: str, world: Path) -> Answer:
+async def _ask(driver: Driver, world: Path) -> Answer:
+    program = PROGRAMS[driver]
     with tempfile.TemporaryFile() as output:
         code = await _run([program, "--check", str(world)], output.fileno())
         output.seek(0)
@@ -49,7 +56,7 @@ async def _ask(driver: str, program: str, world: Path) -> Answer:
         text = f"{program} is not installed on this machine"
     elif code == _TIMED_OUT:
         text = f"{program} did not answer within {_DEADLINE_S:.0f} s"
-    return Answer(driver=driver, starts=code == 0, text=text)
+    return Answer(driver=driver.value, starts=code == 0, text=text)
 
 
 async def _run(command: list[str], output: int) -> int:
