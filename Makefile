@@ -7,7 +7,8 @@ BIN := .venv/bin
 PACKAGES := operator trainer sim_image
 SOURCES := operator/src trainer/src sim_image/src
 WEBOTS_ROS := $(addprefix sim_image/src/,palaestra_protocol/ros/definitions.txt palaestra_sim/message_package/files.py)
-JOB := manifests/examples/move-to-target.yaml
+SIM := stub
+JOB := manifests/examples/move-to-target$(addprefix -,$(SIM:stub=)).yaml
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header
 
 # Bytecode is kept, whatever the surroundings say: else every process compiles PyTorch and all else anew, for seconds.
@@ -23,7 +24,7 @@ setup: .venv/ready ## install ROS from the distribution and everything else into
 .venv/ready: requirements.lock $(PACKAGES:%=%/pyproject.toml) tools/setup.sh $(WEBOTS_ROS)
 	@tools/setup.sh
 
-run: setup ## train move-to-target on this machine, from a TrainingJob to a policy
+run: setup ## train move-to-target on this machine, from a TrainingJob to a policy; SIM=mujoco: in MuJoCo
 	@$(BIN)/palaestra run $(JOB)
 
 # Four at once, also on two processors: many tests wait for processes, leases and deadlines most of their time.

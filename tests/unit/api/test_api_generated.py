@@ -1,10 +1,11 @@
 """The committed files match the models, and the documented examples are true."""
 
 import re
+import subprocess
 
 import pytest
 
-from palaestra.api import API_VERSION, Role, load
+from palaestra.api import API_VERSION, Driver, Role, load
 from palaestra.api.crd import schema
 from palaestra.api.generated import generated_files
 from palaestra.api.reference import page, tables
@@ -15,6 +16,7 @@ EXAMPLES = [
     "chaos",
     "minimal",
     "move-to-target",
+    "move-to-target-mujoco",
     "reinforce",
     "sparse-reward",
     "standby",
@@ -68,6 +70,32 @@ def test_the_examples_show_what_their_names_say(repository) -> None:
         "DQN",
         50_000,
     )
+
+
+def test_the_example_for_mujoco_is_the_same_job_with_another_driver(repository) -> None:
+    """`make run SIM=mujoco` changes nothing else; a policy may be compared with the stub's."""
+    folder = repository / "manifests/examples"
+    stub, mujoco = (
+        load((folder / f"{name}.yaml").read_text(encoding="utf-8"), name).spec
+        for name in ("move-to-target", "move-to-target-mujoco")
+    )
+
+    groups = tuple(group.model_copy(update={"driver": Driver.MUJOCO}) for group in stub.simulators)
+
+    assert mujoco == stub.model_copy(update={"simulators": groups})
+
+
+@pytest.mark.parametrize(
+    ("chosen", "example"),
+    [([], "move-to-target"), (["SIM=stub"], "move-to-target"), (["SIM=mujoco"], "move-to-target-mujoco")],
+)
+def test_make_run_takes_the_example_of_the_simulator(chosen, example, repository) -> None:
+    """Each has a run directory of its own, so no run is resumed in another simulator."""
+    shown = subprocess.run(
+        ["make", "--dry-run", "run", *chosen], cwd=repository, capture_output=True, text=True, check=True
+    )
+
+    assert shown.stdout.splitlines()[-1].endswith(f"palaestra run manifests/examples/{example}.yaml")
 
 
 def test_the_page_shows_the_smallest_example(repository) -> None:
