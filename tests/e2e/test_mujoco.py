@@ -1,0 +1,69 @@
+"""Jobs with `driver: mujoco`: a training, and what the image of the simulator can do in a pod."""
+
+import pytest
+
+from tests.e2e.jobs import WAIT
+from tests.e2e.namespace import LONG_S
+
+pytestmark = pytest.mark.timeout(900)
+
+# Steps that take time, so that the simulator still runs when its environment is read.
+SLOW = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=40"}]
+SIMULATORS = [
+    {"name": "collect", "role": "Collect", "driver": "mujoco", "env": SLOW},
+    {"name": "evaluate", "role": "Evaluate", "driver": "mujoco"},
+]
+TRAINER = {
+    "steps": 600,
+    "evaluation": {"everySteps": 300, "episodes": 1},
+    "checkpoint": {"everySteps": 300, "keep": 2},
+}
+ENVIRONMENT = """
+from pathlib import Path
+for process in Path("/proc").glob("[0-9]*"):
+    try:
+        if b"palaestra-mujoco" in (process / "cmdline").read_bytes():
+            print(*(process / "environ").read_text().split(chr(0)), sep=chr(10))
+    except OSError:
+        pass
+"""
+DRAW = """
+import mujoco
+model = mujoco.MjModel.from_xml_string(
+    '<mujoco><worldbody><light pos="0 0 3"/><geom type="box" size=".3 .3 .3" rgba="1 0 0 1"/>'
+    '<camera name="above" pos="0 0 2"/></worldbody></mujoco>'
+)
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+with mujoco.Renderer(model, 48, 64) as renderer:
+    renderer.update_scene(data, "above")
+    red, green, blue = renderer.render()[24, 32]
+print("red" if red > 2 * max(green, blue) else (red, green, blue))
+"""
+
+
+def test_a_policy_is_trained_in_mujoco(namespace, job):
+    """With the release's image, and on one thread: the simulators of a node share its cores."""
+    namespace.apply(job("mujoco", simulators=SIMULATORS, trainer=TRAINER))
+    pod = namespace.wait_for_pod("mujoco")
+
+    said = namespace.wait(
+        lambda: namespace.execute(pod, "python3", "-c", ENVIRONMENT, container="sim-collect-0"), LONG_S
+    )
+
+    assert "LP_NUM_THREADS=0" in said.splitlines()
+    assert namespace.wait_for_end("mujoco", LONG_S) == "Succeeded"
+    replica = namespace.replica("mujoco")
+    assert replica["step"] == 600
+    assert replica["restarts"]["trainer"] == 0
+
+
+@pytest.mark.beside
+def test_the_image_of_mujoco_draws_without_a_screen(namespace, job):
+    """As a user without rights, on a read-only file system, and without a GPU."""
+    namespace.apply(job("draws", script=WAIT, simulator={"driver": "mujoco"}))
+    pod = namespace.wait_for_pod("draws")
+
+    drawn = ["env", "MUJOCO_GL=egl", "LP_NUM_THREADS=0", "python3", "-c", DRAW]
+
+    assert namespace.execute(pod, *drawn, container="sim-collect-0").split() == ["red"]
