@@ -7,10 +7,11 @@
     ├── UnknownWorldError       no shipped world has that name: retrying cannot help
     ├── ForeignPackageError     the folder has another webots_ros: retrying cannot help
     ├── SidecarError            the sidecar cannot run as requested: retrying cannot help
-    ├── FaultError              the description of a fault is wrong (stub.faults.language)
-    ├── NoSuchHandleError       this load of the world has no such node (stub.front.handles)
-    ├── NoValueError            a field has no such value (stub.scene.tree)
-    └── UnsimulatedError        Webots does it, the stub does not (stub.seam)
+    ├── FaultError              the description of a fault is wrong (faults.language)
+    ├── NoSuchHandleError       this load of the world has no such node (front.handles)
+    ├── NoValueError            a field has no such value (scene.tree)
+    ├── MissingLibraryError     a simulator needs a package that is not installed (mujoco.library)
+    └── UnsimulatedError        Webots does it, this simulator does not (seam)
 
 A message names the place, the fact and the remedy.
 """

@@ -11,7 +11,8 @@ import pytest
 SCRIPT = Path(__file__).parents[3] / "tools/setup.sh"
 PACKAGES = (
     "python3-rospy python3-rosmaster python3-netifaces python3-venv "
-    "python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs"
+    "python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs "
+    "g++ libroscpp-dev libsensor-msgs-dev python3-gencpp"
 )
 NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
 

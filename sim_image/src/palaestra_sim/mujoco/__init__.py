@@ -4,6 +4,7 @@
 - `physics`: the bodies and obstacles of a world
 - `model`: from robots and shapes to MuJoCo's model
 - `body`: a robot that drives
+- `loose`: a thing that moves when it is pushed
 - `library`: MuJoCo itself
 - `rays`: how far the beams of sensors travel
 

@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.program import Program
+from palaestra_sim.scene.physics import Physics
+
+
+def _physics() -> Physics:
+    """Return the physics of a world.
+
+    Raises:
+        MissingLibraryError: MuJoCo is not installed.
+    """
+    # Here, so that the program can report the error as its own.
+    from palaestra_sim.mujoco.physics import MujocoPhysics  # noqa: PLC0415 - `--help` needs no MuJoCo
+
+    return MujocoPhysics()
+
 
 MUJOCO = Program(
     name="palaestra-mujoco",
     description="Simulate a world with MuJoCo, and answer over ROS 1 like the `ros` controller of Webots.",
-    physics=MujocoPhysics,
+    physics=_physics,
 )
 
 
