@@ -66,6 +66,8 @@ class Joint:
 class JointPlace(Place):
     """The frame of the end of a joint."""
 
+    moves = True
+
     def __init__(self, parent: Place | None, translation: Vector, rotation: AxisAngle, joint: Joint) -> None:
         super().__init__(parent, translation, rotation)
         self.joint = joint

@@ -21,11 +21,14 @@ class Place:
     """The frame of one node.
 
     Attributes:
+        moves: whether it moves by itself, and not only where a client puts it.
         parent: the place of the node around it; None at the top of the world.
         translation: x, y, z in meters, in the parent's frame.
         rotation: axis and angle in radians, in the parent's frame.
         scale: meters of the world in a meter of this frame.
     """
+
+    moves = False
 
     def __init__(
         self, parent: Place | None, translation: Vector, rotation: AxisAngle, size: float = 1.0

@@ -22,6 +22,8 @@ class RobotPlace(Place):
     in the axes of the ground.
     """
 
+    moves = True
+
     def __init__(self, top: Place | None, translation: Vector, rotation: AxisAngle, body: Body) -> None:
         super().__init__(top, translation, rotation)
         self._body = body
