@@ -30,6 +30,11 @@ class Service(NamedTuple):
 class Publisher(Protocol):
     """Sends to the subscribers that are connected at that moment."""
 
+    @property
+    def heard(self) -> bool:
+        """Whether there is a subscriber."""
+        ...
+
     def send(self, fields: Fields) -> None:
         """Send a message of these fields."""
         ...

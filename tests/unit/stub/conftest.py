@@ -33,6 +33,11 @@ class FakePublisher:
         self.latched = latched
         self.reading = reading
 
+    @property
+    def heard(self):
+        """Whether somebody is subscribed."""
+        return bool(self.topic.inboxes)
+
     def send(self, fields):
         """Keep the template with these fields."""
         self.topic.deliver({**self.template, **fields})

@@ -100,6 +100,8 @@ def check(faults: Iterable[Fault], found: Survey) -> None:
 class _Silent:
     """A publisher without subscribers."""
 
+    heard = False
+
     def send(self, fields: Fields) -> None:
         """Send it to nobody."""
 

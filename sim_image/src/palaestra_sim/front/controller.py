@@ -59,7 +59,7 @@ class Controller:
         self._host_clock = host.clock
         self._stepping = stepping
         self._outlets = {
-            name: Outlet(node, name, topics, kind.enable, partial(kind.enabled, device), kind.sensor)
+            name: Outlet(node, name, topics, kind.accepts(device), partial(kind.enabled, device), kind.sensor)
             for name, (kind, device) in robot.parts.devices.rows.items()
             if (topics := kind.topics(device))
         }

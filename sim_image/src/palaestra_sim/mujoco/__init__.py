@@ -7,6 +7,9 @@
 - `loose`: a thing that moves when it is pushed
 - `library`: MuJoCo itself
 - `rays`: how far the beams of sensors travel
+- `eye`, `pictures`: what cameras see
+- `visible`: from visible shapes to a model of their own
+- `canvas`: OpenGL
 
 Worlds, devices and the interface are those of all simulators: `scene` and `front`.
 """

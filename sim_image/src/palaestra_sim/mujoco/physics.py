@@ -1,7 +1,7 @@
 """The physics of MuJoCo: one model of all robots and obstacles, made anew when one comes or goes.
 
 A basic step is a whole number of MuJoCo's steps. After it, every body has the pose that the scene's devices
-read. Rays are cast when a sensor is sampled.
+read. Rays are cast when a sensor is sampled. Pictures have a model of their own.
 """
 
 from __future__ import annotations
@@ -11,14 +11,19 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from palaestra_sim.mujoco.body import MujocoBody
+from palaestra_sim.mujoco.eye import MujocoEye
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import Built, build
+from palaestra_sim.mujoco.pictures import Pictures
 from palaestra_sim.mujoco.rays import Beams
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.drawn import View
+from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
+from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
 
 LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
@@ -36,6 +41,7 @@ class MujocoPhysics:
         self._built: Built = build((), (), ())
         self._settled = True
         self._pushes: list[tuple[Figure | Loose, Push]] = []
+        self._pictures: Pictures | None = None
 
     def body(self, build: Build) -> MujocoBody:
         """Return the body of a robot that is being read."""
@@ -94,6 +100,14 @@ class MujocoPhysics:
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Let a force act on a robot or a loose thing in the next basic step."""
         self._pushes.append((target, push))
+
+    def show(self, view: View) -> None:
+        """Take what cameras see of the world."""
+        self._pictures = Pictures(view)
+
+    def eye(self, place: Place, lens: Lens) -> MujocoEye | None:
+        """Return a camera; None if its picture would not be flat."""
+        return MujocoEye(self._pictures, place, lens) if self._pictures is not None and lens.flat else None
 
     def contacts(self) -> Iterator[ContactPoint]:
         """Yield where robots touch obstacles and each other now."""

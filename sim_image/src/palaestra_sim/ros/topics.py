@@ -83,6 +83,11 @@ class Publisher:
         self._reading_at = 0
         self._pack: _Pack = _STAMP.pack_into
 
+    @property
+    def heard(self) -> bool:
+        """Whether there is a subscriber."""
+        return bool(self.topic.links)
+
     def send(self, fields: Mapping[str, Any]) -> None:
         """Send a message of `fields`, over the template's."""
         self.topic.send(self.topic.type.codec.frame({**self._template, **fields}))

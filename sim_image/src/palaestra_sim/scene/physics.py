@@ -1,4 +1,4 @@
-"""The physics as the scene needs it: bodies that move, rays, and contacts.
+"""The physics as the scene needs it: bodies that move, rays, contacts, and pictures.
 
 The scene reads a world, and gives its robots devices. A physics moves these robots. The stub's is kinematic;
 another one takes its place by implementing this Protocol. It has the axes of the ground, of which z points
@@ -13,6 +13,8 @@ from typing import NamedTuple, Protocol
 
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body, Build
+from palaestra_sim.scene.drawn import View
+from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -102,6 +104,14 @@ class Physics(Protocol):
 
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Let a force act on a robot or a loose thing in the next basic step."""
+        ...
+
+    def show(self, view: View) -> None:
+        """Take what cameras see of the world; a physics that draws nothing ignores it."""
+        ...
+
+    def eye(self, place: Place, lens: Lens) -> Eye | None:
+        """Return a camera; None if this physics draws nothing."""
         ...
 
     def contacts(self) -> Iterable[ContactPoint]:

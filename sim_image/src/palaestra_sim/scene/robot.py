@@ -18,6 +18,7 @@ from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.kind import Sample, Source
+from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.motion import Motion, Trail, motion_of
 from palaestra_sim.scene.motors import Motor
@@ -57,6 +58,8 @@ class Robot:
         self._random = random.Random()  # noqa: S311 - noise, not secrets
         self.gauss = self._random.gauss
         self._trails: list[Trail] = []
+        for kind, device in parts.devices.rows.values():
+            kind.attach(device, self)
         self.samplers: tuple[Sample, ...] = tuple(
             kind.sampler(devices, self)
             for kind in DEVICES.values()
@@ -79,6 +82,10 @@ class Robot:
     def look(self, beams: Sequence[Beam]) -> Cast:
         """Return a function that returns how far each beam travels now, in meters; see `Carrier`."""
         return self._physics.look(self, beams)
+
+    def eye(self, place: Place, lens: Lens) -> Eye | None:
+        """Return a camera at a place; None if this simulator draws nothing; see `Carrier`."""
+        return self._physics.eye(place, lens)
 
     def motion(self, place: Place) -> Motion:
         """Return how a place on the robot moves in the world; see `Carrier`."""

@@ -19,6 +19,7 @@ from collections.abc import Callable
 from palaestra_sim.errors import SimError, WorldError
 from palaestra_sim.scene.air import Air
 from palaestra_sim.scene.devices.connector import Connector
+from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.node_motion import NodeMotion
@@ -52,6 +53,8 @@ class Simulation:
     def __init__(self, tree: SceneTree, scene: Scene, mode: Mode) -> None:
         self.tree = tree
         self.scene = scene
+        self._view = View(tree.root)
+        scene.physics.show(self._view)
         self.robots = tuple(Robot(parts, scene.random_seed, scene.physics) for parts in scene.robots)
         self.time_ms = 0
         self.mode = mode
@@ -173,7 +176,7 @@ class Simulation:
         """Take the effect of a field that has a new value."""
         if node.outline:
             self._resize(node)
-            return
+        self._view.written(node, field)
         if node.place is None or field not in {"translation", "rotation"}:
             return
         if field == "translation":
@@ -205,6 +208,7 @@ class Simulation:
             self.tree.forget(added)
             raise
         self.tree.attach(added, field.name, at)
+        self._view.changes += 1
         self._added += added
         self._states.begin(inside for node in added for inside in (node, *node.descendants()))
         self.scene.solids += fresh.solids
@@ -226,6 +230,7 @@ class Simulation:
         require_removable(node)
         gone = {node, *node.descendants()}
         self.tree.remove(node)
+        self._view.changes += 1
         self.scene.solids = [shape for shape in self.scene.solids if shape.node not in gone]
         self.scene.loose = [thing for thing in self.scene.loose if thing.node not in gone]
         self.scene.robots = [parts for parts in self.scene.robots if parts.node not in gone]
@@ -254,6 +259,7 @@ class Simulation:
             UnsimulatedError: no state of that name was saved.
         """
         self._states.load(node, name)
+        self._view.moves += 1
         for robot in self.robots:
             if robot.parts.node in {node, *node.descendants(), *node.ancestors()}:
                 robot.halt()
@@ -325,6 +331,7 @@ class Simulation:
         for node in self.tree.nodes.values():
             if node.place is not None:
                 node.place.return_to_start()
+        self._view.moves += 1
         self._air.clear()
         for robot in self.robots:
             robot.reset()

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from palaestra_sim.errors import refusal
-from palaestra_sim.scene.devices.kind import never
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.simulation import Simulation
 
@@ -40,8 +39,8 @@ def silent_devices(robots: Iterable[Robot]) -> str:
             kind.node
             for robot in robots
             if robot.parts.arguments is not None
-            for kind, _ in robot.parts.devices.rows.values()
-            if kind.enable is never
+            for kind, device in robot.parts.devices.rows.values()
+            if kind.silent(device)
         )
     )
 

@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
+from palaestra_sim.scene.drawn import View
+from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
+from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
@@ -91,6 +94,12 @@ class StubPhysics:
 
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Do nothing: without masses a force moves nothing; see `abilities`."""
+
+    def show(self, view: View) -> None:
+        """Do nothing: there are no pictures."""
+
+    def eye(self, _place: Place, _lens: Lens) -> None:
+        """Return None: there are no pictures."""
 
     def contacts(self) -> Iterable[ContactPoint]:
         """Return where robots touch obstacles and each other now."""

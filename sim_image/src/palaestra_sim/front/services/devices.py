@@ -49,12 +49,15 @@ class Feed:
         self.publishers.clear()
 
     def publish(self, elapsed_ms: int) -> None:
-        """Send the value to the subscribers, by each publisher that is due."""
+        """Send the value to the subscribers, by each publisher that is due.
+
+        A value that nobody would get is not read: a picture takes time to draw.
+        """
         source = self.source
         if source is None:
             return
         for period_ms, publisher in self.publishers.items():
-            if elapsed_ms % period_ms == 0:
+            if elapsed_ms % period_ms == 0 and publisher.heard:
                 for value in source.value if self.many else (source.value,):
                     if self.reading:
                         publisher.send_stamped({self.reading: value})
@@ -102,7 +105,7 @@ class Outlet:
         """Publish every `period_ms`; 0 stops. Return whether the device accepts the period.
 
         Raises:
-            UnsimulatedError: the device never publishes.
+            UnsimulatedError: the device cannot begin, as a camera on a machine that cannot draw.
         """
         if period_ms == 0:
             self._periods_ms.clear()
@@ -112,8 +115,8 @@ class Outlet:
             return True
         if not self._accepts(period_ms, step_ms):
             return False
+        self._enabled(min(self._periods_ms | {period_ms}))
         self._periods_ms.add(period_ms)
-        self._enabled(min(self._periods_ms))
         for feed in self.feeds:
             feed.begin(self._node, period_ms)
         return True

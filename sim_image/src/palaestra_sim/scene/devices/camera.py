@@ -1,22 +1,29 @@
-"""Camera: its settings. The stub renders no images, so `enable` and what saves one answer failure."""
+"""Camera: its settings, and the picture that it sees if the simulator draws.
+
+Otherwise `enable` and what saves a picture answer failure. Distortion, focus, exposure, motion blur and noise
+have no effect.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic, never
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Topic
+from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
+from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Handler, Row
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Camera:
-    """A camera that sees nothing.
+    """A camera.
 
     Attributes:
-        size: width and height in pixels.
-        field_of_view_rad: as the world or a client set it.
-        near_m: nearest distance that would be visible.
+        place: its frame.
+        lens: with the field of view that the world or a client set.
+        spherical: whether its picture would be that of a sphere.
         exposure: as the world or a client set it.
         focus: focal length, distance, and its highest and lowest value, in meters; None without a Focus node.
         zoom: least and greatest field of view in rad; None without a Zoom node.
@@ -26,14 +33,33 @@ class Camera:
 
     name: str
     model: str
-    size: tuple[int, int]
-    field_of_view_rad: float
-    near_m: float
+    place: Place
+    lens: Lens
+    spherical: bool
     exposure: float
     focus: tuple[float, float, float, float] | None = None
     zoom: tuple[float, float] | None = None
     recognizes: bool = False
     segments: bool = False
+    eye: Eye | None = None
+
+    @property
+    def value(self) -> bytes | memoryview:
+        """The picture of this moment: blue, green, red and alpha of each pixel."""
+        return b"" if self.eye is None else self.eye.colors()
+
+    def attach(self, robot: Carrier) -> None:
+        """Look from a robot."""
+        self.eye = None if self.spherical else robot.eye(self.place, self.lens)
+
+    def enabled(self, period_ms: int) -> None:
+        """Get ready to draw.
+
+        Raises:
+            UnsimulatedError: this machine cannot draw.
+        """
+        if period_ms and self.eye is not None:
+            self.eye.open()
 
 
 def _read(part: Part) -> Camera:
@@ -41,9 +67,9 @@ def _read(part: Part) -> Camera:
     return Camera(
         name=part.name,
         model=part.text("model"),
-        size=(int(part.number("width", 64.0)), int(part.number("height", 64.0))),
-        field_of_view_rad=part.number("fieldOfView", 0.7854),
-        near_m=part.number("near", 0.01),
+        place=part.place,
+        lens=read_lens(part, part.number("near", 0.01), part.number("far", 0.0)),
+        spherical=part.node.flag("spherical", False),
         exposure=part.number("exposure", 1.0),
         focus=_focus(part),
         zoom=_zoom(part),
@@ -76,7 +102,7 @@ def _services(camera: Camera) -> tuple[Row, ...]:
         ("get_info", "camera_get_info", lambda _: _info(camera)),
         ("get_focus_info", "camera_get_focus_info", lambda _: _focus_info(camera)),
         ("get_zoom_info", "camera_get_zoom_info", lambda _: _zoom_info(camera)),
-        ("save_image", "save_image", _no_picture),
+        ("save_image", "save_image", saver(camera.lens, lambda: camera.eye is None, lambda: camera.value)),
         ("set_fov", "set_float", _fov_setter(camera)),
         ("set_focal_distance", "set_float", _focus_setter(camera)),
         ("set_exposure", "set_float", _exposure_setter(camera)),
@@ -100,8 +126,9 @@ def _recognition() -> tuple[Row, ...]:
 
 
 def _info(camera: Camera) -> Fields:
-    width, height = camera.size
-    return {"width": width, "height": height, "Fov": camera.field_of_view_rad, "nearRange": camera.near_m}
+    lens = camera.lens
+    width, height = lens.size
+    return {"width": width, "height": height, "Fov": lens.field_of_view_rad, "nearRange": lens.near_m}
 
 
 def _focus_info(camera: Camera) -> Fields:
@@ -115,7 +142,7 @@ def _focus_info(camera: Camera) -> Fields:
 
 
 def _zoom_info(camera: Camera) -> Fields:
-    low, high = camera.zoom or (camera.field_of_view_rad, camera.field_of_view_rad)
+    low, high = camera.zoom or (camera.lens.field_of_view_rad, camera.lens.field_of_view_rad)
     return {"minFov": low, "maxFov": high}
 
 
@@ -123,7 +150,7 @@ def _fov_setter(camera: Camera) -> Handler:
     def set_fov(request: Any) -> Fields:
         """Zoom, within the limits of the Zoom node; otherwise nothing changes, as in Webots."""
         if camera.zoom is not None and camera.zoom[0] <= request.value <= camera.zoom[1]:
-            camera.field_of_view_rad = request.value
+            camera.lens.field_of_view_rad = request.value
         return {"success": True}
 
     return set_fov
@@ -153,8 +180,8 @@ def _no_picture(_request: Any) -> Fields:
     return {"success": 0}
 
 
-def _topics(_camera: Camera) -> tuple[Topic, ...]:
-    return (Topic(name="image", type_name="sensor_msgs/Image", source=None),)
+def _topics(camera: Camera) -> tuple[Topic, ...]:
+    return (picture_topic("image", camera, camera.lens, "bgra8"),)
 
 
 CAMERA: Final = Kind(
@@ -168,5 +195,7 @@ CAMERA: Final = Kind(
     read=_read,
     services=_services,
     topics=_topics,
-    enable=never,
+    attach=Camera.attach,
+    enabled=Camera.enabled,
+    silent=lambda camera: camera.eye is None,
 )

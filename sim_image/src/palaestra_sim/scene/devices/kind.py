@@ -11,6 +11,7 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Body
+from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.joints import Joint
 from palaestra_sim.scene.motion import Motion
@@ -151,6 +152,10 @@ class Carrier(Protocol):
         """Return a function that returns how far each beam travels now, in meters."""
         ...
 
+    def eye(self, place: Place, lens: Lens) -> Eye | None:
+        """Return a camera at a place; None if this simulator draws nothing."""
+        ...
+
     def motion(self, place: Place) -> Motion:
         """Return how a place on the robot moves in the world."""
         ...
@@ -200,8 +205,13 @@ def whole_steps(period_ms: int, step_ms: int) -> bool:
 
 
 def never(_period_ms: int, _step_ms: int) -> bool:
-    """Accept no period: Webots publishes readings of this device, and the stub has none."""
+    """Accept no period: Webots publishes readings of this device, and the simulator has none."""
     return False
+
+
+def always_silent(_device: object) -> bool:
+    """Return that a device has no readings in any simulator of ours."""
+    return True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -219,7 +229,9 @@ class Kind(Generic[DeviceT]):
         services: returns those beside `get_model`, `get_name`, `get_node_type`; on joints, the names of the
             others of the joint; and, with topics, `enable` and `get_sampling_period`.
         topics: returns those that `enable` begins to publish.
+        attach: connects a device with the robot that carries it.
         enable: whether a period is accepted; 0, which ends publishing, always is.
+        silent: whether a device that is attached has no readings, so that no period is accepted.
         enabled: called with a device and its sampling period in ms, 0 for none, after that has changed.
         sensor: the path of `enable` below the name of the device, "" for the name itself.
     """
@@ -233,9 +245,15 @@ class Kind(Generic[DeviceT]):
     sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
     services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
     topics: Callable[[DeviceT], tuple[Topic, ...]] = lambda _: ()
+    attach: Callable[[DeviceT, Carrier], None] = lambda _device, _robot: None
     enable: Enable = whole_steps
+    silent: Callable[[DeviceT], bool] = lambda _: False
     enabled: Callable[[DeviceT, int], None] = lambda _device, _period_ms: None
     sensor: str = ""
+
+    def accepts(self, device: DeviceT) -> Enable:
+        """Return the rule by which a device accepts a sampling period."""
+        return never if self.silent(device) else self.enable
 
     @property
     def on_joint(self) -> bool:

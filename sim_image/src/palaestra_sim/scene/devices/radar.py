@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic, never
+from palaestra_sim.scene.devices.kind import Kind, Part, Topic, always_silent
 from palaestra_sim.seam import Row
 
 _ANSWERS: Final = {
@@ -54,5 +54,5 @@ RADAR: Final = Kind(
     read=_read,
     services=_services,
     topics=_topics,
-    enable=never,
+    silent=always_silent,
 )

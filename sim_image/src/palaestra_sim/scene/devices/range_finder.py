@@ -1,43 +1,111 @@
-"""RangeFinder: its settings. The stub renders no depths, so `enable` and `save_image` answer failure."""
+"""RangeFinder: its settings, and the distances that it sees if the simulator draws.
+
+Otherwise `enable` and `save_image` answer failure. Distortion, motion blur and noise have no effect.
+"""
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import dataclass
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic, never
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Topic
+from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
+from palaestra_sim.scene.eyes import Eye, Lens
+from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Row
 
+_WHITE: Final = 255
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+
+@dataclass(slots=True, kw_only=True, eq=False)
 class RangeFinder:
-    """A depth camera that sees nothing; `info` is what `get_info` answers."""
+    """A depth camera.
+
+    Attributes:
+        place: its frame.
+        lens: its far end is the greatest range.
+        least_m: the least range.
+        resolution_m: of a distance; -1: as fine as can be.
+        spherical: whether its picture would be that of a sphere.
+        eye: None if it sees nothing.
+    """
 
     name: str
     model: str
-    info: Fields
+    place: Place
+    lens: Lens
+    least_m: float
+    resolution_m: float
+    spherical: bool
+    eye: Eye | None = None
+
+    @property
+    def value(self) -> bytes | memoryview:
+        """The distances of this moment, a float32 each; infinite outside of the range."""
+        return b"" if self.eye is None else self.eye.depths(self.least_m, self.resolution_m)
+
+    @property
+    def info(self) -> Fields:
+        """What `get_info` answers."""
+        width, height = self.lens.size
+        return {
+            "width": width,
+            "height": height,
+            "Fov": self.lens.field_of_view_rad,
+            "minRange": self.least_m,
+            "maxRange": self.lens.far_m,
+        }
+
+    def attach(self, robot: Carrier) -> None:
+        """Look from a robot."""
+        self.eye = None if self.spherical else robot.eye(self.place, self.lens)
+
+    def enabled(self, period_ms: int) -> None:
+        """Get ready to draw.
+
+        Raises:
+            UnsimulatedError: this machine cannot draw.
+        """
+        if period_ms and self.eye is not None:
+            self.eye.open()
+
+    def gray(self) -> bytes:
+        """Return the distances as pixels: black is near, white is the greatest range or beyond."""
+        share = _WHITE / self.lens.far_m
+        distances = array("f", bytes(self.value))
+        levels = bytes(
+            min(_WHITE, int(share * distance)) if distance < self.lens.far_m else _WHITE
+            for distance in distances
+        )
+        pixels = bytearray(4 * len(levels))
+        for channel in range(4):
+            pixels[channel::4] = levels
+        return bytes(pixels)
 
 
 def _read(part: Part) -> RangeFinder:
-    info = {
-        "width": int(part.number("width", 64.0)),
-        "height": int(part.number("height", 64.0)),
-        "Fov": part.number("fieldOfView", 0.7854),
-        "minRange": part.number("minRange", 0.01),
-        "maxRange": part.number("maxRange", 1.0),
-    }
-    return RangeFinder(name=part.name, model=part.text("model"), info=info)
+    least_m = part.number("minRange", 0.01)
+    return RangeFinder(
+        name=part.name,
+        model=part.text("model"),
+        place=part.place,
+        lens=read_lens(part, min(part.number("near", 0.01), least_m), part.number("maxRange", 1.0)),
+        least_m=least_m,
+        resolution_m=part.number("resolution", -1.0),
+        spherical=part.node.flag("spherical", False),
+    )
 
 
 def _services(finder: RangeFinder) -> tuple[Row, ...]:
     return (
         ("get_info", "range_finder_get_info", lambda _: finder.info),
-        ("save_image", "save_image", lambda _: {"success": 0}),
+        ("save_image", "save_image", saver(finder.lens, lambda: finder.eye is None, finder.gray)),
     )
 
 
-def _topics(_finder: RangeFinder) -> tuple[Topic, ...]:
-    return (Topic(name="range_image", type_name="sensor_msgs/Image", source=None),)
+def _topics(finder: RangeFinder) -> tuple[Topic, ...]:
+    return (picture_topic("range_image", finder, finder.lens, "32FC1"),)
 
 
 RANGE_FINDER: Final = Kind(
@@ -49,5 +117,7 @@ RANGE_FINDER: Final = Kind(
     read=_read,
     services=_services,
     topics=_topics,
-    enable=never,
+    attach=RangeFinder.attach,
+    enabled=RangeFinder.enabled,
+    silent=lambda finder: finder.eye is None,
 )
