@@ -116,6 +116,16 @@ def test_bytes_numbers_and_flags_have_types_of_their_own():
     assert type(decoded.e[0]) is type(decoded.f) is bool
 
 
+def test_pixels_are_written_from_the_memory_in_which_they_were_drawn():
+    """A picture has a million bytes; `frame` copies them once, into the message."""
+    message = codec("string name\nuint8[] data")
+    pixels = memoryview(bytearray(range(12))).cast("B", (3, 4))
+
+    framed = message.frame({"name": "eye", "data": pixels})
+
+    assert framed == frame(message.encode({"name": "eye", "data": bytes(range(12))}))
+
+
 def test_a_message_inside_may_be_a_tuple_of_its_fields():
     """As it was decoded, or where a mapping for each of ten thousand points takes too long."""
     message = codec("demo/Point[] points\ndemo/Named named")

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 from palaestra_protocol.ros.fixed import UNFIT, Find, Record, has_fixed_size, record
 from palaestra_protocol.ros.syntax import Message
-from palaestra_protocol.ros.tcpros import frame
-from palaestra_protocol.ros.variable import Sections
+from palaestra_protocol.ros.tcpros import LENGTH
+from palaestra_protocol.ros.variable import Piece, Sections
 
 
 class Codec(Protocol):
@@ -100,15 +100,11 @@ class _VariableCodec:
         self._sections = sections
 
     def encode(self, fields: Mapping[str, Any]) -> bytes:
-        pieces: list[bytes] = []
-        try:
-            self._sections.write(fields, pieces)
-        except UNFIT as error:
-            raise ValueError(f"{self._name}: {error}") from error
-        return b"".join(pieces)
+        return b"".join(self._pieces(fields))
 
     def frame(self, fields: Mapping[str, Any]) -> bytes:
-        return frame(self.encode(fields))
+        pieces = self._pieces(fields)
+        return b"".join((LENGTH.pack(sum(map(len, pieces))), *pieces))
 
     def decode(self, payload: bytes | memoryview) -> Any:
         try:
@@ -118,3 +114,11 @@ class _VariableCodec:
         if end != len(payload):
             raise ValueError(f"{len(payload)} bytes for {end}")
         return message
+
+    def _pieces(self, fields: Mapping[str, Any]) -> list[Piece]:
+        pieces: list[Piece] = []
+        try:
+            self._sections.write(fields, pieces)
+        except UNFIT as error:
+            raise ValueError(f"{self._name}: {error}") from error
+        return pieces

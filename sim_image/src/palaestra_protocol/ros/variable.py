@@ -28,6 +28,7 @@ from palaestra_protocol.ros.fixed import (
 from palaestra_protocol.ros.syntax import NUMBERS, Field, Message
 from palaestra_protocol.ros.tcpros import LENGTH
 
+Piece = bytes | memoryview  # of a message that is being written
 _LENGTH_SIZE = LENGTH.size
 _length_at = LENGTH.unpack_from
 
@@ -40,7 +41,7 @@ class _Layout(Protocol):
         """Return the value of an absent field."""
         ...
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         """Append the bytes of a value."""
         ...
 
@@ -66,7 +67,7 @@ class Sections:
         self._sections = tuple(_sections(message, find))
         self._reads = tuple((layout.read, isinstance(layout, _Packed)) for _, layout in self._sections)
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         """Append the bytes of a message, given as a mapping, or as a tuple of all fields in order.
 
         Raises:
@@ -108,7 +109,7 @@ class _Packed:
         self._struct = struct.Struct("<" + record.codes)
         self.unfit = record.unfit
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         pieces.append(self._struct.pack(*self._record.flatten(value)))
 
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
@@ -120,7 +121,7 @@ class _Packed:
 class _Text:
     empty = ""
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         text = value.encode()
         pieces += LENGTH.pack(len(text)), text
 
@@ -133,14 +134,14 @@ class _Text:
 
 
 class _Octets:
-    """A list of `uint8` or `char`, as bytes."""
+    """A list of `uint8` or `char`, as bytes; a picture is not copied before it is sent."""
 
     empty = b""
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         if not isinstance(value, bytes | bytearray | memoryview | list | tuple):
             raise TypeError(f"{type(value).__name__} where bytes are needed")
-        octets = bytes(value)
+        octets = bytes(value) if isinstance(value, list | tuple) else memoryview(value).cast("B")
         pieces += LENGTH.pack(len(octets)), octets
 
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
@@ -157,7 +158,7 @@ class _Numbers:
         self._code = code
         self._size = struct.calcsize("<" + code)
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         pieces.append(struct.pack(f"<I{len(value)}{self._code}", len(value), *value))
 
     def read(self, data: bytes, at: int) -> tuple[Any, int]:
@@ -174,7 +175,7 @@ class _Records:
         self._record = record
         self._struct = struct.Struct("<" + record.codes)
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         pack, flatten = self._struct.pack, self._record.flatten
         pieces.append(LENGTH.pack(len(value)))
         pieces += [pack(*flatten(item)) for item in value]
@@ -195,7 +196,7 @@ class _Elements:
         self._length = length
         self.empty: Sequence[Any] = [element.empty] * (length or 0)
 
-    def write(self, value: Any, pieces: list[bytes]) -> None:
+    def write(self, value: Any, pieces: list[Piece]) -> None:
         if self._length is None:
             pieces.append(LENGTH.pack(len(value)))
         else:

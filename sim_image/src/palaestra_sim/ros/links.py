@@ -69,7 +69,7 @@ class Link:
         self._greet = greet
         self._frames = FrameReader()
         self._endpoint: Endpoint | None = None
-        self._unsent = b""
+        self._unsent: bytes | memoryview = b""
         self._newest: bytes | None = None
         self.closed = False
         loop.watch(connection, self._ready)
@@ -77,7 +77,7 @@ class Link:
     def send(self, data: bytes) -> None:
         """Send all of `data`, now or as soon as the peer reads."""
         if self._unsent:
-            self._unsent += data
+            self._unsent = bytes(self._unsent) + data
         else:
             self._write(data)
 
@@ -98,7 +98,7 @@ class Link:
         if self._endpoint is not None:
             self._endpoint.lost()
 
-    def _write(self, data: bytes) -> None:
+    def _write(self, data: bytes | memoryview) -> None:
         try:
             sent = self._socket.send(data)
         except BlockingIOError:
@@ -107,7 +107,7 @@ class Link:
             self.close()
             return
         if sent < len(data):
-            self._unsent = data[sent:]
+            self._unsent = memoryview(data)[sent:]  # a picture is sent in many parts; none is copied
             self._loop.watch(self._socket, self._ready, writing=True)
         elif self._unsent:
             self._unsent = b""
