@@ -34,7 +34,7 @@ from palaestra_sim.scene.arguments import Arguments
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.stepping import Stepping
-from palaestra_sim.seam import Node, Publisher, Service
+from palaestra_sim.seam import Node, Publisher, Service, UnsimulatedError, topic_name
 
 _MODEL_NAME = "/model_name"
 _CLOCK = "/clock"
@@ -100,8 +100,7 @@ class Controller:
             self._serve(*FieldServices(self._handles).table())
         self._serve_devices()
         if self._arguments.auto_publish:
-            for outlet in self._outlets.values():
-                outlet.enable(self._basic_ms, self._basic_ms)
+            self._enable_all()
         self._serve(services.device_list())
         if self.robot.parts.node.flag("synchronization", True):
             self._stepping.join(self.robot)
@@ -127,6 +126,14 @@ class Controller:
                 feed.publish(elapsed_ms)
         if self._options.lost_wakeup:
             self._published_s = self._host_clock()
+
+    def _enable_all(self) -> None:
+        """Enable every device that can be; log why another one cannot."""
+        for name, outlet in self._outlets.items():
+            try:
+                outlet.enable(self._basic_ms, self._basic_ms)
+            except UnsimulatedError as error:
+                self._log.error(f"{topic_name(name)}/enable: {error}")
 
     def _serve(self, *services: Service) -> None:
         for path, type_name, handler in services:
