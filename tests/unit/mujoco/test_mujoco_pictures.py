@@ -211,6 +211,49 @@ def test_a_spherical_camera_sees_nothing(load):
     assert camera.value == b""
 
 
+RECOGNITION = CAMERA.replace("fieldOfView", "recognition Recognition { segmentation TRUE } fieldOfView")
+OBJECT = BOX.replace("DEF BOX Solid {", 'DEF BOX Solid { recognitionColors [ 0 1 0, 1 0 1 ] model "crate"')
+
+
+def recognized(simulation):
+    """Return the messages of the recognized objects."""
+    return simulation.robots[0].parts.devices.rows["eye"][1].recognition.value
+
+
+def test_a_solid_with_recognition_colors_is_recognized(load):
+    """Where it is, as large as it looks, in its colors."""
+    (found,) = recognized(load(OBJECT, RECOGNITION))
+
+    assert found["position"] == pytest.approx((2.0, 0.0, 0.0))
+    assert found["orientation"] == pytest.approx((0.0, 0.0, 0.0, 1.0))
+    assert found["position_on_image"] == pytest.approx((WIDTH / 2, HEIGHT / 2, 0.0), abs=1)
+    assert found["size_on_image"] == pytest.approx((39.0, 39.0, 0.0), abs=1)
+    assert (found["number_of_colors"], found["colors"]) == (2, [(0.0, 1.0, 0.0), (1.0, 0.0, 1.0)])
+    assert found["model"] == "crate"
+
+
+def test_what_is_behind_a_wall_is_not_recognized(load):
+    """Nor what has no colors, or is out of reach."""
+    wall = WALL.replace("2.05", "1")
+    near = RECOGNITION.replace("segmentation TRUE", "maxRange 1")
+    none = RECOGNITION.replace("segmentation TRUE", "maxObjects 0")
+
+    assert recognized(load(f"{OBJECT} {wall}", RECOGNITION)) == []
+    assert recognized(load(BOX, RECOGNITION)) == []
+    assert recognized(load(OBJECT, near)) == []
+    assert recognized(load(OBJECT, none)) == []
+
+
+def test_the_image_of_segments_has_plain_colors(load):
+    """The first recognition color of each object, and black."""
+    simulation = load(OBJECT, RECOGNITION)
+    recognition = simulation.robots[0].parts.devices.rows["eye"][1].recognition
+    picture = np.frombuffer(recognition.picture, np.uint8).reshape(HEIGHT, WIDTH, 4)
+
+    assert picture[HEIGHT // 2, WIDTH // 2].tolist() == [0, 255, 0, 255]
+    assert picture[0, 0].tolist() == [0, 0, 0, 255]
+
+
 HASH = """import hashlib
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.eyes import Lens

@@ -23,7 +23,7 @@ from palaestra_sim.front.backend import Backend
 from palaestra_sim.front.handles import Handles
 from palaestra_sim.front.host import Host
 from palaestra_sim.front.inputs import inputs
-from palaestra_sim.front.services.devices import Outlet, device_services, services_below
+from palaestra_sim.front.services.devices import Outlet, device_services, services_below, stream_outlet
 from palaestra_sim.front.services.logs import NodeLog
 from palaestra_sim.front.services.robot import RobotServices
 from palaestra_sim.front.services.scene_fields import FieldServices
@@ -59,12 +59,24 @@ class Controller:
         self._host_clock = host.clock
         self._stepping = stepping
         self._outlets = {
-            name: Outlet(node, name, topics, kind.accepts(device), partial(kind.enabled, device), kind.sensor)
+            name: Outlet(
+                node,
+                name,
+                topics,
+                kind.accepts(device),
+                partial(kind.enabled, device),
+                kind.sensor and f"{kind.sensor}/",
+            )
             for name, (kind, device) in robot.parts.devices.rows.items()
             if (topics := kind.topics(device))
         }
+        self._streams = tuple(
+            stream_outlet(node, name, stream)
+            for name, (kind, device) in robot.parts.devices.rows.items()
+            for stream in kind.streams(device)
+        )
         self._inputs = {it: Outlet(node, it.name, it.topics, it.enable) for it in inputs(robot)}
-        outlets = (*self._outlets.values(), *self._inputs.values())
+        outlets = (*self._outlets.values(), *self._streams, *self._inputs.values())
         self._feeds = tuple(feed for outlet in outlets for feed in outlet.feeds)
         self._log = NodeLog(node)
         self._clock: Publisher | None = None
@@ -144,6 +156,8 @@ class Controller:
             self._serve(*device_services(kind, device, self.robot.parts.devices.shafts.get(name)))
             if name in self._outlets:
                 self._serve_outlet(self._outlets[name])
+        for outlet in self._streams:
+            self._serve_outlet(outlet)
         for it, outlet in self._inputs.items():
             self._serve_outlet(outlet)
             self._serve(*services_below(it.name, it.rows))

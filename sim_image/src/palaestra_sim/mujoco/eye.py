@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
+from typing import Any, Final
 
 import numpy as np
 
 from palaestra_sim.mujoco.pictures import Pictures
-from palaestra_sim.scene.eyes import Lens, Patch
+from palaestra_sim.scene.eyes import Corners, Lens
+from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
+
+_BLACK: Final = bytes((0, 0, 0, 255))
 
 
 class MujocoEye:
@@ -36,16 +40,25 @@ class MujocoEye:
             depths = np.round(depths / np.float32(resolution_m)) * np.float32(resolution_m)
         return memoryview(depths).cast("B")
 
-    def patches(self) -> list[Patch]:
-        """Return what is visible, and where in the picture."""
-        return list(self._patches())
-
-    def _patches(self) -> Iterator[Patch]:
+    def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> dict[SceneNode, Corners]:
+        """Return where each owner is visible."""
         numbers = self._pictures.segments(self._place, self._lens)
-        things = self._pictures.things
-        for number in np.unique(numbers).tolist():
-            if number >= 0:
-                rows, columns = np.nonzero(numbers == number)
-                left, top = int(columns.min()), int(rows.min())
-                right, bottom = int(columns.max()) + 1, int(rows.max()) + 1
-                yield Patch(things[number].node, (left, top, right, bottom))
+        owners = [owner(thing.node) for thing in self._pictures.things]
+        known = list(dict.fromkeys(it for it in owners if it is not None))
+        # By the number of a thing, the number of its owner; the last one is for pixels without a thing.
+        table = np.array([*(-1 if it is None else known.index(it) for it in owners), -1])
+        of_owner = table[numbers]
+        return {known[at]: _corners(of_owner == at) for at in np.unique(of_owner).tolist() if at >= 0}
+
+    def painted(self, color: Callable[[SceneNode], bytes | None]) -> memoryview:
+        """Return a picture in which each shape has one color."""
+        numbers = self._pictures.segments(self._place, self._lens)
+        colors = [color(thing.node) or _BLACK for thing in self._pictures.things]
+        table = np.frombuffer(b"".join((*colors, _BLACK)), np.uint8).reshape(-1, len(_BLACK))
+        return memoryview(table[numbers]).cast("B")
+
+
+def _corners(mask: Any) -> Corners:
+    """Return the rectangle around the pixels of a mask."""
+    rows, columns = np.nonzero(mask)
+    return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1

@@ -18,7 +18,7 @@ from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.visible import SKY, Visible, build, glow
 from palaestra_sim.scene.drawn import Drawn, View
 from palaestra_sim.scene.eyes import Lens
-from palaestra_sim.scene.geometry import Pose, transposed, turn
+from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.places import Place
 
 _OPAQUE: Final = 255
@@ -158,7 +158,7 @@ class Pictures:
             carrier = next((it for it in place.chain() if it.moves), None) if place is not None else None
             frame = Pose() if place is None else place.world_pose
             if carrier is not None:
-                frame = _inverse(carrier.world_pose).after(frame)
+                frame = carrier.world_pose.inverse.after(frame)
             turned = np.reshape(frame.rotation, (3, 3))
             offsets = visible.positions[part] @ turned.T + frame.position
             turns = turned @ visible.rotations[part]
@@ -172,9 +172,3 @@ class Pictures:
 def _far(lens: Lens) -> float:
     """Return how far a lens sees, in meters."""
     return lens.far_m or _HORIZON_M
-
-
-def _inverse(pose: Pose) -> Pose:
-    back = transposed(pose.rotation)
-    x, y, z = turn(back, pose.position)
-    return Pose((-x, -y, -z), back)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+
+# Left, top, right and bottom in pixels from the top left; the last two are outside.
+Corners = tuple[int, int, int, int]
 
 MOST_PIXELS: Final = 4096  # in a row or column
 _WIDEST_RAD: Final = 3.1  # of a picture that is flat
@@ -34,18 +37,6 @@ class Lens:
         return 0.0 < self.field_of_view_rad <= _WIDEST_RAD
 
 
-class Patch(NamedTuple):
-    """A thing in a picture, in pixels from the top left.
-
-    Attributes:
-        node: the Shape, or the stand-in.
-        corners: left, top, right and bottom of what is visible of it; the last two are outside.
-    """
-
-    node: SceneNode
-    corners: tuple[int, int, int, int]
-
-
 class Eye(Protocol):
     """A camera of a physics that draws. Every picture shows the world as it is at the call."""
 
@@ -69,6 +60,16 @@ class Eye(Protocol):
         """
         ...
 
-    def patches(self) -> Sequence[Patch]:
-        """Return what is visible, and where in the picture."""
+    def patches(self, owner: Callable[[SceneNode], SceneNode | None]) -> Mapping[SceneNode, Corners]:
+        """Return where each owner is visible: the rectangle around all its shapes.
+
+        `owner` returns what a shape is part of, None if it is of no interest.
+        """
+        ...
+
+    def painted(self, color: Callable[[SceneNode], bytes | None]) -> bytes | memoryview:
+        """Return a picture in which each shape has one color, without light, and the rest is black.
+
+        `color` returns the blue, green, red and alpha of a shape, a byte each, None for black.
+        """
         ...

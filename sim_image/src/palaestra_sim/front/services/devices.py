@@ -6,7 +6,18 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from palaestra_sim.scene.devices.kind import ROLES, Device, Enable, Kind, Shaft, Source, Topic
+from palaestra_sim.scene.devices.kind import (
+    ROLES,
+    Device,
+    Enable,
+    Kind,
+    Shaft,
+    Source,
+    Stream,
+    Topic,
+    never,
+    whole_steps,
+)
 from palaestra_sim.scene.nodes.types import type_number
 from palaestra_sim.seam import Fields, Node, Publisher, Row, Service, topic_name
 
@@ -74,7 +85,7 @@ class Outlet:
         topics: of the device.
         accepts: whether it accepts a period.
         enabled: called with the sampling period in ms, 0 for none, after that has changed.
-        sensor: the path of `enable` below the device; "" for the device itself.
+        prefix: of `enable` and `get_sampling_period`, below the device.
 
     Attributes:
         feeds: one for each topic.
@@ -87,7 +98,7 @@ class Outlet:
         topics: Iterable[Topic],
         accepts: Enable,
         enabled: Callable[[int], None] = lambda _period_ms: None,
-        sensor: str = "",
+        prefix: str = "",
     ) -> None:
         path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
@@ -96,7 +107,7 @@ class Outlet:
             for it in topics
         )
         self._node = node
-        self._path = f"{path}/{sensor}" if sensor else path
+        self._path = f"{path}/{prefix}"
         self._enabled = enabled
         self._accepts = accepts
         self._periods_ms: set[int] = set()
@@ -131,9 +142,15 @@ class Outlet:
             return {"value": min(self._periods_ms, default=0)}
 
         return (
-            Service(f"{self._path}/enable", "webots_ros/set_int", enable),
-            Service(f"{self._path}/get_sampling_period", "webots_ros/get_int", get_sampling_period),
+            Service(f"{self._path}enable", "webots_ros/set_int", enable),
+            Service(f"{self._path}get_sampling_period", "webots_ros/get_int", get_sampling_period),
         )
+
+
+def stream_outlet(node: Node, device_name: str, stream: Stream) -> Outlet:
+    """Return the outlet of topics that have an `enable` of their own."""
+    accepts = never if stream.silent else whole_steps
+    return Outlet(node, device_name, stream.topics, accepts, stream.enabled, stream.prefix)
 
 
 def device_services(kind: Kind[Any], device: Device, shaft: Shaft | None = None) -> tuple[Service, ...]:

@@ -9,8 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Topic
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Stream, Topic
 from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
+from palaestra_sim.scene.devices.recognition import (
+    Recognition,
+    read_recognition,
+    recognition_services,
+    recognition_stream,
+)
 from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.places import Place
 from palaestra_sim.seam import Fields, Handler, Row
@@ -27,8 +33,8 @@ class Camera:
         exposure: as the world or a client set it.
         focus: focal length, distance, and its highest and lowest value, in meters; None without a Focus node.
         zoom: least and greatest field of view in rad; None without a Zoom node.
-        recognizes: whether it has a Recognition node.
-        segments: whether the Recognition node has `segmentation`.
+        recognition: None without a Recognition node.
+        eye: None if it sees nothing.
     """
 
     name: str
@@ -39,8 +45,7 @@ class Camera:
     exposure: float
     focus: tuple[float, float, float, float] | None = None
     zoom: tuple[float, float] | None = None
-    recognizes: bool = False
-    segments: bool = False
+    recognition: Recognition | None = None
     eye: Eye | None = None
 
     @property
@@ -51,6 +56,8 @@ class Camera:
     def attach(self, robot: Carrier) -> None:
         """Look from a robot."""
         self.eye = None if self.spherical else robot.eye(self.place, self.lens)
+        if self.recognition is not None:
+            self.recognition.eye = self.eye
 
     def enabled(self, period_ms: int) -> None:
         """Get ready to draw.
@@ -63,18 +70,17 @@ class Camera:
 
 
 def _read(part: Part) -> Camera:
-    recognition = part.inner("recognition")
+    lens = read_lens(part, part.number("near", 0.01), part.number("far", 0.0))
     return Camera(
         name=part.name,
         model=part.text("model"),
         place=part.place,
-        lens=read_lens(part, part.number("near", 0.01), part.number("far", 0.0)),
+        lens=lens,
         spherical=part.node.flag("spherical", False),
         exposure=part.number("exposure", 1.0),
         focus=_focus(part),
         zoom=_zoom(part),
-        recognizes=recognition is not None,
-        segments=recognition is not None and recognition.flag("segmentation", False),
+        recognition=read_recognition(part, lens),
     )
 
 
@@ -98,6 +104,8 @@ def _zoom(part: Part) -> tuple[float, float] | None:
 
 
 def _services(camera: Camera) -> tuple[Row, ...]:
+    recognition = camera.recognition
+    segments = recognition is not None and recognition.segments
     return (
         ("get_info", "camera_get_info", lambda _: _info(camera)),
         ("get_focus_info", "camera_get_focus_info", lambda _: _focus_info(camera)),
@@ -107,22 +115,14 @@ def _services(camera: Camera) -> tuple[Row, ...]:
         ("set_focal_distance", "set_float", _focus_setter(camera)),
         ("set_exposure", "set_float", _exposure_setter(camera)),
         ("get_exposure", "get_float", lambda _: {"value": camera.exposure}),
-        ("has_recognition", "get_bool", lambda _: {"value": camera.recognizes}),
-        ("recognition_has_segmentation", "get_bool", lambda _: {"value": camera.segments}),
-        *(_recognition() if camera.recognizes else ()),
+        ("has_recognition", "get_bool", lambda _: {"value": recognition is not None}),
+        ("recognition_has_segmentation", "get_bool", lambda _: {"value": segments}),
+        *(() if recognition is None else recognition_services(recognition)),
     )
 
 
-def _recognition() -> tuple[Row, ...]:
-    """Return the services of a camera that recognizes objects; all of them answer failure."""
-    return (
-        ("recognition_enable", "set_int", lambda request: {"success": request.value == 0}),
-        ("recognition_get_sampling_period", "get_int", lambda _: {"value": 0}),
-        ("recognition_enable_segmentation", "get_bool", lambda _: {"value": False}),
-        ("recognition_disable_segmentation", "get_bool", lambda _: {"value": True}),
-        ("recognition_is_segmentation_enabled", "get_bool", lambda _: {"value": False}),
-        ("recognition_save_segmentation_image", "save_image", _no_picture),
-    )
+def _streams(camera: Camera) -> tuple[Stream, ...]:
+    return () if camera.recognition is None else (recognition_stream(camera.recognition),)
 
 
 def _info(camera: Camera) -> Fields:
@@ -176,10 +176,6 @@ def _exposure_setter(camera: Camera) -> Handler:
     return set_exposure
 
 
-def _no_picture(_request: Any) -> Fields:
-    return {"success": 0}
-
-
 def _topics(camera: Camera) -> tuple[Topic, ...]:
     return (picture_topic("image", camera, camera.lens, "bgra8"),)
 
@@ -195,6 +191,7 @@ CAMERA: Final = Kind(
     read=_read,
     services=_services,
     topics=_topics,
+    streams=_streams,
     attach=Camera.attach,
     enabled=Camera.enabled,
     silent=lambda camera: camera.eye is None,

@@ -195,6 +195,23 @@ class Topic:
     many: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stream:
+    """Topics of a device that have an `enable` of their own, beside the device's.
+
+    Attributes:
+        prefix: of `enable` and `get_sampling_period`, below the name of the device.
+        topics: that it begins.
+        silent: whether no period is accepted.
+        enabled: called with the sampling period in ms, 0 for none, after that has changed.
+    """
+
+    prefix: str
+    topics: tuple[Topic, ...]
+    silent: bool
+    enabled: Callable[[int], None]
+
+
 Sample = Callable[[], None]
 Enable = Callable[[int, int], bool]  # period and step in ms; returns whether the period is accepted
 
@@ -229,6 +246,7 @@ class Kind(Generic[DeviceT]):
         services: returns those beside `get_model`, `get_name`, `get_node_type`; on joints, the names of the
             others of the joint; and, with topics, `enable` and `get_sampling_period`.
         topics: returns those that `enable` begins to publish.
+        streams: returns the other topics, each with an `enable` of its own.
         attach: connects a device with the robot that carries it.
         enable: whether a period is accepted; 0, which ends publishing, always is.
         silent: whether a device that is attached has no readings, so that no period is accepted.
@@ -245,6 +263,7 @@ class Kind(Generic[DeviceT]):
     sampler: Callable[[Sequence[DeviceT], Carrier], Sample] | None = None
     services: Callable[[DeviceT], Iterable[Row]] = lambda _: ()
     topics: Callable[[DeviceT], tuple[Topic, ...]] = lambda _: ()
+    streams: Callable[[DeviceT], tuple[Stream, ...]] = lambda _: ()
     attach: Callable[[DeviceT, Carrier], None] = lambda _device, _robot: None
     enable: Enable = whole_steps
     silent: Callable[[DeviceT], bool] = lambda _: False

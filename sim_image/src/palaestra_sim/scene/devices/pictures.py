@@ -27,11 +27,18 @@ def read_lens(part: Part, near_m: float, far_m: float) -> Lens:
     )
 
 
-def picture_topic(name: str, source: Source, lens: Lens, encoding: str) -> Topic:
+def picture_topic(name: str, source: Source, lens: Lens, encoding: str, *, many: bool = False) -> Topic:
     """Return the topic of pictures of four bytes a pixel."""
     width, height = lens.size
     constants = {"height": height, "width": width, "encoding": encoding, "step": PIXEL_BYTES * width}
-    return Topic(name=name, type_name="sensor_msgs/Image", source=source, constants=constants, reading="data")
+    return Topic(
+        name=name,
+        type_name="sensor_msgs/Image",
+        source=source,
+        constants=constants,
+        reading="data",
+        many=many,
+    )
 
 
 def saver(lens: Lens, silent: Callable[[], bool], pixels: Callable[[], bytes | memoryview]) -> Handler:

@@ -1,0 +1,171 @@
+"""What a camera recognizes: solids with `recognitionColors` that are at least partly visible.
+
+An object is where its solid is, in the frame of the camera. Its place in the picture is the middle of the
+rectangle around what is visible of it. The image of segments has each object in its first
+color, before black.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from palaestra_sim.scene.devices.kind import Part, Stream, Topic
+from palaestra_sim.scene.devices.pictures import picture_topic, saver
+from palaestra_sim.scene.eyes import Corners, Eye, Lens
+from palaestra_sim.scene.geometry import Pose, to_quaternion
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Fields, Row
+
+_BYTE = 255
+_CHANNELS = 3
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Recognition:
+    """The Recognition node of a camera.
+
+    Attributes:
+        place, lens: of the camera.
+        reach_m: objects are recognized within this distance.
+        most: how many at most, the nearest first; -1: all.
+        segments: whether it has `segmentation`.
+        segmenting: whether the image of segments is published.
+        eye: None if the camera sees nothing.
+    """
+
+    place: Place
+    lens: Lens
+    reach_m: float
+    most: int
+    segments: bool
+    segmenting: bool = False
+    eye: Eye | None = None
+
+    @property
+    def value(self) -> list[Fields]:
+        """The objects of this moment, as messages."""
+        if self.eye is None:
+            return []
+        camera = self.place.world_pose.inverse
+        found = [
+            (camera.after(_pose(node)), node, corners) for node, corners in self.eye.patches(_owner).items()
+        ]
+        found = [item for item in found if math.hypot(*item[0].position) <= self.reach_m]
+        found.sort(key=lambda item: math.hypot(*item[0].position))
+        return [_object(*item) for item in found[: self.most if self.most >= 0 else None]]
+
+    @property
+    def picture(self) -> bytes | memoryview:
+        """The image of segments of this moment: blue, green, red and alpha of each pixel."""
+        return b"" if self.eye is None else self.eye.painted(_paint)
+
+    def silent(self) -> bool:
+        """Return whether there is no image of segments."""
+        return self.eye is None or not self.segments
+
+    def segment(self, *, on: bool) -> bool:
+        """Publish the image of segments or not; return whether that is so now."""
+        self.segmenting = on and not self.silent()
+        return self.segmenting is on
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Segments:
+    """The image of segments, as a list of one; empty while it is not enabled."""
+
+    recognition: Recognition
+
+    @property
+    def value(self) -> list[bytes | memoryview]:
+        return [self.recognition.picture] if self.recognition.segmenting else []
+
+
+def read_recognition(part: Part, lens: Lens) -> Recognition | None:
+    """Return the Recognition node of a camera; None if it has none."""
+    node = part.inner("recognition")
+    if node is None:
+        return None
+    return Recognition(
+        place=part.place,
+        lens=lens,
+        reach_m=part.reading.number(node, "maxRange", 100.0),
+        most=int(part.reading.number(node, "maxObjects", -1.0)),
+        segments=node.flag("segmentation", False),
+    )
+
+
+def recognition_services(recognition: Recognition) -> tuple[Row, ...]:
+    """Return the services of a camera that recognizes objects, beside those of its stream."""
+    save = saver(recognition.lens, recognition.silent, lambda: recognition.picture)
+    return (
+        ("recognition_enable_segmentation", "get_bool", lambda _: {"value": recognition.segment(on=True)}),
+        ("recognition_disable_segmentation", "get_bool", lambda _: {"value": recognition.segment(on=False)}),
+        ("recognition_is_segmentation_enabled", "get_bool", lambda _: {"value": recognition.segmenting}),
+        ("recognition_save_segmentation_image", "save_image", save),
+    )
+
+
+def recognition_stream(recognition: Recognition) -> Stream:
+    """Return the topics that `recognition_enable` begins."""
+    objects = Topic(
+        name="recognition_objects",
+        type_name="webots_ros/RecognitionObjects",
+        source=recognition,
+        reading="objects",
+    )
+    image = picture_topic(
+        "recognition_segmentation_image", _Segments(recognition), recognition.lens, "bgra8", many=True
+    )
+    return Stream(
+        prefix="recognition_",
+        topics=(objects, image) if recognition.segments else (objects,),
+        silent=recognition.eye is None,
+        enabled=lambda period_ms: _begin(recognition, period_ms),
+    )
+
+
+def _begin(recognition: Recognition, period_ms: int) -> None:
+    if period_ms and recognition.eye is not None:
+        recognition.eye.open()
+
+
+def _owner(shape: SceneNode) -> SceneNode | None:
+    """Return the solid with colors that a shape is part of; None if there is none."""
+    return next((it for it in (shape, *shape.ancestors()) if _colors(it)), None)
+
+
+def _paint(shape: SceneNode) -> bytes | None:
+    """Return blue, green, red and alpha of the object that a shape is part of; None if it is of none."""
+    owner = _owner(shape)
+    if owner is None:
+        return None
+    red, green, blue = (round(_BYTE * min(1.0, max(0.0, share))) for share in _colors(owner)[0])
+    return bytes((blue, green, red, _BYTE))
+
+
+def _colors(node: SceneNode) -> list[tuple[float, ...]]:
+    numbers = node.numbers("recognitionColors") or ()
+    return [numbers[at : at + _CHANNELS] for at in range(0, len(numbers) - _CHANNELS + 1, _CHANNELS)]
+
+
+def _pose(node: SceneNode) -> Pose:
+    place = next((it.place for it in (node, *node.ancestors()) if it.place is not None), None)
+    return Pose() if place is None else place.world_pose
+
+
+def _object(pose: Pose, node: SceneNode, corners: Corners) -> dict[str, Any]:
+    """Return the message of an object; `pose` is in the frame of the camera."""
+    left, top, right, bottom = corners
+    colors = _colors(node)
+    return {
+        "position": pose.position,
+        "orientation": to_quaternion(pose.rotation),
+        "position_on_image": (float((left + right) // 2), float((top + bottom) // 2), 0.0),
+        "size_on_image": (float(right - left), float(bottom - top), 0.0),
+        "number_of_colors": len(colors),
+        "colors": colors,
+        "model": node.text("model") or "",
+    }
