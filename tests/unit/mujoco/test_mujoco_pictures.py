@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -24,6 +25,13 @@ WHEEL = """HingeJoint { jointParameters HingeJointParameters { axis 0 1 0 anchor
   device RotationalMotor { name "%s" maxVelocity 50 }
   endPoint Solid { translation 0 %s 0.05 rotation 1 0 0 1.5707963
     boundingObject Cylinder { radius 0.05 height 0.01 } } }"""
+
+
+class Request(NamedTuple):
+    """A request of `save_image`."""
+
+    filename: str
+    quality: int = 90
 
 
 @pytest.fixture
@@ -252,6 +260,27 @@ def test_the_image_of_segments_has_plain_colors(load):
 
     assert picture[HEIGHT // 2, WIDTH // 2].tolist() == [0, 255, 0, 255]
     assert picture[0, 0].tolist() == [0, 0, 0, 255]
+
+
+def test_the_view_of_the_world_is_saved_as_a_file(load, tmp_path):
+    """From its Viewpoint, wherever the robots look."""
+    simulation = load(f"Viewpoint {{ position 0 0 0.5 }} {BOX}")
+
+    assert simulation.export_image(str(tmp_path / "world.png"))
+    assert (tmp_path / "world.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_camera_and_a_range_finder_save_what_they_see(load, tmp_path):
+    """A range finder saves shades of gray."""
+    simulation = load(WALL, CAMERA + FINDER)
+
+    for name in ("eye", "depth"):
+        kind, device = simulation.robots[0].parts.devices.rows[name]
+        services = {path: handler for path, _, handler in kind.services(device)}
+        answer = services["save_image"](Request(filename=str(tmp_path / f"{name}.png")))
+
+        assert answer == {"success": 1}
+        assert (tmp_path / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
 
 
 HASH = """import hashlib

@@ -119,6 +119,10 @@ class Backend(Protocol):
         """Remove a node and all inside it."""
         ...
 
+    def export_image(self, path: str) -> bool:
+        """Save what the Viewpoint shows to a file; return whether that was possible."""
+        ...
+
     def contact_points(self, node: SceneNode, *, descendants: bool) -> Sequence[tuple[Vector, int]]:
         """Return where a node touches others: points in meters, each with the number of a node."""
         ...

@@ -35,6 +35,7 @@ from palaestra_sim.scene.states import States, require_joint
 from palaestra_sim.scene.tree.effects import require_removable, require_room
 from palaestra_sim.scene.tree.fields import Field
 from palaestra_sim.scene.tree.scene_tree import SceneTree
+from palaestra_sim.scene.viewpoint import save_view
 from palaestra_sim.world import World, parse
 
 
@@ -237,6 +238,14 @@ class Simulation:
         self.robots = tuple(robot for robot in self.robots if robot.parts.node not in gone)
         self._assemble()
         self._arrange()
+
+    def export_image(self, path: str) -> bool:
+        """Save what the Viewpoint shows as a PNG file; return whether that was possible.
+
+        Raises:
+            UnsimulatedError: the file would be none, or this machine cannot draw.
+        """
+        return save_view(self.tree.root, self.scene.physics, path)
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
         """Return where a node touches others: points in meters, each with the number of the touching node."""

@@ -1,7 +1,6 @@
 """Services under `supervisor/`: the simulation as a whole, and the first handle of everything.
 
-There is no rendering here, so pictures, movies and animations fail, as in Webots with
-`--no-rendering`.
+Movies and animations fail, as in Webots with `--no-rendering`. A picture is saved if the simulator draws.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ class SupervisorServices:
                 ("world_load", "set_string", self._load),
                 ("world_save", "set_string", _refuse),
                 ("world_reload", "get_bool", self._reload),
-                ("export_image", "save_image", _refuse),
+                ("export_image", "save_image", self._export),
                 ("animation_start_recording", "set_string", _refuse),
                 ("animation_stop_recording", "get_bool", _refuse_get),
                 ("movie_start_recording", "supervisor_movie_start_recording", self._start_movie),
@@ -92,6 +91,9 @@ class SupervisorServices:
         if known:
             self._host.set_mode(Mode(request.value))
         return {"success": known}
+
+    def _export(self, request: Any) -> Fields:
+        return {"success": int(self._simulation.export_image(request.filename))}
 
     def _start_movie(self, _request: Any) -> Fields:
         self._movie_asked = True

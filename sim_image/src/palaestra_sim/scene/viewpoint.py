@@ -1,0 +1,31 @@
+"""The picture of a whole world, as its Viewpoint shows it to people."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from palaestra_sim.scene import png
+from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reading import Reading
+
+SIZE: Final = (800, 600)  # Webots has that of its window
+
+
+def save_view(root: SceneNode, physics: Physics, path: str) -> bool:
+    """Save the view of a world as a PNG file; return whether that was possible.
+
+    Raises:
+        UnsimulatedError: the file would be none, or this machine cannot draw.
+    """
+    reading = Reading()
+    viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
+    fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # of the longer side, as in Webots
+    near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)
+    x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
+    ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))
+    lens = Lens(size=SIZE, field_of_view_rad=fov_rad, near_m=near_m, far_m=far_m)
+    eye = physics.eye(Place(None, (x, y, z), (ax, ay, az, angle_rad)), lens)
+    return eye is not None and png.save(path, SIZE, eye.colors())
