@@ -1,17 +1,20 @@
-"""A world whose supervisor has every device of the stub, and the services and topics that it offers there."""
+"""A world whose supervisor has every device, and the services and topics that each simulator offers there."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from palaestra_sim.faults.survey import Survey, survey
+from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.kind import Kind
 from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.physics import Physics
 from palaestra_sim.stub.physics import StubPhysics
 
 ROBOT = "everything"
@@ -20,22 +23,31 @@ _SETTINGS = {
     "Lidar": "numberOfLayers 2",
 }
 
-# What the stub cannot do fails, so that no client trains with a success that did nothing.
-FAILING = frozenset(
+PHYSICS: Mapping[str, Callable[[], Physics]] = {"stub": StubPhysics, "mujoco": MujocoPhysics}
+# What a simulator cannot do fails, so that no client trains with a success that did nothing.
+_STUB = frozenset(  # pictures and forces
     (
         "camera/enable",
         "camera/recognition_enable",
         "camera/recognition_enable_segmentation",
         "camera/recognition_save_segmentation_image",
         "camera/save_image",
+        "range_finder/enable",
+        "range_finder/save_image",
+        "supervisor/export_image",
+        "supervisor/node/add_force",
+        "supervisor/node/add_force_with_offset",
+        "supervisor/node/add_torque",
+    )
+)
+_EVERYWHERE = frozenset(
+    (
         "display/attach_camera",
         "display/image_load",
         "display/image_save",
         "linear_motor/set_force",
         "linear_motor/force_feedback_sensor/enable",
         "radar/enable",
-        "range_finder/enable",
-        "range_finder/save_image",
         "robot/get_urdf",
         "rotational_motor/set_torque",
         "rotational_motor/torque_feedback_sensor/enable",
@@ -47,17 +59,14 @@ FAILING = frozenset(
         "speaker/set_engine",
         "speaker/set_language",
         "supervisor/animation_start_recording",
-        "supervisor/export_image",
         "supervisor/movie_start_recording",
-        "supervisor/node/add_force",
-        "supervisor/node/add_force_with_offset",
-        "supervisor/node/add_torque",
         "supervisor/virtual_reality_headset_get_orientation",
         "supervisor/virtual_reality_headset_get_position",
         "supervisor/world_save",
         "vacuum_gripper/presence_sensor/enable",
     )
 )
+FAILING: Mapping[str, frozenset[str]] = {"stub": _EVERYWHERE | _STUB, "mujoco": _EVERYWHERE}
 
 
 def device_name(type_name: str) -> str:
@@ -81,12 +90,13 @@ DEF ROBOT Robot {{
 """
 
 
-def offered() -> Survey:
-    """Return the services and topics of the stub in that world."""
+@cache
+def offered(simulator: str) -> Survey:
+    """Return the services and topics of a simulator in that world."""
     with TemporaryDirectory() as folder:
         path = Path(folder, "everything.wbt")
         path.write_text(world())
-        return survey(Loader(physics=StubPhysics), path)
+        return survey(Loader(physics=PHYSICS[simulator]), path)
 
 
 def groups(paths: Mapping[str, str]) -> dict[str, dict[str, str]]:

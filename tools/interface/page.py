@@ -39,8 +39,9 @@ def page(text: str) -> str:
 
 def tables() -> str:
     """Return a table for the robot, the supervisor, each type of device, and the services of ours."""
-    found = offered()
-    services, topics = groups(found.services), groups(found.topics)
+    surveys = [offered(simulator) for simulator in FAILING]
+    services = groups({path: it for survey in surveys for path, it in survey.services.items()})
+    topics = groups({path: it for survey in surveys for path, it in survey.topics.items()})
     sections = (
         _section(group, services.get(group, {}), topics.get(group, {}))
         for group in [*services, *(topics.keys() - services.keys())]
@@ -56,6 +57,14 @@ def _section(group: str, services: Mapping[str, str], topics: Mapping[str, str])
 
 def _row(group: str, path: str, type_name: str, md5: str) -> str:
     shown = path.replace(device_name(group), "<name>", 1) if group in DEVICES else path
-    stub = "fails" if path in FAILING else "yes"
+    states = " | ".join(_state(simulator, path) for simulator in FAILING)
     webots = "no" if group in _OURS else "yes"
-    return f"| `{shown}` | {type_name} | `{md5}` | {stub} | no | {webots} | {_TEST} |"
+    return f"| `{shown}` | {type_name} | `{md5}` | {states} | {webots} | {_TEST} |"
+
+
+def _state(simulator: str, path: str) -> str:
+    """Return what becomes of a path in a simulator of ours."""
+    survey = offered(simulator)
+    if path not in survey.services and path not in survey.topics:
+        return "no"
+    return "fails" if path in FAILING[simulator] else "yes"

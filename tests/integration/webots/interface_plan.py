@@ -1,4 +1,4 @@
-"""What the clients with rospy and roscpp ask of a stub, and the answers that they expect.
+"""What the clients with rospy and roscpp ask of a simulator, and the answers that they expect.
 
 A service that is not here is called with an empty request, and has to succeed. `REQUESTS` has the requests of
 the others, by the end of their paths, `ANSWERS` what some of them answer: a value that is set is read back.
@@ -140,12 +140,14 @@ ANSWERS = {
 }
 
 
+LATE = ("camera/recognition_enable_segmentation",)  # after what ends it: its topic is listened to
+
 HANDLES = ("BOX", "LINEARMOTOR_JOINT", "SHADED", "PAINT", "ROUND", "FLAT")
 
 
-def plan(world_path):
+def plan(world_path, simulator):
     """Return the plan for the client; the name of a call is its path, but for those that get handles."""
-    survey = offered()
+    survey = offered(simulator)
     typed = {**survey.services}
     calls = [_call(typed, name, path, request) for name, path, request in _opening()]
     last = []
@@ -154,6 +156,7 @@ def plan(world_path):
             last.append(_call(typed, path, path, _request(path, world_path)))
         elif path != "robot/time_step" and path not in {name for name, *_ in calls}:
             calls.append(_call(typed, path, path, _request(path, world_path)))
+    calls.sort(key=lambda call: call[0] in LATE)
     last.sort(key=lambda call: [call[0].endswith(end) for end in ENDING], reverse=True)
     topics = {absolute(path): type_name for path, type_name in survey.topics.items()}
     return {"calls": calls, "topics": topics, "rounds": [STEP, REFUSED], "last": last}
@@ -197,6 +200,8 @@ def _opening():
 def _request(path, world_path):
     if path == "supervisor/world_load":
         return {"value": str(world_path)}
+    if path.endswith(("/save_image", "/export_image", "_save_segmentation_image")):
+        return {"filename": str(world_path.with_name("picture.png"))}
     request = next((it for end, it in REQUESTS.items() if path.endswith(end)), {})
     if path.startswith("supervisor/node/") and "node" not in request:
         return {"node": "@BOX", **request}

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,15 @@ from tools.interface.everything import FAILING, offered, world
 
 DEADLINE_S = 120.0  # of what takes seconds, on a busy machine
 ROOT = Path(__file__).parents[3]
-STUB = Path(sys.executable).with_name("palaestra-stub")
+RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
 PAGE = (ROOT / "docs/ros-interface.md").read_text()
-SURVEY = offered()
+SURVEY = offered("mujoco")  # its types include the stub's
+STEPPED = {"robot/time_step"}
+
+
+def cases(paths):
+    """Return each path that `paths(simulator)` has, of each simulator."""
+    return [(simulator, path) for simulator in FAILING for path in sorted(paths(simulator))]
 
 
 def of_rospy(plan_, environment, _folder):
@@ -39,25 +46,42 @@ def of_rospy(plan_, environment, _folder):
 
 def of_roscpp(plan_, environment, folder):
     """Return what the client with roscpp gets, and the `digests` of its types."""
-    program = build(folder, set(SURVEY.services.values()), set(SURVEY.topics.values()))
-    with RoscppClient(program, environment) as client:
+    with RoscppClient(program(folder.parent / "roscpp"), environment) as client:
         return {**play(plan_, client), "digests": client.digests}
 
 
+@cache
+def program(folder):
+    """Return the client with roscpp, built once for all simulators."""
+    folder.mkdir()
+    return build(folder, set(SURVEY.services.values()), set(SURVEY.topics.values()))
+
+
 @pytest.fixture(scope="module", params=[of_rospy, of_roscpp], ids=["rospy", "roscpp"])
-def outcome(request, master, tmp_path_factory):
-    """Return the answers by the names of calls, the messages by topic, and the stub's exit status."""
-    folder = tmp_path_factory.mktemp("interface")
+def outcomes(request, master, tmp_path_factory):
+    """`outcomes(simulator)`: answers by the names of calls, messages by topic, and its exit status."""
+
+    @cache
+    def outcomes(simulator):
+        folder = tmp_path_factory.mktemp(simulator)
+        environment = {**os.environ, "ROS_MASTER_URI": master, "ROS_HOME": str(folder)}
+        return observed(simulator, request.param, environment, folder)
+
+    return outcomes
+
+
+def observed(simulator, client, environment, folder):
+    """Run a simulator and a client, and return what the client observed."""
     path = folder / "everything.wbt"
     path.write_text(world())
-    environment = {**os.environ, "ROS_MASTER_URI": master, "ROS_HOME": str(folder)}
-    with subprocess.Popen([STUB, path], env=environment, stderr=subprocess.DEVNULL) as stub:
+    command = [sys.executable, "-c", RUN.format(simulator), path]
+    with subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as running:
         try:
-            found = request.param(plan(path), environment, folder)
-            stub.wait(timeout=DEADLINE_S)
+            found = client(plan(path, simulator), environment, folder)
+            running.wait(timeout=DEADLINE_S)
         finally:
-            stub.kill()
-    return {**found, "status": stub.returncode}
+            running.kill()
+    return {**found, "status": running.returncode}
 
 
 def near(value):
@@ -69,18 +93,20 @@ def near(value):
     return pytest.approx(value)
 
 
-@pytest.mark.parametrize("outcome", [of_roscpp], ids=["roscpp"], indirect=True)
-def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcome):
+@pytest.mark.parametrize("outcomes", [of_roscpp], ids=["roscpp"], indirect=True)
+def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
     """A client refuses a service or topic with another md5; gencpp computes it from the definition."""
     rows = dict(re.findall(r"^\| `[^`]+` \| (\S+) \| `(\w{32})` ", PAGE, re.MULTILINE))
 
-    assert outcome["digests"] == rows
+    assert outcomes("stub")["digests"] == rows
 
 
-@pytest.mark.parametrize("path", sorted(SURVEY.services.keys() - {"robot/time_step"} - FAILING))
-def test_a_service_of_the_page_succeeds(outcome, path):
+@pytest.mark.parametrize(
+    ("simulator", "path"), cases(lambda it: offered(it).services.keys() - STEPPED - FAILING[it])
+)
+def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
     """And where its answer is known from what was asked before, it is that."""
-    answer = outcome["answers"][path]
+    answer = outcomes(simulator)["answers"][path]
 
     assert "failed" not in answer, answer
     if path.startswith("supervisor/field/insert_"):
@@ -92,31 +118,36 @@ def test_a_service_of_the_page_succeeds(outcome, path):
         assert {name: answer[name] for name in expected} == near(expected)
 
 
-@pytest.mark.parametrize("path", sorted(FAILING))
-def test_a_service_that_the_page_calls_failing_fails(outcome, path):
+@pytest.mark.parametrize(("simulator", "path"), cases(FAILING.__getitem__))
+def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
     """A success that did nothing would leave a client with a wrong picture."""
-    answer = outcome["answers"][path]
+    answer = outcomes(simulator)["answers"][path]
 
     assert "failed" in answer or not next(iter(answer.values()))
 
 
+@pytest.mark.parametrize("simulator", FAILING)
 @pytest.mark.parametrize("type_name", FIELDS)
-def test_a_field_of_every_type_is_read_as_it_was_written(outcome, type_name):
+def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, type_name):
     """Through the messages of rospy and back."""
     _, _, value = FIELDS[type_name]
 
-    assert outcome["answers"][f"supervisor/field/get_{type_name}"]["value"] == pytest.approx(value)
+    answers = outcomes(simulator)["answers"]
+    assert answers[f"supervisor/field/get_{type_name}"]["value"] == pytest.approx(value)
 
 
-@pytest.mark.parametrize("path", sorted(SURVEY.topics))
-def test_a_topic_of_the_page_is_heard(outcome, path):
+@pytest.mark.parametrize(("simulator", "path"), cases(lambda it: offered(it).topics))
+def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
     """In the class of its type, with the time at which it was sent."""
-    message = outcome["heard"][absolute(path)]
+    message = outcomes(simulator)["heard"][absolute(path)]
 
     assert message.get("header", {"stamp": 1.0})["stamp"] > 0.0
 
 
-def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcome):
+@pytest.mark.parametrize("simulator", FAILING)
+def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcomes, simulator):
     """After reset, restart, revert, reload and load, each of which the client came back from."""
+    outcome = outcomes(simulator)
+
     assert outcome["answers"]["supervisor/simulation_quit"]["success"]
     assert outcome["status"] == QUIT_STATUS

@@ -24,6 +24,7 @@ from palaestra_sim.front.simulator import Load, Simulator
 from palaestra_sim.ros.node import ServiceFailed
 from palaestra_sim.seam import Fields, Handler
 
+_ENABLES = ("/enable", "/recognition_enable")
 _HASH = re.compile(r"_[0-9a-f]{6}$")  # how generated ROS names end; it differs from job to job
 
 
@@ -126,7 +127,7 @@ class _Listener:
     def enable_all(self, period_ms: int) -> None:
         """Enable every sensor, because only then its topic exists; a device that refuses has none."""
         for path, handler in self.services.items():
-            if path.endswith("/enable"):
+            if path.endswith(_ENABLES):
                 with contextlib.suppress(ServiceFailed):
                     handler(SimpleNamespace(value=period_ms))
 
