@@ -43,7 +43,7 @@ class Pictures:
 
     @property
     def things(self) -> tuple[Drawn, ...]:
-        """What was visible in the world when the last picture was drawn."""
+        """The visible things of the last picture, by number."""
         return self._visible.things
 
     def open(self) -> None:

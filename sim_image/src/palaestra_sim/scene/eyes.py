@@ -22,8 +22,8 @@ class Lens:
     Attributes:
         size: width and height in pixels.
         field_of_view_rad: from the left edge to the right one.
-        near_m: what is nearer is not visible.
-        far_m: what is farther is not visible; 0: there is no end.
+        near_m: the nearest visible distance.
+        far_m: the farthest visible distance; 0: there is none.
     """
 
     size: tuple[int, int]
@@ -55,7 +55,7 @@ class Eye(Protocol):
     def depths(self, nearest_m: float, resolution_m: float) -> bytes | memoryview:
         """Return a float32 for each pixel: its distance along the axis of the lens, in meters.
 
-        What is nearer than `nearest_m`, or beyond the far end of the lens, is infinite. Other distances are
+        A distance below `nearest_m`, or beyond the far end of the lens, is infinite. Other distances are
         multiples of `resolution_m`, if that is positive.
         """
         ...

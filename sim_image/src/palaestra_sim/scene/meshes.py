@@ -54,7 +54,8 @@ def elevation_grid(node: SceneNode) -> Mesh | None:
     columns, rows = (int((node.numbers(name) or (0.0,))[0]) for name in ("xDimension", "yDimension"))
     across, along = ((node.numbers(name) or (1.0,))[0] for name in ("xSpacing", "ySpacing"))
     heights = node.numbers("height") or ()
-    if min(columns, rows) < 2 or len(heights) < columns * rows or not _finite((*heights, across, along)):  # noqa: PLR2004
+    complete = min(columns, rows) > 1 and len(heights) >= columns * rows
+    if not complete or not _finite((*heights, across, along)):
         return None
     points = tuple(
         (column * across, row * along, heights[row * columns + column])

@@ -14,7 +14,8 @@ has the steps.
 - `emitter`, `receiver`: the rows of radio
 - `connector`: the row of what feels another of its kind
 - `led`, `speaker`, `pen`, `display`: rows that only keep what a program sets
-- `camera`, `range_finder`: the rows of what sees, with `pictures`, which they share, and `recognition`
+- `camera`, `range_finder`: the rows of what sees
+- `pictures`, `recognition`: the lens that both have, and the objects that a camera finds
 - `radar`, `vacuum_gripper`: rows that nothing enables
 - `skin`: the row of meshes that move, of which there are none
 - `response`: lookup tables, resolution and axes, which several of them have
