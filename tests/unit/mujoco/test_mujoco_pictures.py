@@ -10,7 +10,9 @@ import pytest
 
 from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.world import parse
 
 BLUE, GREEN, RED, ALPHA = range(4)
 WIDTH, HEIGHT = 64, 48
@@ -304,6 +306,40 @@ def test_two_processes_draw_the_same_bytes():
     }
 
     assert len(found) == 1
+
+
+def test_a_loose_thing_is_seen_where_it_has_fallen(load):
+    """The physics moves it, and no client."""
+    simulation = load(
+        BOX.replace("children [", "physics Physics { } boundingObject Box { size 1 1 1 } children [").replace(
+            "2 0 0.5", "3 0 1.5"
+        )
+    )
+    before = np.nonzero(reds(look(simulation)))[0].mean()
+    for _ in range(40):
+        simulation.step(32)
+
+    assert np.nonzero(reds(look(simulation)))[0].mean() > before + 5
+
+
+OLD = """#VRML_SIM R2021b utf8
+WorldInfo { coordinateSystem "NUE" }
+Solid { translation 0 0.5 -2 children [ Shape {
+  appearance PBRAppearance { baseColor 1 0 0 } geometry Box { size 1 1 1 } } ] }
+Robot { name "robot" children [ %s ] }
+"""
+
+
+def test_a_camera_of_an_old_file_looks_along_minus_z_with_y_up():
+    """Worlds from before R2022a have those axes."""
+    leave_out = LeaveOut(types=frozenset(("WorldInfo",)))
+    camera = CAMERA.replace("0 0 0.5", "0 0.5 0")
+    world = parse((OLD % camera).encode(), "world")
+    simulation = Simulation.of(world, MujocoPhysics(), leave_out=leave_out)
+    rows, columns = np.nonzero(reds(look(simulation)))
+
+    assert columns.mean() == pytest.approx((WIDTH - 1) / 2, abs=0.5)
+    assert rows.mean() == pytest.approx((HEIGHT - 1) / 2, abs=0.5)
 
 
 def _with(simulation, name, **fields):

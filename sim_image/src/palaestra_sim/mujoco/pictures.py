@@ -15,7 +15,7 @@ import numpy as np
 
 from palaestra_sim.mujoco.canvas import canvas
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.mujoco.visible import SKY, Visible, build, glow
+from palaestra_sim.mujoco.visible import SKY, SUN, Visible, build, glow
 from palaestra_sim.scene.drawn import Drawn, View
 from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.geometry import Pose
@@ -38,7 +38,7 @@ class Pictures:
     def __init__(self, view: View) -> None:
         self._view = view
         self._seen = (-1, -1)  # changes and moves of the view that the model has
-        self._visible: Visible = build((), (0.0, 0.0, 0.0))
+        self._visible: Visible = build((), (0.0, 0.0, 0.0), SUN)
         self._carried: list[tuple[Place, slice, Any, Any]] = []
 
     @property
@@ -129,7 +129,7 @@ class Pictures:
         model.vis.map.znear, model.vis.map.zfar = lens.near_m, _BEYOND * far_m
         forward = turned[:, 0]
         model.geom_size[-1] = lens.near_m, across * far_m, up * far_m
-        model.mat_emission[0] = glow(forward.tolist())
+        model.mat_emission[0] = glow(forward.tolist(), self._visible.sun)
         data.geom_xpos[-1] = pose.position + far_m * forward
         data.geom_xmat[-1] = turned.ravel()
 
@@ -137,7 +137,10 @@ class Pictures:
         """Put every shape where it is now."""
         seen = (self._view.changes, self._view.moves)
         if seen[0] != self._seen[0]:
-            self._visible = build(self._view.things(), self._view.sky())
+            things = self._view.things()
+            place = next((thing.place for thing in things if thing.place is not None), None)
+            sun = SUN if place is None else place.from_ground(SUN)
+            self._visible = build(things, self._view.sky(), sun)
         if seen != self._seen:
             self._seen = seen
             self._place_all()

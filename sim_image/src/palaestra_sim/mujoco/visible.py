@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -26,8 +25,7 @@ _QUALITY: Final = {"shadowsize": 0, "offsamples": 0, "numslices": 20, "numstacks
 _AMBIENT: Final = 0.45
 _FROM_CAMERA: Final = 0.25
 _FROM_ABOVE: Final = 0.30
-_SUN: Final = (-0.3, 0.4, -0.85)  # its direction
-_TO_GROUND: Final = tuple(part / math.hypot(*_SUN) for part in _SUN)
+SUN: Final = (-0.3, 0.4, -0.866)  # a unit vector: the direction of its light, where z points up
 SKY: Final = 1  # the group of its geom, the last one of the model
 
 
@@ -38,6 +36,7 @@ class Visible:
     Attributes:
         things: by the number of their geom; the last geom is the sky.
         positions, rotations: of the geoms in the frames of their places, (n, 3) and (n, 3, 3).
+        sun: the direction of its light.
         scene, option, camera: of MuJoCo's visualizer.
     """
 
@@ -46,17 +45,24 @@ class Visible:
     data: Any
     positions: Any
     rotations: Any
+    sun: Vector
     scene: Any
     option: Any
     camera: Any
 
 
-def build(things: Sequence[Drawn], sky: Vector) -> Visible:
-    """Return the model of these things, under a sky of that color, red, green and blue from 0 to 1."""
+def build(things: Sequence[Drawn], sky: Vector, sun: Vector) -> Visible:
+    """Return the model of these things.
+
+    Args:
+        things: all that is visible, but for the sky.
+        sky: its color, red, green and blue from 0 to 1.
+        sun: the direction of its light.
+    """
     spec = mujoco.MjSpec()
     for name, value in _QUALITY.items():
         setattr(spec.visual.quality, name, value)
-    _light(spec)
+    _light(spec, sun)
     spec.worldbody.add_camera(name="eye")
     meshes: dict[tuple[Mesh, Vector], str] = {}
     for thing in things:
@@ -78,20 +84,19 @@ def build(things: Sequence[Drawn], sky: Vector) -> Visible:
         data=data,
         positions=data.geom_xpos.copy(),
         rotations=data.geom_xmat.reshape(-1, 3, 3).copy(),
+        sun=sun,
         scene=mujoco.MjvScene(model, maxgeom=len(things) + 8),
         option=mujoco.MjvOption(),
         camera=camera,
     )
 
 
-def _light(spec: Any) -> None:
+def _light(spec: Any, sun: Vector) -> None:
     headlight = spec.visual.headlight
     headlight.ambient = [_AMBIENT] * 3
     headlight.diffuse = [_FROM_CAMERA] * 3
     headlight.specular = [0.0] * 3
-    light = spec.worldbody.add_light(
-        dir=_SUN, diffuse=[_FROM_ABOVE] * 3, specular=[0.0] * 3, castshadow=False
-    )
+    light = spec.worldbody.add_light(dir=sun, diffuse=[_FROM_ABOVE] * 3, specular=[0.0] * 3, castshadow=False)
     light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
 
 
@@ -110,9 +115,9 @@ def _hang_sky(spec: Any) -> None:
     )
 
 
-def glow(forward: Sequence[float]) -> float:
+def glow(forward: Sequence[float], sun: Vector) -> float:
     """Return the emission with which the sky has its own color, if a camera looks `forward`."""
-    from_above = max(0.0, sum(a * b for a, b in zip(forward, _TO_GROUND, strict=True)))
+    from_above = max(0.0, sum(a * b for a, b in zip(forward, sun, strict=True)))
     return 1.0 - _AMBIENT - _FROM_CAMERA - _FROM_ABOVE * from_above
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from palaestra_sim.scene.geometry import Pose, from_axis_angle
+from palaestra_sim.scene.geometry import Pose, from_axis_angle, to_axis_angle
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place, YUp
 from palaestra_sim.scene.reading import Reading
@@ -23,6 +23,7 @@ _CONVERT: Final = (
     " or run this world with driver webots"
 )
 _UP: Final = {"ENU": "z", "NUE": "y", "EUN": "y"}
+_X_TO_MINUS_Z: Final = (0.0, -1.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.0, 0.0)
 _Z_TO_Y: Final = Pose(rotation=from_axis_angle((1.0, 0.0, 0.0, -math.pi / 2.0)))
 
 
@@ -51,6 +52,13 @@ def standing(node: SceneNode, frame: Pose) -> Pose:
     if not of_old_axes(node) or any(around.stand_in for around in node.ancestors()):
         return frame
     return frame.after(_Z_TO_Y)
+
+
+def looking(node: SceneNode, place: Place) -> Place:
+    """Return the frame of a camera that looks along x with z up; in an old file it is -z with y up."""
+    if not of_old_axes(node):
+        return place
+    return Place(place, (0.0, 0.0, 0.0), to_axis_angle(_X_TO_MINUS_Z))
 
 
 def frame_of_shapes(owner: SceneNode) -> Pose:

@@ -30,6 +30,8 @@ class LoosePlace(Place):
             takes them; None: no change.
     """
 
+    moves = True
+
     def __init__(
         self, parent: Place | None, translation: Vector, rotation: AxisAngle, size: float = 1.0
     ) -> None:

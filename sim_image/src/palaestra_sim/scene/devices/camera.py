@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
+from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Stream, Topic
 from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
 from palaestra_sim.scene.devices.recognition import (
@@ -71,16 +72,17 @@ class Camera:
 
 def _read(part: Part) -> Camera:
     lens = read_lens(part, part.number("near", 0.01), part.number("far", 0.0))
+    place = looking(part.node, part.place)
     return Camera(
         name=part.name,
         model=part.text("model"),
-        place=part.place,
+        place=place,
         lens=lens,
         spherical=part.node.flag("spherical", False),
         exposure=part.number("exposure", 1.0),
         focus=_focus(part),
         zoom=_zoom(part),
-        recognition=read_recognition(part, lens),
+        recognition=read_recognition(part, place, lens),
     )
 
 

@@ -9,6 +9,7 @@ from array import array
 from dataclasses import dataclass
 from typing import Final
 
+from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Topic
 from palaestra_sim.scene.devices.pictures import picture_topic, read_lens, saver
 from palaestra_sim.scene.eyes import Eye, Lens
@@ -89,7 +90,7 @@ def _read(part: Part) -> RangeFinder:
     return RangeFinder(
         name=part.name,
         model=part.text("model"),
-        place=part.place,
+        place=looking(part.node, part.place),
         lens=read_lens(part, min(part.number("near", 0.01), least_m), part.number("maxRange", 1.0)),
         least_m=least_m,
         resolution_m=part.number("resolution", -1.0),

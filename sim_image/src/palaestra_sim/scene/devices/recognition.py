@@ -83,13 +83,13 @@ class _Segments:
         return [self.recognition.picture] if self.recognition.segmenting else []
 
 
-def read_recognition(part: Part, lens: Lens) -> Recognition | None:
+def read_recognition(part: Part, place: Place, lens: Lens) -> Recognition | None:
     """Return the Recognition node of a camera; None if it has none."""
     node = part.inner("recognition")
     if node is None:
         return None
     return Recognition(
-        place=part.place,
+        place=place,
         lens=lens,
         reach_m=part.reading.number(node, "maxRange", 100.0),
         most=int(part.reading.number(node, "maxObjects", -1.0)),
