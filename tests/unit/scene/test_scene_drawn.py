@@ -6,6 +6,7 @@ import pytest
 
 from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.loading import Loader
+from palaestra_sim.scene.meshes import cut
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.stub.physics import StubPhysics
@@ -157,6 +158,35 @@ def test_a_mesh_that_is_seen_from_behind_is_turned_around(things):
     )
 
     assert thing.mesh.triangles == ((0, 2, 1),)
+
+
+HOOK = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0)]  # of 3 square meters
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])  # of the axes
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_face_that_is_not_convex_is_cut_without_overlap(first, way):
+    """Floors of houses are such faces."""
+    points = [(*point[first:], *point[:first]) for point in HOOK]
+    triangles = cut(points, list(range(6))[::way])
+
+    areas = [area(*(points[index] for index in triangle)) for triangle in triangles]
+    assert len(triangles) == 4
+    assert sum(areas) == pytest.approx(3.0)
+
+
+def test_an_outline_that_crosses_itself_ends():
+    """It has no triangles that are right."""
+    star = [(0, 0, 0), (2, 2, 0), (0, 2, 0), (2, 0, 0), (1, 3, 0)]
+
+    assert len(cut(star, [0, 1, 2, 3, 4])) == 3
+
+
+def area(a, b, c):
+    """Return the area of a triangle."""
+    across, along = ([q - p for p, q in zip(a, corner, strict=True)] for corner in (b, c))
+    normal = [across[i - 2] * along[i - 1] - across[i - 1] * along[i - 2] for i in range(3)]
+    return math.hypot(*normal) / 2
 
 
 def test_a_grid_of_heights_is_a_mesh(things):

@@ -13,6 +13,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 
 _SIDES: Final = 20  # of a cone
 _CORNERS: Final = 3  # of a triangle
+_FEW: Final = 4  # a face with so many corners is taken as convex; most have three or four
 _LARGEST_M: Final = 1e5
 
 Triangle = tuple[int, int, int]
@@ -43,7 +44,7 @@ def face_set(node: SceneNode) -> Mesh | None:
         return None
     points = tuple(zip(flat[0::3], flat[1::3], flat[2::3], strict=True))
     faces = _faces(node.numbers("coordIndex") or (), len(points))
-    triangles = [triangle for face in faces for triangle in _fan(face)]
+    triangles = [triangle for face in faces for triangle in cut(points, face)]
     if not node.flag("ccw", True):
         triangles = [(a, c, b) for a, b, c in triangles]
     return Mesh(points, tuple(triangles)) if triangles else None
@@ -65,6 +66,52 @@ def elevation_grid(node: SceneNode) -> Mesh | None:
     corners = (row * columns + column for row in range(rows - 1) for column in range(columns - 1))
     cells = ((at, at + 1, at + columns + 1, at + columns) for at in corners)
     return Mesh(points, tuple(triangle for cell in cells for triangle in _fan(cell)))
+
+
+def cut(points: Sequence[Vector], face: Sequence[int]) -> list[Triangle]:
+    """Return the triangles of a flat face, whose outline may have corners that point inward."""
+    if len(face) <= _FEW:
+        return list(_fan(face))
+    flat = _flattened([points[index] for index in face])
+    left, found = list(range(len(face))), []
+    while len(left) > _CORNERS:
+        ear = next((at for at in range(len(left)) if _is_ear(flat, left, at)), None)
+        if ear is None:  # an outline that crosses itself
+            break
+        found.append((left[ear - 1], left[ear], left[(ear + 1) % len(left)]))
+        del left[ear]
+    found += _fan(left)
+    return [(face[a], face[b], face[c]) for a, b, c in found]
+
+
+def _flattened(corners: Sequence[Vector]) -> list[tuple[float, float]]:
+    """Return an outline without the axis along which it is thinnest, counterclockwise."""
+    normal = [
+        sum(
+            a[(axis + 1) % 3] * b[(axis + 2) % 3] - a[(axis + 2) % 3] * b[(axis + 1) % 3]
+            for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
+        )
+        for axis in range(3)
+    ]
+    axis = max(range(3), key=lambda it: abs(normal[it]))
+    first, second = ((axis + 1) % 3, (axis + 2) % 3)[:: 1 if normal[axis] > 0.0 else -1]
+    return [(corner[first], corner[second]) for corner in corners]
+
+
+def _is_ear(flat: Sequence[tuple[float, float]], left: Sequence[int], at: int) -> bool:
+    """Return whether the corner `at` of those that are left can be cut off: no other is in its triangle."""
+    a, b, c = flat[left[at - 1]], flat[left[at]], flat[left[(at + 1) % len(left)]]
+    if _turn(a, b, c) <= 0.0:
+        return False
+    others = (flat[index] for index in left)
+    return not any(
+        it not in (a, b, c) and min(_turn(a, b, it), _turn(b, c, it), _turn(c, a, it)) >= 0.0 for it in others
+    )
+
+
+def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Return twice the area of a triangle; positive if it is counterclockwise."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _faces(indices: Sequence[float], count: int) -> Iterator[list[int]]:

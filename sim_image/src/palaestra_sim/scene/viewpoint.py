@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from palaestra_sim.scene import png
+from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
@@ -27,5 +28,6 @@ def save_view(root: SceneNode, physics: Physics, path: str) -> bool:
     x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
     ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))
     lens = Lens(size=SIZE, field_of_view_rad=fov_rad, near_m=near_m, far_m=far_m)
-    eye = physics.eye(Place(None, (x, y, z), (ax, ay, az, angle_rad)), lens)
+    place = looking(viewpoint, Place(None, (x, y, z), (ax, ay, az, angle_rad)))
+    eye = physics.eye(place, lens)
     return eye is not None and png.save(path, SIZE, eye.colors())
