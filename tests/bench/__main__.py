@@ -9,10 +9,21 @@ import json
 import sys
 import time
 
-from tests.bench import learning, newcomer, operator, operator_planning, parallel, plain, runs, stepping
+from tests.bench import (
+    learning,
+    newcomer,
+    operator,
+    operator_planning,
+    parallel,
+    plain,
+    runs,
+    simulators,
+    stepping,
+)
 
 PARTS = {
     "stepping": stepping.measure,
+    "simulators": simulators.measure,
     "parallel": parallel.measure,
     "recovery": runs.measure_recovery,
     "shutdown": runs.measure_shutdown,
