@@ -15,7 +15,10 @@ from typing import Any, Final
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.seam import UnsimulatedError
 
-_BACKENDS: Final = {"egl": "libegl1 libgl1-mesa-dri", "osmesa": "libosmesa6"}  # with their packages in Debian
+_BACKENDS: Final = {
+    "egl": "libegl1 libgl1-mesa-dri libopengl0",
+    "osmesa": "libosmesa6",
+}  # with their packages in Debian
 _FONT: Final = mujoco.mjtFontScale.mjFONTSCALE_100.value  # the smallest; no text is drawn
 
 

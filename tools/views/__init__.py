@@ -1,0 +1,1 @@
+"""Pictures of the shipped arena for the documentation, as MuJoCo draws them."""
