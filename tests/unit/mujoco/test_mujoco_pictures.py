@@ -308,6 +308,37 @@ def test_two_processes_draw_the_same_bytes():
     assert len(found) == 1
 
 
+BLIND = """import os, sys
+os.environ.update(%r)
+from palaestra_sim.errors import SimError
+from palaestra_sim.mujoco.physics import MujocoPhysics
+from palaestra_sim.scene.simulation import Simulation
+world = b"#VRML_SIM R2023b utf8\\nRobot { children [ Camera { } ] }\\n"
+simulation = Simulation.load(world, MujocoPhysics())
+simulation.step(32)
+try:
+    simulation.robots[0].parts.devices.rows["camera"][1].enabled(32)
+except SimError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    ("environment", "message"),
+    [
+        ({"PYOPENGL_PLATFORM": "glx"}, "install the Debian packages libegl1 libgl1-mesa-dri libopengl0"),
+        ({"MUJOCO_GL": "glfw"}, "MUJOCO_GL=glfw draws no pictures; use egl or osmesa"),
+    ],
+)
+def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
+    """OpenGL is loaded with the first camera, and the refusal says what to install."""
+    done = subprocess.run(
+        [sys.executable, "-c", BLIND % environment], capture_output=True, text=True, check=True
+    )
+
+    assert message in done.stdout
+
+
 def test_a_loose_thing_is_seen_where_it_has_fallen(load):
     """The physics moves it, and no client."""
     simulation = load(
