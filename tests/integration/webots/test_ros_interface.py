@@ -144,6 +144,18 @@ def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
     assert message.get("header", {"stamp": 1.0})["stamp"] > 0.0
 
 
+@pytest.mark.parametrize("outcomes", [of_rospy], ids=["rospy"], indirect=True)
+@pytest.mark.parametrize(
+    ("topic", "encoding"), [("camera/image", "bgra8"), ("range_finder/range_image", "32FC1")]
+)
+def test_a_picture_arrives_whole(outcomes, topic, encoding):
+    """Four bytes for each of 64 x 64 pixels, in an encoding that cv_bridge knows."""
+    image = outcomes("mujoco")["heard"][absolute(topic)]
+
+    assert (image["width"], image["height"], image["encoding"]) == (64, 64, encoding)
+    assert image["height"] * image["step"] == len(image["data"]) == 4 * 64 * 64
+
+
 @pytest.mark.parametrize("simulator", FAILING)
 def test_the_last_service_ends_the_simulator_with_the_status_that_was_asked_for(outcomes, simulator):
     """After reset, restart, revert, reload and load, each of which the client came back from."""
