@@ -55,7 +55,8 @@ class MujocoEye:
         numbers = self._pictures.segments(self._place, self._lens)
         colors = [color(thing.node) or _BLACK for thing in self._pictures.things]
         table = np.frombuffer(b"".join((*colors, _BLACK)), np.uint8).reshape(-1, len(_BLACK))
-        return memoryview(table[numbers]).cast("B")
+        pixels: Any = table[numbers]
+        return memoryview(pixels).cast("B")
 
 
 def _corners(mask: Any) -> Corners:

@@ -98,8 +98,9 @@ class StubPhysics:
     def show(self, view: View) -> None:
         """Do nothing: there are no pictures."""
 
-    def eye(self, _place: Place, _lens: Lens) -> None:
+    def eye(self, place: Place, lens: Lens) -> None:
         """Return None: there are no pictures."""
+        del place, lens
 
     def contacts(self) -> Iterable[ContactPoint]:
         """Return where robots touch obstacles and each other now."""
