@@ -12,6 +12,7 @@ from palaestra_sim.mujoco.physics import MujocoPhysics
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.summary import silent_devices
 from palaestra_sim.world import parse
 
 BLUE, GREEN, RED, ALPHA = range(4)
@@ -337,6 +338,15 @@ def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
     )
 
     assert message in done.stdout
+
+
+def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
+    """The warning at the start is about devices that a client would wait for in vain."""
+    simulation = load(
+        "", f"{CAMERA} {FINDER}", 'Radar { }] controller "ros" controllerArgs [ "--name=r" "--synchronize"'
+    )
+
+    assert silent_devices(simulation.robots) == "1 Radar"
 
 
 def test_a_loose_thing_is_seen_where_it_has_fallen(load):
