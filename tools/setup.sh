@@ -1,30 +1,36 @@
 #!/usr/bin/env bash
-# Install what Palaestra needs on a Debian 12 or 13 machine: ROS from the distribution, the rest into .venv.
+# Install what Palaestra needs on a Debian 12 or 13 machine: ROS and OpenGL from the distribution, the rest
+# into .venv.
 # Safe to repeat; a failed run leaves no .venv/ready behind, so the next one starts over.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 # rospy's own service proxies import netifaces, on which its package forgets to depend.
-ros_packages=(python3-rospy python3-rosmaster python3-netifaces python3-venv)
+packages=(python3-rospy python3-rosmaster python3-netifaces python3-venv)
 # ROS's command line, and the messages that those of webots_ros hold, as Python modules and as definitions.
-ros_packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
+packages+=(python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs)
 # A compiler and the headers of roscpp: a test builds a client in C++.
-ros_packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
+packages+=(g++ libroscpp-dev libsensor-msgs-dev python3-gencpp)
+# OpenGL on the processor: MuJoCo's cameras draw with it.
+packages+=(libegl1 libgl1-mesa-dri libopengl0)
 
-ros_is_installed() {
-  local modules='ensurepip, netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs, gencpp'
+all_installed() {
+  local libraries modules
+  libraries=$(/sbin/ldconfig -p)
+  modules='ensurepip, netifaces, rosmaster, rosmsg, rospy, rosservice, rostopic, sensor_msgs, gencpp'
   /usr/bin/python3 -c "import $modules" 2>/dev/null && command -v g++ >/dev/null &&
-    [[ -d /usr/share/sensor_msgs/msg && -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]]
+    [[ -d /usr/share/sensor_msgs/msg && -f /usr/include/ros/ros.h && -f /usr/include/sensor_msgs/Imu.h ]] &&
+    [[ $libraries == *libEGL.so.1* && $libraries == *libOpenGL.so.0* ]]
 }
 
-if ! ros_is_installed; then
-  install="apt-get install -y --no-install-recommends ${ros_packages[*]}"
+if ! all_installed; then
+  install="apt-get install -y --no-install-recommends ${packages[*]}"
   if [[ $EUID -ne 0 ]]; then
-    echo "ROS is missing. Type this line, then repeat the command:"
+    echo "Packages are missing. Type this line, then repeat the command:"
     echo "  sudo apt-get update && sudo $install"
     exit 1
   fi
-  echo "setup: installing ${ros_packages[*]}"
+  echo "setup: installing ${packages[*]}"
   apt-get update -qq
   DEBIAN_FRONTEND=noninteractive $install -qq >/dev/null
 fi

@@ -12,7 +12,7 @@ SCRIPT = Path(__file__).parents[3] / "tools/setup.sh"
 PACKAGES = (
     "python3-rospy python3-rosmaster python3-netifaces python3-venv "
     "python3-rosmsg python3-rosservice python3-rostopic python3-sensor-msgs ros-sensor-msgs "
-    "g++ libroscpp-dev libsensor-msgs-dev python3-gencpp"
+    "g++ libroscpp-dev libsensor-msgs-dev python3-gencpp libegl1 libgl1-mesa-dri libopengl0"
 )
 NOBODY = ("setpriv", "--reuid", "65534", "--clear-groups")
 
@@ -46,7 +46,7 @@ def test_without_root_and_ros_it_prints_the_one_line_to_type_and_stops(checkout)
 
     assert (setup.returncode, setup.stderr) == (1, "")
     assert setup.stdout.splitlines() == [
-        "ROS is missing. Type this line, then repeat the command:",
+        "Packages are missing. Type this line, then repeat the command:",
         f"  sudo apt-get update && sudo apt-get install -y --no-install-recommends {PACKAGES}",
     ]
     assert sorted(checkout.rglob("*")) == before
