@@ -5,6 +5,7 @@ step that blocks forever while paused, and the state that a reset does not resto
 """
 
 from palaestra_trainer.webots.attached import Attached
+from palaestra_trainer.webots.cameras import Camera, Lidar, LidarPoints, RangeFinder
 from palaestra_trainer.webots.devices import (
     DistanceSensor,
     Motor,
@@ -21,12 +22,16 @@ from palaestra_trainer.webots.supervisor import Supervisor
 
 __all__ = [
     "Attached",
+    "Camera",
     "DistanceSensor",
     "Launcher",
+    "Lidar",
+    "LidarPoints",
     "Mode",
     "Motor",
     "Observer",
     "PositionSensor",
+    "RangeFinder",
     "Sensor",
     "Simulation",
     "Supervisor",

@@ -68,12 +68,16 @@ class Sensor:
             SimulatorDead, SimulatorHung: as `RosService`.
         """
         if not self._enable(value=period_ms).success:
-            raise WrongData(
-                self._enable.simulator,
-                f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step",
-            )
+            raise self._refused(period_ms)
         self._values.connect()
         self.late = False
+
+    def _refused(self, period_ms: int) -> WrongData:
+        """Return the error for a period that the simulator refused."""
+        return WrongData(
+            self._enable.simulator,
+            f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step",
+        )
 
     def read(self) -> bool:
         """Take the next message; if it does not arrive in time, keep the value and return False.

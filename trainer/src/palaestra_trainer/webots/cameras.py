@@ -1,0 +1,116 @@
+"""The sensors of a robot whose readings are arrays: cameras, depth cameras and lidars.
+
+An array is valid until the next step, which writes the next one to the same place; see `pictures`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_trainer.errors import NoReading, WorldMisfit, WrongData
+from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots.devices import Sensor, topic_name
+from palaestra_trainer.webots.pictures import ImageReading, PointsReading, RangesReading
+
+
+class _Rendered(Sensor):
+    """A sensor whose readings a simulator must render."""
+
+    __slots__ = ()
+
+    def _refused(self, period_ms: int) -> WrongData:
+        return WorldMisfit(
+            self.robot,
+            f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step, and a simulator"
+            " that renders images: the stub renders none",
+        )
+
+    def _array(self) -> NDArray[Any]:
+        array: NDArray[Any] | None = self.value
+        if array is None:
+            raise NoReading(f"{self.device} has sent nothing yet; let a period pass")
+        return array
+
+
+class Camera(_Rendered):
+    """A camera; `value` is its image, read-only: shape (height, width, 4), uint8, BGRA."""
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "sensor_msgs/Image", ImageReading(device), "image")
+
+    @property
+    def rgb(self) -> NDArray[np.uint8]:
+        """The image without alpha: shape (height, width, 3), RGB; a view of `value`.
+
+        Raises:
+            NoReading: before the first step.
+        """
+        return self._array()[..., 2::-1]
+
+
+class RangeFinder(_Rendered):
+    """A depth camera; `value` is meters, read-only: shape (height, width), float32.
+
+    Infinite means out of range.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "sensor_msgs/Image", RangesReading(device), "range_image")
+
+    @property
+    def depths(self) -> NDArray[np.float32]:
+        """The same as `value`.
+
+        Raises:
+            NoReading: before the first step.
+        """
+        return self._array()
+
+
+class Lidar(Sensor):
+    """A lidar; `value` is meters, read-only: shape (layers, rays), float32; infinite: out of range.
+
+    Layers are from the top down, the rays of a layer from left to right.
+    """
+
+    __slots__ = ()
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "sensor_msgs/Image", RangesReading(device), "range_image")
+
+
+class LidarPoints(Sensor):
+    """The point cloud of a lidar, which it enables; a `Lidar` of the same device may be added too.
+
+    `value` is read-only: shape (layers * rays, 3), float32, x, y and z in meters in the lidar's frame;
+    infinite where a ray hit nothing.
+    """
+
+    __slots__ = ("_cloud",)
+
+    def __init__(self, robot: str, device: str) -> None:
+        super().__init__(robot, device, "sensor_msgs/PointCloud2", PointsReading(device), "point_cloud")
+        self._cloud = RosService(f"/{robot}/{topic_name(device)}/enable_point_cloud", "webots_ros/set_bool")
+
+    def enable(self, period_ms: int) -> None:
+        """Enable the lidar and its point cloud.
+
+        Raises:
+            WrongData: the period is not a multiple of the step.
+            SimulatorDead, SimulatorHung: as `RosService`.
+        """
+        super().enable(period_ms)
+        if not self._cloud(value=True).success:
+            raise WrongData(self.robot, f"{self.device} refuses to make a point cloud; use its ranges")
+
+    def close(self) -> None:
+        """Close the connections."""
+        super().close()
+        self._cloud.close()
