@@ -14,7 +14,7 @@ SENTENCES = [
     ({"simulators.0.driver": "gazebo"},
      'spec.simulators[0].driver: "gazebo" is not a driver; use stub, mujoco, webots or command'),
     ({"simulators.0.world": {"builtin": "maze"}},
-     'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena'),
+     'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena or seeing'),
     ({"trainer.algorithm.name": "TD3"},
      ('spec.trainer.algorithm.name: "TD3" is not an algorithm; '
      "use DQN, PPO, A2C, SAC or REINFORCE")),

@@ -19,13 +19,13 @@ from palaestra_sim.world import (
 
 # Every type of node in the shipped worlds; all are Webots' own, so nothing is ever downloaded.
 PLAIN = {
-    "Background", "Box", "ContactProperties", "Cylinder", "DirectionalLight", "DistanceSensor",
+    "Background", "Box", "Camera", "ContactProperties", "Cylinder", "DirectionalLight", "DistanceSensor",
     "HingeJoint", "HingeJointParameters", "PBRAppearance", "Physics", "Pose", "PositionSensor",
-    "Robot", "RotationalMotor", "Shape", "Solid", "TouchSensor", "Viewpoint", "WorldInfo",
+    "RangeFinder", "Robot", "RotationalMotor", "Shape", "Solid", "TouchSensor", "Viewpoint", "WorldInfo",
 }  # fmt: skip
 
 
-@pytest.fixture(params=["arena", "two_robots"])
+@pytest.fixture(params=["arena", "seeing", "two_robots"])
 def shipped(request: pytest.FixtureRequest) -> bytes:
     """Return each shipped world in turn."""
     return builtin(request.param)
@@ -48,9 +48,14 @@ def defined(world: World, name: str) -> Node:
     return node
 
 
+def sees(world: World) -> bool:
+    """Return whether it is the world with cameras."""
+    return bool(of_type(world, "Camera"))
+
+
 def test_an_unknown_world_names_those_that_ship() -> None:
     """A path is not a name."""
-    message = 'no world "../secret" ships; choose one of arena, two_robots'
+    message = 'no world "../secret" ships; choose one of arena, seeing, two_robots'
 
     with pytest.raises(UnknownWorldError, match=message):
         builtin("../secret")
@@ -130,26 +135,29 @@ def test_walls_stand_with_their_inner_faces_2_m_from_the_origin(
 
 
 def test_four_cylinders_stand_in_the_corners_of_a_square(scene: World) -> None:
-    """They are what the robot has to drive around."""
+    """They are what the robot has to drive around, if an episode wants it."""
     cylinders = [defined(scene, f"CYLINDER_{number}") for number in range(4)]
     shapes = [defined(scene, f"CYLINDER_{number}_SHAPE") for number in range(4)]
 
+    z = -0.7 if sees(scene) else 0.2  # the world with cameras keeps them under the floor
     assert [cylinder.numbers("translation") for cylinder in cylinders] == [
-        (0.8, 0.8, 0.2),
-        (-0.8, 0.8, 0.2),
-        (-0.8, -0.8, 0.2),
-        (0.8, -0.8, 0.2),
+        (0.8, 0.8, z),
+        (-0.8, 0.8, z),
+        (-0.8, -0.8, z),
+        (0.8, -0.8, z),
     ]
     assert {(s.numbers("radius"), s.numbers("height")) for s in shapes} == {((0.25,), (0.4,))}
     assert all(cylinder.nodes("boundingObject")[0].uses for cylinder in cylinders)
 
 
 def test_the_target_is_seen_and_never_felt(scene: World) -> None:
-    """A disk of the radius within which it counts as reached."""
+    """A disk of the radius within which it counts as reached; for cameras, a pole of 0.5 m on the floor."""
     target = defined(scene, "TARGET")
-    (disk,) = target.nodes("children")[0].nodes("geometry")
+    (shape,) = target.nodes("children")[0].nodes("geometry")
+    form = tuple(shape.numbers(name) for name in ("radius", "height"))
 
-    assert disk.numbers("radius") == (0.2,)
+    assert form == (((0.05,), (0.5,)) if sees(scene) else ((0.2,), (0.002,)))
+    assert (target.numbers("translation") or ())[2] == (0.25 if sees(scene) else 0.001)
     assert target.numbers("translation") is not None
     assert "boundingObject" not in target.fields
 
@@ -222,3 +230,15 @@ def test_the_body_weighs_20_kg(scene: World) -> None:
 
     assert physics.numbers("mass") == (20,)
     assert bounds.nodes("children")[0].uses == "BODY"
+
+
+def test_both_cameras_look_forward_from_one_place() -> None:
+    """A pixel of the depth image belongs to the same pixel of the color image."""
+    scene = parse(builtin("seeing"))
+    (camera,), (depth_camera,) = of_type(scene, "Camera"), of_type(scene, "RangeFinder")
+
+    assert (camera.text("name"), depth_camera.text("name")) == ("camera", "depth camera")
+    assert (camera.numbers("width"), camera.numbers("height")) == ((64,), (48,))
+    for name in ("translation", "fieldOfView", "width", "height"):
+        assert camera.numbers(name) == depth_camera.numbers(name)
+    assert "rotation" not in camera.fields

@@ -36,6 +36,7 @@ class Builtin(StrEnum):
     """The worlds that ship with Palaestra."""
 
     ARENA = "arena"
+    SEEING = "seeing"
 
 
 class ConfigMapKey(ApiModel):
@@ -67,7 +68,8 @@ class World(ApiModel):
     """ConfigMap key with the text of a `.wbt` file; relative URLs are refused."""
 
     builtin: Builtin | None = Field(default=None, strict=False)
-    """A world that ships with Palaestra: `arena`, four by four meters with four cylinders and a Robotino."""
+    """A world that ships with Palaestra. `arena`: four by four meters with four cylinders and a Robotino.
+    `seeing`: an arena without cylinders, with a red pole, and a Robotino with a color and a depth camera."""
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
     """Absolute path of a `.wbt` file in the simulator's image (`palaestra run`: on this machine). PROTOs and
