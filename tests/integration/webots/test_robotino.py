@@ -88,8 +88,22 @@ def test_volts_become_metres_within_the_sensors_range():
 
 def test_it_has_no_camera(arena):
     """A typed error, so that an environment can do without."""
-    with pytest.raises(NoSuchSensor):
-        arena.robot.color_image()
+    with pytest.raises(NoSuchSensor, match="has no device camera"):
+        arena.robot.use_cameras(color=True)
+    with pytest.raises(NoSuchSensor, match=r"call use_cameras\(depth=True\), then advance"):
+        arena.robot.depth_image()
+
+    assert arena.robot.advance() == 0
+
+
+def test_cameras_that_a_simulator_does_not_render_are_refused(start):
+    """The world has them, and the stub does not."""
+    seeing = start(world="seeing")
+
+    with pytest.raises(NoSuchSensor, match="the stub renders none"):
+        seeing.robot.use_cameras(color=True)
+
+    assert seeing.robot.advance() == 0
 
 
 def test_a_lost_wake_up_costs_an_extra_step_and_no_fault(start):

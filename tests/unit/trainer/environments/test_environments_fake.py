@@ -19,6 +19,7 @@ from palaestra_trainer.testing import (
     check_robot,
     check_scene,
     fake_arena,
+    fake_seeing,
 )
 from palaestra_trainer.testing import conformance as rules
 
@@ -26,6 +27,11 @@ from palaestra_trainer.testing import conformance as rules
 def test_the_fake_is_a_robotino():
     """It passes what the simulated and the real one have to pass."""
     check_robot(FakeRobotino())
+
+
+def test_the_fake_with_cameras_is_a_robotino():
+    """Its images are checked too."""
+    check_robot(fake_seeing()[0])
 
 
 def test_the_fake_has_a_scene():
@@ -155,7 +161,7 @@ class _Flawed(FakeRobotino):
     """A robot that breaks one rule, by one method of its own."""
 
     def __init__(self, method: str, answer) -> None:
-        super().__init__()
+        super().__init__(cameras=True)
         setattr(self, method, lambda *_: answer(super(_Flawed, self)))
 
 
@@ -177,7 +183,10 @@ def _backwards(robot: RobotinoAbc) -> Pose:
         ("pose", lambda _: Pose(0.0, 0.0, 0.0), rules.MOVEMENTS_MOVE),
         ("pose", _backwards, rules.MOVEMENTS_MOVE),
         ("advance", lambda it: it.advance() or None, rules.ADVANCE_COUNTS),
-        ("color_image", lambda _: np.zeros(3, np.uint8), rules.IMAGES_ARE_TYPED),
+        ("color_image", lambda _: np.zeros(3, np.uint8), rules.COLORS_ARE_TYPED),
+        ("color_image", lambda it: it.color_image()[..., :1], rules.COLORS_ARE_TYPED),
+        ("depth_image", lambda it: it.depth_image().astype(np.float64), rules.DEPTHS_ARE_TYPED),
+        ("depth_image", lambda it: -it.depth_image(), rules.DEPTHS_ARE_TYPED),
     ],
     ids=[
         "out of range",
@@ -191,6 +200,9 @@ def _backwards(robot: RobotinoAbc) -> Pose:
         "mirrored",
         "no count of extra periods",
         "a flat image",
+        "a gray image",
+        "depths in float64",
+        "negative depths",
     ],
 )
 def test_conformance_names_the_rule_that_a_robot_breaks(method, answer, rule):

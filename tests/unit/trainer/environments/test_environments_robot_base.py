@@ -47,3 +47,20 @@ def test_a_robot_without_cameras_says_so(take):
     """The error is typed, so that a caller can ask whether there is a camera."""
     with pytest.raises(NoSuchSensor, match=r"FakeRobotino has no .* camera; use distances\(\)"):
         getattr(FakeRobotino(), take)()
+
+
+@pytest.mark.parametrize("camera", ["color", "depth"])
+def test_a_robot_without_cameras_lets_none_be_used(camera):
+    """Before an episode that would need it."""
+    with pytest.raises(NoSuchSensor, match=f"FakeRobotino has no {camera} camera"):
+        FakeRobotino().use_cameras(**{camera: True})
+
+
+@pytest.mark.parametrize("camera", ["color", "depth"])
+def test_a_camera_that_is_not_in_use_has_no_image(camera):
+    """The error says how to use it."""
+    robot = FakeRobotino(cameras=True)
+    robot.use_cameras(**{"depth" if camera == "color" else "color": True})
+
+    with pytest.raises(NoSuchSensor, match=rf"call use_cameras\({camera}=True\), then advance"):
+        getattr(robot, f"{camera}_image")()

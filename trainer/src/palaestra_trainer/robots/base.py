@@ -111,21 +111,41 @@ class RobotinoAbc(ABC):
         """Drive at the speeds of `movement` until the next command."""
         self.drive(*movement.twist)
 
-    def color_image(self) -> NDArray[np.uint8]:
-        """Return what the camera sees, shape (height, width, 3), RGB.
+    def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
+        """Let the chosen cameras have an image from the next `advance` on; they stay in use.
+
+        A camera that is not in use costs nothing.
 
         Raises:
-            NoSuchSensor: the robot has no color camera.
+            NoSuchSensor: the robot lacks one of them. A simulated robot that is not connected yet raises
+                `WorldMisfit` when it connects.
         """
-        raise NoSuchSensor(f"{type(self).__name__} has no color camera; use distances()")
+        for wanted, name in ((color, "color"), (depth, "depth")):
+            if wanted:
+                raise self._no_camera(name)
+
+    def color_image(self) -> NDArray[np.uint8]:
+        """Return what the camera sees, shape (height, width, 3), RGB; valid until the next `advance`.
+
+        Raises:
+            NoSuchSensor: no color camera is in use.
+            NoReading: no period has passed since `use_cameras`.
+        """
+        raise self._no_camera("color")
 
     def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel, shape (height, width).
+        """Return meters for each pixel, shape (height, width); valid until the next `advance`.
+
+        Meters are along the line of sight of the image's middle; infinite where nothing is in range.
 
         Raises:
-            NoSuchSensor: the robot has no depth camera.
+            NoSuchSensor: no depth camera is in use.
+            NoReading: no period has passed since `use_cameras`.
         """
-        raise NoSuchSensor(f"{type(self).__name__} has no depth camera; use distances()")
+        raise self._no_camera("depth")
+
+    def _no_camera(self, name: str) -> NoSuchSensor:
+        return NoSuchSensor(f"{type(self).__name__} has no {name} camera; use distances()")
 
 
 class Scene(Protocol):

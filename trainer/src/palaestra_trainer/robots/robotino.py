@@ -9,11 +9,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import NoReading
+from palaestra_trainer.errors import NoReading, NoSuchSensor, WorldMisfit
 from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, Pose, RobotinoAbc
 from palaestra_trainer.webots import (
+    Camera,
     DistanceSensor,
     Motor,
+    RangeFinder,
+    Sensor,
     Simulation,
     TouchSensor,
     Webots,
@@ -64,6 +67,9 @@ class Robotino(RobotinoAbc):
         self._wheels = tuple(Motor(name, f"wheel{number}_joint") for number in range(3))
         self._infrared = tuple(DistanceSensor(name, f"ir{number + 1}") for number in range(SENSORS))
         self._bumper = TouchSensor(name, "touch sensor")
+        self._camera = Camera(name, "camera")
+        self._depth_camera = RangeFinder(name, "depth camera")
+        self._cameras: set[Sensor] = set()  # those in use
         others = map(webots.name_of, robots)
         together = dict.fromkeys((name, webots.robot_name, *others))
         self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, period_ms)
@@ -102,6 +108,31 @@ class Robotino(RobotinoAbc):
             raise self._no_reading()
         return bool(self._bumper.value)
 
+    def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
+        """Enable the Camera `camera`, the RangeFinder `depth camera`, or both; they stay enabled.
+
+        Raises:
+            NoSuchSensor: the robot is connected and lacks one of them, or the simulator renders no images.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        for wanted, camera in ((color, self._camera), (depth, self._depth_camera)):
+            if wanted:
+                try:
+                    self.simulation.use(camera)
+                except WorldMisfit as misfit:
+                    raise NoSuchSensor(str(misfit)) from misfit
+                self._cameras.add(camera)
+
+    def color_image(self) -> NDArray[np.uint8]:
+        """Return what the camera sees, shape (height, width, 3), RGB; a view until the next step."""
+        self._require_use(self._camera, "color")
+        return self._camera.rgb
+
+    def depth_image(self) -> NDArray[np.float32]:
+        """Return meters for each pixel, shape (height, width); a view until the next step."""
+        self._require_use(self._depth_camera, "depth")
+        return self._depth_camera.depths
+
     def pose(self) -> Pose:
         """Return the true pose after the last step."""
         return Pose(*self.simulation.pose(self.definition))
@@ -122,6 +153,13 @@ class Robotino(RobotinoAbc):
     def close(self) -> None:
         """Drop all connections."""
         self.simulation.close()
+
+    def _require_use(self, camera: Sensor, name: str) -> None:
+        if camera not in self._cameras:
+            raise NoSuchSensor(
+                f"{self.definition}: its {name} camera is not in use; call use_cameras({name}=True), "
+                "then advance()"
+            )
 
     def _no_reading(self) -> NoReading:
         return NoReading(

@@ -4,7 +4,7 @@ They are shipped, not kept among the tests, because authors of environments and 
 """
 
 from palaestra_trainer.testing.conformance import NotConforming, check_robot, check_scene
-from palaestra_trainer.testing.fake import FakeRobotino, FakeScene, fake_arena
+from palaestra_trainer.testing.fake import FakeRobotino, FakeScene, fake_arena, fake_seeing
 
 __all__ = [
     "FakeRobotino",
@@ -13,4 +13,5 @@ __all__ = [
     "check_robot",
     "check_scene",
     "fake_arena",
+    "fake_seeing",
 ]

@@ -9,7 +9,7 @@ free floor on every side.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,8 @@ READINGS_STAND_STILL = "readings change in advance() only"
 ADVANCE_COUNTS = "advance() returns how many extra periods passed, an int not below 0"
 MOVEMENTS_MOVE = "each Movement moves the robot along its own axis, at about its speed"
 STOP_STOPS = "after two periods of STOP the robot stands"
-IMAGES_ARE_TYPED = "color_image() and depth_image() return an array or raise NoSuchSensor"
+COLORS_ARE_TYPED = "color_image() returns uint8 of shape (height, width, 3)"
+DEPTHS_ARE_TYPED = "depth_image() returns float32 of shape (height, width), no meters below 0"
 RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh readings"
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
@@ -131,13 +132,19 @@ def _check_twist(movement: Movement, seen: Twist, elapsed_s: float) -> None:
 
 
 def _check_images(robot: RobotinoAbc) -> None:
-    taken: tuple[Callable[[], NDArray[np.generic]], ...] = (robot.color_image, robot.depth_image)
-    for take in taken:
-        try:
-            image = take()
-        except NoSuchSensor:
-            continue
-        _require(image.ndim > 1, IMAGES_ARE_TYPED, image.shape)
+    """Check the images of the cameras that the robot has."""
+    with suppress(NoSuchSensor):
+        robot.use_cameras(color=True)
+        robot.advance()
+        image = robot.color_image()
+        typed = image.shape[2:] == (3,) and image.dtype == np.uint8
+        _require(typed, COLORS_ARE_TYPED, (image.shape, image.dtype))
+    with suppress(NoSuchSensor):
+        robot.use_cameras(depth=True)
+        robot.advance()
+        depths = robot.depth_image()
+        typed = len(depths.shape[1:]) == 1 and depths.dtype == np.float32
+        _require(typed and bool((depths >= 0.0).all()), DEPTHS_ARE_TYPED, (depths.shape, depths.dtype))
 
 
 def _drive_after_reset(

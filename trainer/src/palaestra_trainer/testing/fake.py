@@ -1,7 +1,8 @@
 """The arena and a Robotino in it, computed in this process.
 
 `fake_arena()` returns a robot and a scene for `MoveToTargetEnv` that run at some
-twenty thousand steps a second, for notebooks, tests and experiments with rewards. Its
+twenty thousand steps a second, for notebooks, tests and experiments with rewards.
+`fake_seeing()` is the same for `SeeTarget`: its robot has cameras. The
 physics are those that matter to the task: acceleration takes time, walls and cylinders
 stop the robot and let it slide, infrared has a range of 40 cm. It can die at given
 steps, as simulators do.
@@ -10,7 +11,7 @@ steps, as simulators do.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from palaestra_trainer.environments.arena import (
     HALF_SIDE_M,
     Point,
 )
-from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.errors import NoSuchSensor, SimulatorDead
 from palaestra_trainer.robots.base import (
     RADIUS_M,
     SENSOR_RANGE_M,
@@ -30,6 +31,7 @@ from palaestra_trainer.robots.base import (
     RobotinoAbc,
     Twist,
 )
+from palaestra_trainer.testing.fake_camera import look
 
 BASIC_STEP_S = 0.032
 BASIC_STEPS = 6  # in one control period
@@ -45,11 +47,20 @@ class FakeRobotino(RobotinoAbc):
         deaths: numbers of the `advance` calls, counted from 1 over its whole life, at
             which it dies; every call raises `SimulatorDead` from then until `restart`.
         name: its name in faults.
+        cameras: whether it has a color and a depth camera.
+
+    Attributes:
+        cylinders: x, y in meters of those on the floor.
+        target: x, y in meters of the pole that cameras see.
     """
 
-    def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
+    def __init__(self, deaths: Collection[int] = (), name: str = "fake", *, cameras: bool = False) -> None:
         self._deaths = frozenset(deaths)
         self._name = name
+        self._cameras = cameras
+        self._in_use: set[str] = set()
+        self.cylinders: Sequence[Point] = CYLINDERS
+        self.target: Point = (0.0, 0.0)
         self._steps = 0
         self._dead = False
         self._wanted: Twist
@@ -75,6 +86,21 @@ class FakeRobotino(RobotinoAbc):
         """Return the pose after the last step."""
         self._live()
         return Pose(self._x_m, self._y_m, self._heading_rad)
+
+    def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
+        """Let the chosen cameras have an image from the next `advance` on."""
+        self._live()
+        if not self._cameras:
+            super().use_cameras(color=color, depth=depth)
+        self._in_use |= {name for name, wanted in (("color", color), ("depth", depth)) if wanted}
+
+    def color_image(self) -> NDArray[np.uint8]:
+        """Return what the camera sees from the pose after the last step, a new array; see `fake_camera`."""
+        return self._look("color")[0]
+
+    def depth_image(self) -> NDArray[np.float32]:
+        """Return meters for each pixel from the pose after the last step, a new array."""
+        return self._look("depth")[1]
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
         """Set the wanted velocity."""
@@ -108,6 +134,17 @@ class FakeRobotino(RobotinoAbc):
         """Bring the robot back to life."""
         self._dead = False
 
+    def _look(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        self._live()
+        if not self._cameras:
+            raise self._no_camera(camera)
+        if camera not in self._in_use:
+            raise NoSuchSensor(
+                f"{self._name}: its {camera} camera is not in use; call use_cameras({camera}=True), "
+                "then advance()"
+            )
+        return look(self.pose(), self.target, self.cylinders)
+
     def _live(self) -> None:
         if self._dead:
             raise SimulatorDead(self._name, f"died at step {self._steps}; restart it")
@@ -128,7 +165,7 @@ class FakeRobotino(RobotinoAbc):
 
     def _slide(self) -> None:
         """Push the robot out of the obstacle that it hit; the rest of its motion is sliding."""
-        for x, y in CYLINDERS:
+        for x, y in self.cylinders:
             reach = CYLINDER_RADIUS_M + RADIUS_M
             distance = math.hypot(self._x_m - x, self._y_m - y)
             if distance < reach:
@@ -150,7 +187,7 @@ class FakeRobotino(RobotinoAbc):
         """Return meters from the robot's body to the nearest obstacle in this direction of the world."""
         ux, uy = math.cos(bearing_rad), math.sin(bearing_rad)
         nearest = min(_to_wall(self._x_m, ux), _to_wall(self._y_m, uy))
-        for x, y in CYLINDERS:
+        for x, y in self.cylinders:
             along = (x - self._x_m) * ux + (y - self._y_m) * uy
             aside = (x - self._x_m) * uy - (y - self._y_m) * ux
             if along > 0.0 and abs(aside) < CYLINDER_RADIUS_M:
@@ -159,22 +196,39 @@ class FakeRobotino(RobotinoAbc):
 
 
 class FakeScene:
-    """The scene of a `FakeRobotino`."""
+    """The scene of a `FakeRobotino`.
 
-    def __init__(self, robot: FakeRobotino) -> None:
+    Args:
+        robot: the robot.
+        cylinders: x, y in meters of those that stand on the floor after a reset.
+    """
+
+    def __init__(self, robot: FakeRobotino, cylinders: Sequence[Point] = CYLINDERS) -> None:
         self._robot = robot
+        self._cylinders = robot.cylinders = cylinders
         self.target: Point = (0.0, 0.0)
 
     def reset(self, seed: int, start: Pose, target: Point) -> None:
-        """Put the robot at rest at `start`."""
+        """Put the robot at rest at `start`, and the cylinders to their places."""
+        self._robot.cylinders = self._cylinders
+        self._robot.target = self.target = target
         self._robot.place(start, seed)
-        self.target = target
+
+    def raise_cylinders(self) -> None:
+        """Let the arena's cylinders stand on the floor until the next reset."""
+        self._robot.cylinders = CYLINDERS
 
 
 def fake_arena(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
     """Return a robot and its scene; see `FakeRobotino` for `deaths`."""
     robot = FakeRobotino(deaths)
     return robot, FakeScene(robot)
+
+
+def fake_seeing(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
+    """Return a robot with cameras and its scene, without cylinders; see `FakeRobotino` for `deaths`."""
+    robot = FakeRobotino(deaths, cameras=True)
+    return robot, FakeScene(robot, cylinders=())
 
 
 def wrapped(angle_rad: float) -> float:

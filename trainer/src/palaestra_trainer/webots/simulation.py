@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from palaestra_trainer.errors import Paused, SimulatorHung, WrongData
+from palaestra_trainer.errors import Paused, SimulatorFault, SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
 from palaestra_trainer.waiting.turns import let_others
 from palaestra_trainer.webots.devices import Motor, Sensor
@@ -48,11 +48,30 @@ class Simulation:
         self._sensors: list[Sensor] = []
         self._motors: list[Motor] = []
         self._tracked: dict[str, tuple[float, float, float] | None] = {}
+        self._connected = False
 
     def add(self, sensors: Sequence[Sensor], motors: Sequence[Motor]) -> None:
         """Add a robot's devices: its sensors are read at each step, its motors released at resets."""
         self._sensors += sensors
         self._motors += motors
+
+    def use(self, sensor: Sensor) -> None:
+        """Add a sensor unless it is there; if the simulator is connected, enable it for the next step.
+
+        Raises:
+            WorldMisfit: the robot lacks the sensor, or it cannot be enabled; it is not added.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        if sensor in self._sensors:
+            return
+        if self._connected:
+            try:
+                require_devices(sensor.robot, [sensor.device])
+                sensor.enable(self.period_ms)
+            except SimulatorFault:
+                sensor.close()
+                raise
+        self._sensors.append(sensor)
 
     def track(self, name: str) -> None:
         """Read the pose of the node with DEF `name` at each step, for `pose`."""
@@ -79,6 +98,7 @@ class Simulation:
         for sensor in self._sensors:
             sensor.enable(self.period_ms)
         self._release_motors()
+        self._connected = True
 
     def step(self) -> int:
         """Simulate one period and read every sensor; return the number of extra steps, normally 0.
@@ -115,6 +135,7 @@ class Simulation:
 
     def close(self) -> None:
         """Close all connections of steps, sensors and motors."""
+        self._connected = False
         parts: tuple[RosService | Sensor | Motor, ...] = (*self._steps, *self._sensors, *self._motors)
         for part in parts:
             part.close()

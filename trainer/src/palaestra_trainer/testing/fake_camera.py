@@ -1,0 +1,99 @@
+"""What the cameras of a `FakeRobotino` see, by geometry: the target's pole, cylinders, walls and floor.
+
+Everything stands upright on the floor. So a column of pixels looks along one direction over the floor, and
+the distance to each thing is computed once a column. A pixel sees the nearest thing that it meets between
+foot and top. Colors are flat: there is no light, no shadow and no noise, unlike in a simulator that renders.
+
+Camera, pole and colors are those of the shipped world `seeing`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_trainer.environments.arena import CYLINDER_RADIUS_M, HALF_SIDE_M, Point
+from palaestra_trainer.robots.base import Pose
+
+HEIGHT, WIDTH = 48, 64  # pixels
+FIELD_OF_VIEW_RAD = 1.0472  # horizontal
+FORWARD_M, ABOVE_M = 0.23, 0.3  # from the robot's center, from the floor
+RANGE_M = (0.05, 6.0)  # of the depth camera
+POLE_HEIGHT_M, POLE_RADIUS_M = 0.5, 0.05
+WALL_HEIGHT_M = 0.3
+CYLINDER_HEIGHT_M = 0.4
+
+SKY, FLOOR, WALL = (191, 209, 230), (217, 217, 209), (153, 140, 128)
+POLE, CYLINDER = (217, 26, 26), (51, 89, 179)
+
+Colors = NDArray[np.uint8]
+Depths = NDArray[np.float32]
+_Row = NDArray[np.floating[Any]]
+
+# The line of sight of a pixel, per meter forward: meters to the left by column, meters up by row.
+_FOCAL = 0.5 * WIDTH / math.tan(0.5 * FIELD_OF_VIEW_RAD)  # pixels
+_LEFT: _Row = (0.5 * WIDTH - 0.5 - np.arange(WIDTH)) / _FOCAL
+_UP: _Row = (0.5 * HEIGHT - 0.5 - np.arange(HEIGHT))[:, None] / _FOCAL
+_FLOOR_M: _Row = np.where(_UP < 0.0, ABOVE_M / np.maximum(-_UP, 1e-9), math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class _Thing:
+    """A thing as the columns of an image meet it: meters forward to it, its height and its color."""
+
+    forward_m: _Row
+    height_m: float
+    color: tuple[int, int, int]
+
+
+def look(pose: Pose, target: Point, cylinders: Sequence[Point]) -> tuple[Colors, Depths]:
+    """Return the color and the depth image of a robot at `pose`, both new.
+
+    Colors: shape (48, 64, 3), RGB. Depths: shape (48, 64), meters forward, infinite out of range.
+    """
+    depths = np.repeat(_FLOOR_M, WIDTH, axis=1)
+    colors = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+    colors[:] = np.where(_UP < 0.0, np.array(FLOOR, np.uint8), np.array(SKY, np.uint8))[:, None]
+    for thing in _things(pose, target, cylinders):
+        top_m = ABOVE_M + _UP * thing.forward_m  # infinite beside the thing, and so refused
+        seen = (thing.forward_m < depths) & (top_m >= 0.0) & (top_m <= thing.height_m)
+        np.copyto(depths, thing.forward_m, where=seen)
+        colors[seen] = thing.color
+    depths[(depths < RANGE_M[0]) | (depths > RANGE_M[1])] = math.inf
+    return colors, depths.astype(np.float32)
+
+
+def _things(pose: Pose, target: Point, cylinders: Sequence[Point]) -> Iterator[_Thing]:
+    c, s = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
+    eye = pose.x_m + FORWARD_M * c, pose.y_m + FORWARD_M * s
+    ways = c - s * _LEFT, s + c * _LEFT  # x and y per meter forward, by column
+    walls = np.minimum(_to_wall(eye[0], ways[0]), _to_wall(eye[1], ways[1]))
+    yield _Thing(walls, WALL_HEIGHT_M, WALL)
+    for x, y in cylinders:
+        yield _Thing(
+            _to_circle((x - eye[0], y - eye[1]), ways, CYLINDER_RADIUS_M), CYLINDER_HEIGHT_M, CYLINDER
+        )
+    pole = target[0] - eye[0], target[1] - eye[1]
+    yield _Thing(_to_circle(pole, ways, POLE_RADIUS_M), POLE_HEIGHT_M, POLE)
+
+
+def _to_wall(position_m: float, way: _Row) -> _Row:
+    """Return meters forward to the wall on the side to which each column looks."""
+    away = np.copysign(np.maximum(np.abs(way), 1e-9), way)
+    wall: _Row = (np.copysign(HALF_SIDE_M, way) - position_m) / away
+    return wall
+
+
+def _to_circle(middle: Point, ways: tuple[_Row, _Row], radius_m: float) -> _Row:
+    """Return meters forward to a circle on the floor, by column; infinite beside it and behind the camera."""
+    x, y = ways
+    squared = x**2 + y**2
+    along = (middle[0] * x + middle[1] * y) / squared
+    inside = radius_m**2 / squared - (middle[0] ** 2 + middle[1] ** 2) / squared + along**2
+    near = along - np.sqrt(np.maximum(inside, 0.0))
+    return np.where((inside > 0.0) & (near > 0.0), near, math.inf)
