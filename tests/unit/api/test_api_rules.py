@@ -116,6 +116,13 @@ BROKEN = {
             "set environment.options.actions: continuous"
         ),
     ),
+    "SAC with movements, for images": (
+        {"trainer.algorithm.name": "SAC", "trainer.environment.id": "SeeTarget-v0"},
+        (
+            "spec.trainer.algorithm.name: SAC needs continuous actions; "
+            "set environment.options.actions: continuous"
+        ),
+    ),
     "DQN with twists": (
         {"trainer.environment.options": {"actions": "continuous"}},
         "spec.trainer.algorithm.name: DQN needs discrete actions; set environment.options.actions: discrete",

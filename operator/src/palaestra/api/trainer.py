@@ -9,7 +9,7 @@ from palaestra.api.container import Environment, Resources
 from palaestra.api.fields import ENVIRONMENT_ID, Count, FreeObject, Image, Words
 from palaestra.api.model import ApiModel, Rule
 
-MOVE_TO_TARGET = "MoveToTargetEnv-v0"
+OWN_TASKS = frozenset({"MoveToTargetEnv-v0", "SeeTarget-v0"})
 
 
 class Reward(StrEnum):
@@ -152,8 +152,8 @@ class Checkpoint(ApiModel):
 
 
 def _actions(trainer: "Trainer") -> str | None:
-    """Return whether Palaestra's own task takes discrete or continuous actions; None for another task."""
-    if trainer.environment.id != MOVE_TO_TARGET:
+    """Return whether a task of Palaestra's takes discrete or continuous actions; None for another task."""
+    if trainer.environment.id not in OWN_TASKS:
         return None
     return str(trainer.environment.options.get("actions", "discrete"))
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from palaestra_sim.world import builtin, parse
+from palaestra_trainer.environments.arena import CYLINDER_NAMES, CYLINDERS
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.testing import fake_camera, fake_seeing
 from palaestra_trainer.testing.fake_camera import CYLINDER, FLOOR, POLE, SKY, WALL
@@ -24,7 +25,8 @@ def look():
     def images(pose, target, *, cylinders=False):
         scene.reset(0, pose, target)
         if cylinders:
-            scene.raise_cylinders()
+            for name, (x, y) in zip(CYLINDER_NAMES, CYLINDERS, strict=True):
+                scene.put(name, (x, y, 0.2))
         return robot.color_image(), robot.depth_image()
 
     return images

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palaestra_trainer.environments.options import Options, parse
+from palaestra_trainer.environments.options import Options, SeeOptions, parse, parse_as
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots import Movement
 
@@ -59,3 +59,26 @@ def test_all_mistakes_are_reported_at_once():
         "actions",
         "max_steps",
     ]
+
+
+def test_a_task_that_sees_has_options_of_its_own():
+    """And those of driving, with the same names and values."""
+    options = parse_as(SeeOptions, {"frames": 3, "cylinders": True, "movements": ["FORWARD"]})
+
+    assert options == SeeOptions(frames=3, cylinders=True, movements=(Movement.FORWARD,))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"frames": 2}, "frames: 2 is not a number of frames; use 1 or 3"),
+        ({"cylinders": "no"}, "cylinders: 'no' is neither true nor false; use one of them"),
+        ({"actions": "both"}, "actions: 'both' is not known; use discrete or continuous"),
+        ({"observe": ["target"]}, "observe: is not an option; use reward, movements, actions"),
+    ],
+    ids=lambda it: next(iter(it)) if isinstance(it, dict) else "",
+)
+def test_wrong_options_of_a_task_that_sees_are_refused_in_the_same_way(given, message):
+    """With fact and remedy, before a simulator is started."""
+    with pytest.raises(ConfigurationError, match=message):
+        parse_as(SeeOptions, given)

@@ -9,27 +9,27 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from palaestra_trainer.environments.options import Options
+from palaestra_trainer.environments.options import Driving
 from palaestra_trainer.robots.base import SPEED_M_S, TURN_RAD_S, Movement, Twist
 
 SCALE = (SPEED_M_S, SPEED_M_S, TURN_RAD_S)  # the velocity of 1 in a continuous action
 
 
-def action_space(options: Options) -> spaces.Space[Any]:
+def action_space(options: Driving) -> spaces.Space[Any]:
     """Return `Discrete(n)` for n movements, or a `Box` of shape (3,) within [-1, 1]."""
     if options.actions == "continuous":
         return spaces.Box(-1.0, 1.0, (len(SCALE),), np.float32)
     return spaces.Discrete(len(options.movements))
 
 
-def twist(action: Any, options: Options) -> Twist:
+def twist(action: Any, options: Driving) -> Twist:
     """Return the velocity of an action of `action_space(options)`, see `RobotinoAbc.drive`."""
     if options.actions == "continuous":
         return _scaled(action)
     return options.movements[int(action)].twist
 
 
-def nearest(wanted: Twist, options: Options) -> Any:
+def nearest(wanted: Twist, options: Driving) -> Any:
     """Return the action whose velocity is nearest to the wanted one."""
     if options.actions == "continuous":
         return np.clip(np.divide(wanted, SCALE), -1.0, 1.0).astype(np.float32)

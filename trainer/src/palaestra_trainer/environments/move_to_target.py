@@ -20,7 +20,7 @@ from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
 from palaestra_trainer.environments.arena import Point, chosen_task
 from palaestra_trainer.environments.observation import Situation
-from palaestra_trainer.environments.options import Options
+from palaestra_trainer.environments.options import Options, time_up_terminates
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
 from palaestra_trainer.robots.base import RobotinoAbc, Scene, Twist
 
@@ -195,7 +195,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
             "reward_terms": terms,
             "extra_steps": extra_steps,
         }
-        time_up, terminates = outcome is Outcome.TIME_UP, self.options.time_up_terminates
+        time_up, terminates = outcome is Outcome.TIME_UP, time_up_terminates(self.options)
         terminated = outcome.terminal or (time_up and terminates)
         return self._numbers_of(after), sum(terms.values()), terminated, time_up and not terminates, info
 

@@ -1,10 +1,10 @@
-"""The options of the task, which vary it without changes to its code."""
+"""The options of the tasks, which vary them without changes to their code."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from palaestra_trainer.environments.observation import PARTS
 from palaestra_trainer.environments.rewards import WEIGHTS
@@ -15,6 +15,38 @@ ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
 # `Sparse` has a reward for time-up, so its episode ends there. `Dense` does not: see docs/environments.md.
 TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
+
+
+FRAMES = (1, 3)
+
+
+class Driving(Protocol):
+    """The options of every task in which a robot drives to a target; see `Options`."""
+
+    @property
+    def reward(self) -> str:
+        """`Dense` or `Sparse`."""
+        ...
+
+    @property
+    def movements(self) -> Sequence[Movement]:
+        """The choices of a discrete action, in this order."""
+        ...
+
+    @property
+    def actions(self) -> str:
+        """`discrete` or `continuous`."""
+        ...
+
+    @property
+    def max_steps(self) -> int:
+        """Steps until time is up."""
+        ...
+
+    @property
+    def time_up(self) -> str | None:
+        """How an episode then ends; None: `TIME_UP_OF` the reward."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,27 +73,67 @@ class Options:
     time_up: str | None = None
 
     def __post_init__(self) -> None:
-        if mistakes := list(_mistakes(self)):
-            raise ConfigurationError("\n".join(mistakes))
+        _refuse((*_mistakes(self), *_mistakes_of_parts(self.observe)))
 
-    @property
-    def time_up_terminates(self) -> bool:
-        """Whether time-up ends the episode as terminated, so that a learner estimates no value beyond it."""
-        return (self.time_up or TIME_UP_OF[self.reward]) == "terminated"
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeeOptions:
+    """The options of `SeeTargetEnv`, checked.
+
+    Args:
+        reward: see `Options`.
+        movements: see `Options`.
+        actions: see `Options`.
+        max_steps: see `Options`.
+        time_up: see `Options`.
+        frames: the newest images in an observation, 1 or 3.
+        cylinders: whether the arena's four cylinders stand on the floor.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+
+    reward: str = "Dense"
+    movements: Sequence[Movement] = tuple(Movement)
+    actions: str = "discrete"
+    max_steps: int = 100
+    time_up: str | None = None
+    frames: int = 1
+    cylinders: bool = False
+
+    def __post_init__(self) -> None:
+        _refuse((*_mistakes(self), *_mistakes_of_images(self)))
+
+
+def time_up_terminates(options: Driving) -> bool:
+    """Return whether time-up ends an episode as terminated: a learner then estimates no value beyond it."""
+    return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
 
 def parse(given: Mapping[str, Any]) -> Options:
+    """Return the options of `MoveToTargetEnv` from the values in a job file.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+    return parse_as(Options, given)
+
+
+_Chosen = TypeVar("_Chosen", Options, SeeOptions)
+
+
+def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
     """Return options from the values in a job file, which has movements and parts by name.
 
     Raises:
         ConfigurationError: one line for every mistake.
     """
-    known = [field.name for field in fields(Options)]
+    known = [field.name for field in fields(kind)]
     if unknown := [name for name in given if name not in known]:
         raise ConfigurationError(
             "\n".join(f"{name}: is not an option; use {', '.join(known)}" for name in unknown)
         )
-    return Options(**{**given, "movements": _movements(given.get("movements", tuple(Movement)))})
+    return kind(**{**given, "movements": _movements(given.get("movements", tuple(Movement)))})
 
 
 def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
@@ -71,10 +143,14 @@ def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
     return tuple(known[it] if isinstance(it, str) else Movement(it) for it in given)
 
 
-def _mistakes(options: Options) -> Iterator[str]:
+def _refuse(mistakes: Sequence[str]) -> None:
+    if mistakes:
+        raise ConfigurationError("\n".join(mistakes))
+
+
+def _mistakes(options: Driving) -> Iterator[str]:
     if options.reward not in WEIGHTS:
         yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
-    yield from _mistakes_of_parts(options.observe)
     if options.actions not in ACTIONS:
         yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
     if not options.movements:
@@ -95,3 +171,11 @@ def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
         yield f"observe: is empty; choose from {', '.join(PARTS)}"
     if len(set(names)) < len(names):
         yield "observe: contains a part twice; name each once"
+
+
+def _mistakes_of_images(options: SeeOptions) -> Iterator[str]:
+    if options.frames not in FRAMES:
+        yield f"frames: {options.frames!r} is not a number of frames; use {' or '.join(map(str, FRAMES))}"
+    given: object = options.cylinders
+    if not isinstance(given, bool):
+        yield f"cylinders: {given!r} is neither true nor false; use one of them"

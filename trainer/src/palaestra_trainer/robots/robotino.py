@@ -214,6 +214,15 @@ class RobotinoScene:
         self.supervisor.stop_inertia(self._robot.definition)
         self._robot.advance()
 
+    def put(self, name: str, place: tuple[float, float, float]) -> None:
+        """Put the node with DEF `name` to x, y, z (meters) with the next step; a reset undoes it.
+
+        Raises:
+            SimulatorDead, SimulatorHung
+            WrongData: the world lacks the node, or the simulator refuses to move it.
+        """
+        self.supervisor.set_field(name, "translation", place)
+
 
 def wheel_speeds(vx: float, vy: float, omega: float) -> Sequence[float]:
     """Return the speeds in rad/s of rear, front-right and front-left wheel for a twist in m/s and rad/s."""

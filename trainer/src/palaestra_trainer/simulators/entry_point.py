@@ -1,13 +1,16 @@
-"""What `gymnasium.make` calls: the environment with the robot that it is given, or one that it finds."""
+"""What `gymnasium.make` calls: an environment with the robot that it is given, or one that it finds."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from palaestra_protocol.pod.terms import Role
+from palaestra_trainer.configuration import CONFIG_VARIABLE
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
-from palaestra_trainer.environments.options import parse
+from palaestra_trainer.environments.options import SeeOptions, parse, parse_as
+from palaestra_trainer.environments.see_target import SeeTargetEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
@@ -35,16 +38,70 @@ def make(
         ConfigurationError: an option is wrong, or no simulator with this role is left.
     """
     chosen = parse(options)
+    place = _place(robot, scene, simulator, role)
+    return MoveToTargetEnv(place.robot, place.scene, chosen, place.release)
+
+
+def make_seeing(
+    robot: RobotinoAbc | None = None,
+    scene: Scene | None = None,
+    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
+    role: str = Role.COLLECT,
+    **options: Any,
+) -> SeeTargetEnv:
+    """Return the environment for `gymnasium.make("SeeTarget-v0", ...)`.
+
+    Args:
+        robot: see `make`; it has a color camera.
+        scene: see `make`.
+        simulator: see `make`. `palaestra_trainer.testing.fake_seeing` needs no simulator.
+        role: see `make`. Without PALAESTRA_CONFIG no simulator is started: the stub renders no images.
+        options: see `SeeOptions`; names of movements are text.
+
+    Raises:
+        ConfigurationError: an option is wrong, or there is no simulator for it.
+        NoSuchSensor: the robot has no color camera.
+    """
+    chosen = parse_as(SeeOptions, options)
+    if (robot, scene, simulator) == (None, None, None) and not os.environ.get(CONFIG_VARIABLE):
+        raise ConfigurationError(
+            "simulator: SeeTarget-v0 was given none, and the stub renders no images; "
+            "give simulator=palaestra_trainer.testing.fake_seeing, or robot and scene"
+        )
+    place = _place(robot, scene, simulator, role)
+    try:
+        return SeeTargetEnv(place.robot, place.scene, chosen, place.release)
+    except BaseException:
+        if place.release is not None:
+            place.release()
+        raise
+
+
+class _Place(NamedTuple):
+    """Where an environment is played, and how it gives that back."""
+
+    robot: RobotinoAbc
+    scene: Scene
+    release: Callable[[], None] | None = None
+
+
+def _place(
+    robot: RobotinoAbc | None,
+    scene: Scene | None,
+    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None,
+    role: str,
+) -> _Place:
+    """Return the robot and scene that are given, made by `simulator`, or found with this role."""
     if (robot is None) != (scene is None):
         raise ConfigurationError("robot, scene: only one of them was given; give both or neither")
     if robot is not None and scene is not None:
-        return MoveToTargetEnv(robot, scene, chosen)
+        return _Place(robot, scene)
     if simulator is not None:
-        return MoveToTargetEnv(*simulator(), chosen)
+        return _Place(*simulator())
     from palaestra_trainer.simulators.configured import simulator_for  # noqa: PLC0415 - it needs ROS
 
     taken = simulator_for(_role(role))
-    return MoveToTargetEnv(taken.robot, taken.scene, chosen, taken.release)
+    return _Place(taken.robot, taken.scene, taken.release)
 
 
 def _role(name: str) -> Role:

@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.environments.arena import (
+    CYLINDER_NAMES,
     CYLINDER_RADIUS_M,
     CYLINDERS,
     HALF_SIDE_M,
     Point,
 )
-from palaestra_trainer.errors import NoSuchSensor, SimulatorDead
+from palaestra_trainer.errors import NoSuchSensor, SimulatorDead, WrongData
 from palaestra_trainer.robots.base import (
     RADIUS_M,
     SENSOR_RANGE_M,
@@ -205,18 +206,28 @@ class FakeScene:
 
     def __init__(self, robot: FakeRobotino, cylinders: Sequence[Point] = CYLINDERS) -> None:
         self._robot = robot
-        self._cylinders = robot.cylinders = cylinders
+        self._first = dict(zip(CYLINDER_NAMES, cylinders, strict=False))
+        self._standing = dict(self._first)
         self.target: Point = (0.0, 0.0)
+        robot.cylinders = tuple(cylinders)
 
     def reset(self, seed: int, start: Pose, target: Point) -> None:
         """Put the robot at rest at `start`, and the cylinders to their places."""
-        self._robot.cylinders = self._cylinders
+        self._standing = dict(self._first)
+        self._robot.cylinders = tuple(self._standing.values())
         self._robot.target = self.target = target
         self._robot.place(start, seed)
 
-    def raise_cylinders(self) -> None:
-        """Let the arena's cylinders stand on the floor until the next reset."""
-        self._robot.cylinders = CYLINDERS
+    def put(self, name: str, place: tuple[float, float, float]) -> None:
+        """Let a cylinder stand at x, y (meters) until the next reset.
+
+        Raises:
+            WrongData: it has another name than those in `CYLINDER_NAMES`.
+        """
+        if name not in CYLINDER_NAMES:
+            raise WrongData("fake", f"the world has no node DEF {name}")
+        self._standing[name] = place[:2]
+        self._robot.cylinders = tuple(self._standing.values())
 
 
 def fake_arena(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
