@@ -24,7 +24,7 @@ from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.telemetry.logs import configure_logs
-from palaestra_trainer.testing import fake_arena
+from palaestra_trainer.testing import fake_arena, fake_seeing
 
 
 class CountedResets(gymnasium.Wrapper[Any, Any, Any, Any]):
@@ -46,7 +46,8 @@ class FakeSimulator:
         self.log: list[str] = []
         self._hangs = 0 in deaths
         self._abandoned = threading.Event()
-        self.robot, self.scene = fake_arena(deaths)
+        sees = configuration.environment.id == "SeeTarget-v0"
+        self.robot, self.scene = (fake_seeing if sees else fake_arena)(deaths)
         self.env = CountedResets(make_environment(configuration.environment, self.robot, self.scene))
 
     @property

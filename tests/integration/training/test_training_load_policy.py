@@ -13,7 +13,7 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.simulators.keeper import Keeper
-from palaestra_trainer.testing import fake_arena
+from palaestra_trainer.testing import fake_arena, fake_seeing
 
 PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}
 
@@ -41,6 +41,21 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
         expected, _ = policy_of(trained).predict(observation, deterministic=True)
         assert np.array_equal(by_run.predict(observation)[0], expected)
         assert np.array_equal(by_zip.predict(observation)[0], expected)
+
+
+def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
+    """From a job with images to actions, with the small network."""
+    environment = {"id": "SeeTarget-v0", "options": {"frames": 3, "max_steps": 20}}
+    job = write_job(environment=environment, algorithm=PPO | {"cnn": "small"}, steps=128)
+    assert play(job)[0] == 0
+
+    policy = load_policy(tmp_path / "run")
+
+    made = gymnasium.make(policy.environment_id, simulator=fake_seeing, **policy.environment_options)
+    observation, _ = made.reset(seed=1)
+    assert observation.shape == (48, 64, 9)
+    assert made.action_space.contains(policy.predict(observation)[0])
+    assert type(policy.model.policy.features_extractor).__name__ == "SmallCnn"
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path):

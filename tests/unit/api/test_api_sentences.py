@@ -18,6 +18,8 @@ SENTENCES = [
     ({"trainer.algorithm.name": "TD3"},
      ('spec.trainer.algorithm.name: "TD3" is not an algorithm; '
      "use DQN, PPO, A2C, SAC or REINFORCE")),
+    ({"trainer.algorithm.cnn": "large"},
+     'spec.trainer.algorithm.cnn: "large" is not a cnn; use small'),
     ({"trainer.environment.reward": "dense"},
      'spec.trainer.environment.reward: "dense" is not a reward; use Dense or Sparse'),
     ({"trainer.imagePullPolicy": "Sometimes"},

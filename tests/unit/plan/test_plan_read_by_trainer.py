@@ -62,6 +62,14 @@ def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
     assert read_back(job).algorithm.normalize == read
 
 
+@pytest.mark.parametrize("cnn", ["small", None])
+def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
+    """A field that a job leaves out is absent, for trainers of older releases."""
+    job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"cnn": cnn} if cnn else {})})
+
+    assert read_back(job).algorithm.cnn == cnn
+
+
 def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
     """Memory is written in bytes: a trainer compares it with what the kernel says."""
     group = {

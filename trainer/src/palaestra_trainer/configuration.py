@@ -40,6 +40,7 @@ CONFIRM_EPISODES = 100  # with these, a rate of 95 % is known to within 4 %
 Positive = Annotated[int, Field(ge=1)]
 Reward = Literal["Dense", "Sparse"]
 Device = Literal["cpu", "cuda"]
+Cnn = Literal["small"]
 DEFAULT_REWARD: Reward = "Dense"
 
 
@@ -91,11 +92,13 @@ class Algorithm(_Section):
         name: a name in the table of algorithms.
         hyperparameters: values that differ from that table's defaults.
         normalize: which values are normalized; None: none.
+        cnn: the convolutional network for images; None: Stable-Baselines3's NatureCNN.
     """
 
     name: str = "DQN"
     hyperparameters: dict[str, Any] = Field(default_factory=dict)
     normalize: Normalize | None = None
+    cnn: Cnn | None = None
 
 
 class Evaluation(_Section):

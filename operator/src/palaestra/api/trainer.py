@@ -29,6 +29,12 @@ class AlgorithmName(StrEnum):
     REINFORCE = "REINFORCE"
 
 
+class Cnn(StrEnum):
+    """The convolutional networks for images besides Stable-Baselines3's own."""
+
+    SMALL = "small"
+
+
 class PullPolicy(StrEnum):
     """When a node pulls an image."""
 
@@ -106,6 +112,10 @@ class Algorithm(ApiModel):
 
     normalize: Normalize | None = None
     """Normalization of observations and rewards; `{}`: both; absent: neither."""
+
+    cnn: Cnn | None = Field(default=None, strict=False)
+    """Convolutional network for observations that are images. `small`: 16 and 32 channels and 128 units,
+    which trains about twice as fast; absent: Stable-Baselines3's NatureCNN."""
 
 
 class Evaluation(ApiModel):

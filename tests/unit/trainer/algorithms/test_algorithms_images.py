@@ -5,6 +5,9 @@ from __future__ import annotations
 import io
 import os
 import signal
+import subprocess
+import sys
+import textwrap
 import zipfile
 
 import numpy as np
@@ -15,6 +18,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor, NatureCNN
 
 from palaestra_trainer import checkpoint
 from palaestra_trainer.algorithms import make_model
+from palaestra_trainer.algorithms.small_cnn import SmallCnn
 from palaestra_trainer.configuration import Algorithm, Normalize
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
@@ -60,8 +64,8 @@ def make_seeing(make_member):
 def play(make_seeing, job, tmp_path):
     """Train into a folder; a signal comes at each of the steps `signals`, counted over one attempt."""
 
-    def run(folder, name, collectors=1, signal_at=0, normalize=None):
-        algorithm = {"name": name, "hyperparameters": HYPERPARAMETERS[name]}
+    def run(folder, name, collectors=1, signal_at=0, normalize=None, cnn=None):
+        algorithm = {"name": name, "hyperparameters": HYPERPARAMETERS[name], "cnn": cnn}
         steps = iter(range(1, 10_000))
 
         def make_members(given):
@@ -126,6 +130,87 @@ def test_images_get_the_policy_for_images(make_seeing, name, shape):
     extractors = [part for part in model.policy.modules() if isinstance(part, NatureCNN | FlattenExtractor)]
 
     assert {type(extractor) for extractor in extractors} == {NatureCNN}
+
+
+@pytest.mark.parametrize("name", sorted({*HYPERPARAMETERS, "SAC"}))
+@pytest.mark.parametrize(
+    ("shape", "layers"), [((ROWS, COLUMNS, 3), 3), ((20, 48, 9), 9)], ids=["1", "3 frames"]
+)
+def test_the_small_network_takes_the_place_of_the_large_one(make_seeing, name, shape, layers):
+    """In every algorithm, for one image or three, and for images that are too small for the large one."""
+    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0", shape))], run_seed=1)
+    if name == "SAC":
+        env.action_space = spaces.Box(-1.0, 1.0, (3,))
+    chosen = Algorithm(name=name, hyperparameters=HYPERPARAMETERS.get(name, {"buffer_size": 10}), cnn="small")
+
+    model = make_model(chosen, env, seed=1)
+
+    extractors = [part for part in model.policy.modules() if isinstance(part, NatureCNN | SmallCnn)]
+    assert {type(extractor) for extractor in extractors} == {SmallCnn}
+    assert [
+        tuple(layer.weight.shape[:2]) for layer in extractors[0].modules() if hasattr(layer, "weight")
+    ] == [
+        (16, layers),
+        (32, 16),
+        (128, extractors[0].layers[5].in_features),
+    ]
+
+
+def test_hyperparameters_change_the_small_network(make_seeing):
+    """`policy_kwargs` are those of the policy, as everywhere."""
+    env = SimulatorsVecEnv([Keeper(make_seeing("collect-0"))], run_seed=1)
+    policy_kwargs = {"net_arch": [32], "features_extractor_kwargs": {"features_dim": 64}}
+    hyperparameters = {**HYPERPARAMETERS["PPO"], "policy_kwargs": policy_kwargs}
+
+    model = make_model(Algorithm(name="PPO", hyperparameters=hyperparameters, cnn="small"), env, seed=1)
+
+    assert model.policy.features_dim == 64
+    assert model.policy.net_arch == [32]
+
+
+def test_a_run_with_the_small_network_resumes_as_others_do(play):
+    """To the last bit, although nothing of a checkpoint is unpickled."""
+    _, reference = play("whole", "PPO", cnn="small")
+    play("cut", "PPO", signal_at=28, cnn="small")
+
+    code, directory = play("cut", "PPO", cnn="small")
+
+    assert code == 0
+    assert outcome(directory) == outcome(reference)
+
+
+def test_stable_baselines3_loads_the_small_network_without_this_package(play):
+    """model.zip contains the class itself."""
+    _, directory = play("run", "PPO", cnn="small")
+    program = f"""
+        import sys
+        sys.modules["palaestra_trainer"] = None  # an import of it fails from now on
+        import numpy as np
+        from stable_baselines3 import PPO
+        model = PPO.load({str(directory.model)!r}, device="cpu")
+        action, _ = model.predict(np.zeros(({ROWS}, {COLUMNS}, 3), np.uint8))
+        print(type(model.policy.features_extractor).__name__, action)
+    """
+
+    result = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)],
+        check=True,
+        timeout=60,
+        capture_output=True,
+        text=True,
+    )
+
+    assert result.stdout.startswith("SmallCnn ")
+
+
+def test_a_network_for_images_is_refused_where_there_are_none(make_member):
+    """It would have no effect, and the job says otherwise."""
+    env = SimulatorsVecEnv([Keeper(make_member("collect-0"))], run_seed=1)
+
+    with pytest.raises(
+        ConfigurationError, match=r"algorithm\.cnn: has no effect, since the environment's obs"
+    ):
+        make_model(Algorithm(name="PPO", cnn="small"), env, seed=1)
 
 
 def test_a_run_on_images_that_began_at_a5276f3_keeps_its_policy(play):

@@ -1,4 +1,4 @@
-"""Image observations: their policy, and the order of their channels.
+"""Image observations: their policy with its network, and the order of their channels.
 
 Environments return images with channels last. Stable-Baselines3 transposes them for PyTorch, so its models
 see channels first. A checkpoint keeps them as environments return them.
@@ -14,31 +14,46 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 from stable_baselines3.common.vec_env import VecEnv, VecTransposeImage, is_vecenv_wrapped
 
-from palaestra_trainer.configuration import Normalize
+from palaestra_trainer.algorithms.small_cnn import SmallCnn
+from palaestra_trainer.configuration import Algorithm, Cnn
 from palaestra_trainer.errors import ConfigurationError
 
-SMALLEST = 36  # pixels per side that the convolutions of CnnPolicy need
+# Pixels per side that the convolutions of each network need.
+SMALLEST: dict[Cnn | None, int] = {None: 36, "small": 20}
 
 
-def policy_for(space: spaces.Box, normalize: Normalize | None) -> str:
+def policy_for(space: spaces.Box, algorithm: Algorithm) -> str:
     """Return the name of Stable-Baselines3's policy for observations of a space.
 
     Raises:
-        ConfigurationError: they are images that CnnPolicy cannot take.
+        ConfigurationError: they are images that CnnPolicy cannot take, or no images for `cnn`.
     """
     if not is_image_space(space):
+        if algorithm.cnn:
+            raise ConfigurationError(
+                "algorithm.cnn: has no effect, since the environment's observation is no image; remove it"
+            )
         return "MlpPolicy"
-    if normalize and normalize.observations:
+    if algorithm.normalize and algorithm.normalize.observations:
         raise ConfigurationError(
             "algorithm.normalize.observations: CnnPolicy scales images itself; set it to false"
         )
     sides = space.shape[1:] if is_image_space_channels_first(space) else space.shape[:2]
-    if min(sides) < SMALLEST:
+    smallest = SMALLEST[algorithm.cnn]
+    if min(sides) < smallest:
         raise ConfigurationError(
             f"environment.id: its images have {sides[0]} x {sides[1]} pixels, and CnnPolicy needs "
-            f"{SMALLEST} x {SMALLEST}; make them larger, or flatten them"
+            f"{smallest} x {smallest}; make them larger, or flatten them"
         )
     return "CnnPolicy"
+
+
+def with_network(policy_kwargs: dict[str, Any], cnn: Cnn | None) -> dict[str, Any]:
+    """Return the policy's arguments with the network for images that the algorithm names."""
+    if cnn is None:
+        return policy_kwargs
+    # As with NatureCNN, nothing is between features and outputs unless `net_arch` names layers.
+    return {"net_arch": [], **policy_kwargs, "features_extractor_class": SmallCnn}
 
 
 def with_channels_first(env: VecEnv) -> VecEnv:

@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_trainer.algorithms import values
 from palaestra_trainer.algorithms.device import usable
-from palaestra_trainer.algorithms.images import policy_for, with_channels_first
+from palaestra_trainer.algorithms.images import policy_for, with_channels_first, with_network
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
@@ -180,8 +180,9 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
             "give it one Box, e.g. by gymnasium's FlattenObservation"
         )
     given = with_defaults(algorithm, {}).hyperparameters
-    policy = given.pop("policy", None) or policy_for(env.observation_space, algorithm.normalize)
+    policy = given.pop("policy", None) or policy_for(env.observation_space, algorithm)
     chosen = values.arguments(entry.cls, given)
+    chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)
     if "target_update_interval" in chosen:
         # A vector step is num_envs steps: the target can't be updated more often than that.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
