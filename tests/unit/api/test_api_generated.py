@@ -18,6 +18,7 @@ EXAMPLES = [
     "move-to-target",
     "move-to-target-mujoco",
     "reinforce",
+    "see-target",
     "sparse-reward",
     "standby",
     "tiny",
