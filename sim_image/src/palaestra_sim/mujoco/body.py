@@ -55,7 +55,8 @@ class MujocoBody:
 
     def bits(self, outline: Sequence[Shape]) -> int:
         """Return the parts of the body that these shapes are, as bits of `touched`."""
-        return sum(1 << index for index, shape in enumerate(self.build.outline) if shape in outline)
+        parts = (*self.build.outline, *(shape for link in self.build.links for shape in link.shapes))
+        return sum(1 << index for index, shape in enumerate(parts) if shape in outline)
 
     def place(self, x: float, y: float, heading_rad: float) -> None:
         """Place the robot somewhere; its motion continues."""
@@ -102,12 +103,12 @@ class MujocoBody:
 
 
 _RESERVE: Final = 2.0  # of the force for the largest acceleration: a servo that lags must catch up
-_GAIN: Final = 500.0  # in 1/s: a servo reaches its speed within a substep of 4 ms or two
+GAIN: Final = 500.0  # in 1/s: a servo reaches its speed within a substep of 4 ms or two
 
 
 def servo(axis: int, inertia: float) -> tuple[float, float]:
     """Return gain and largest force of the servo along an axis, for a mass in kg or an inertia in kg m2."""
-    return _GAIN * inertia, _RESERVE * ACCELERATIONS[axis] * inertia
+    return GAIN * inertia, _RESERVE * ACCELERATIONS[axis] * inertia
 
 
 def _reach(shape: Shape) -> float:

@@ -1,44 +1,46 @@
-"""From the robots and shapes of a world to MuJoCo's model.
+"""From the robots, shapes and links of a world to MuJoCo's model.
 
 A robot is one body on three joints, an obstacle a body without joints. Which of them meet is decided by
-heights, as in the stub: what a robot drives over or under does not touch it. MuJoCo has 32 bits for that, one
-for each robot and three for all.
+heights, as in the stub: what a robot drives over or under does not touch it.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from palaestra_sim.mujoco.body import MujocoBody, servo
+from palaestra_sim.mujoco.geoms import (
+    FRICTION,
+    LOOSE,
+    ROBOTS,
+    SEEN,
+    STANDING,
+    UNSEEN,
+    Marks,
+    Touch,
+    add_geom,
+    own_bit,
+    put,
+    spread,
+)
 from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.links import Added, Ground, LinkBody, add_links, bodies
 from palaestra_sim.mujoco.loose import LooseBody
-from palaestra_sim.scene.geometry import Pose, to_quaternion
+from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
 
-SEEN: Final = 0  # the group of geoms that rays and contacts meet
 MASS_KG: Final = 23.0  # of a robot: a Robotino 3 with its batteries
 STANDING_KG: Final = 1e5  # of one that nothing drives: it stands like a wall
-_ROBOTS: Final = 1 << 0  # all robots touch each other
-_LOOSE: Final = 1 << 1  # loose things touch each other and robots
-_STANDING: Final = 1 << 2  # and whatever stands
-_FIRST_ROBOT: Final = 3
-_BITS: Final = 32
-_LEAST_M3: Final = 1e-9
-_FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
-
-_GEOMS: Final = {
-    "box": mujoco.mjtGeom.mjGEOM_BOX,
-    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
-    "ball": mujoco.mjtGeom.mjGEOM_SPHERE,
-}
+_LEAST_KG: Final = 1e-6
+_LEAST_KG_M2: Final = 1e-9
 
 
 @dataclass(slots=True, eq=False)
@@ -48,8 +50,10 @@ class Built:
     Attributes:
         figures: each robot that moves, with its body and the number of this in the model.
         geoms: by number, the shapes that are obstacles or outlines, with the body of a robot's.
-        stands: the number of the body of each place that has obstacles.
+        stands: the number of the body of each place that has obstacles, or links mounted on it.
         loose: the loose things.
+        links: what is on joints, by the robot; None: those on no robot.
+        own_geoms: the numbers of the geoms on them.
     """
 
     model: Any
@@ -58,26 +62,45 @@ class Built:
     geoms: dict[int, tuple[Shape, MujocoBody | None, int]]
     stands: dict[Place, int]
     loose: tuple[LooseBody, ...]
+    links: dict[Figure | None, tuple[LinkBody, ...]]
+    own_geoms: dict[Figure | None, list[int]]
 
     def body_of(self, figure: Figure) -> int:
         """Return the number of a robot's body; -1 if it has none."""
         found = self.figures.get(figure)
         return -1 if found is None else found[1]
 
+    @contextmanager
+    def unseen(self, figure: Figure) -> Iterator[None]:
+        """Let rays pass the links of a robot meanwhile."""
+        own = self.own_geoms.get(figure)
+        if own is None:
+            yield
+            return
+        self.model.geom_group[own] = UNSEEN
+        yield
+        self.model.geom_group[own] = SEEN
+
     def put_obstacles(self) -> None:
         """Put the obstacles where their places are now."""
         for place, number in self.stands.items():
             mocap = self.model.body_mocapid[number]
-            _put(self.data.mocap_pos[mocap], self.data.mocap_quat[mocap], place.ground_pose)
+            put(self.data.mocap_pos[mocap], self.data.mocap_quat[mocap], place.ground_pose)
         for figure, (_, number) in self.figures.items():
             self.model.body_pos[number][2] = figure.place.height_m
 
-    def put_loose(self) -> bool:
-        """Take what clients did to loose things; return whether they did anything."""
+    def take(self) -> bool:
+        """Take what clients did to loose things and joints; return whether they did anything."""
         changed = [thing for thing in self.loose if thing.place.put or thing.place.speed is not None]
         for thing in changed:
             thing.take()
-        return bool(changed)
+        moved = [link for link in self.all_links() if link.take()]
+        return bool(changed or moved)
+
+    def all_links(self) -> Iterator[LinkBody]:
+        """Yield the links of all robots, and those of none."""
+        for links in self.links.values():
+            yield from links
 
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Let a force act on a robot or a loose thing until the forces are cleared."""
@@ -94,87 +117,132 @@ class Built:
         mujoco.mj_kinematics(self.model, self.data)
 
 
-def build(figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> Built:
-    """Return the model of these robots, obstacles and loose things, in their present state."""
-    courses = [thing.place.course for thing in loose]  # of the model before, if there was one
-    spec = mujoco.MjSpec()
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    moving = [(it, it.body) for it in figures if isinstance(it.body, MujocoBody)]
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=_STANDING, conaffinity=0, friction=_FRICTION
-    )
-    marks: list[tuple[Any, Shape, MujocoBody | None, int]] = []
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contents:
+    """What a model is made of; see `Physics.arrange`."""
+
+    figures: tuple[Figure, ...] = ()
+    solids: tuple[Shape, ...] = ()
+    loose: tuple[Loose, ...] = ()
+    doors: tuple[Link, ...] = ()
+
+    @property
+    def moving(self) -> list[tuple[Figure, MujocoBody]]:
+        """The robots that have bodies."""
+        return [(it, it.body) for it in self.figures if isinstance(it.body, MujocoBody)]
+
+
+def build(contents: Contents) -> Built:
+    """Return the model of robots, obstacles, loose things and links, in their present state."""
+    courses = [thing.place.course for thing in contents.loose]  # of the model before, if there was one
+    spec, marks, moving = _spec(), Marks(), contents.moving
+    solids = contents.solids
     stands = {
         place: _add_obstacle(spec, [shape for shape in solids if shape.place is place], moving, marks)
         for place in dict.fromkeys(shape.place for shape in solids)
     }
-    robots = {
-        figure: (body, _add_robot(spec, figure, body, index, marks))
-        for index, (figure, body) in enumerate(moving)
-    }
-    things = [_add_loose(spec, thing, marks) for thing in loose]
+    robots = {figure: _add_robot(spec, figure, body, at, marks) for at, (figure, body) in enumerate(moving)}
+    things = {thing: _add_loose(spec, thing, marks) for thing in contents.loose}
+    roots = {figure.place: body for figure, body in robots.items()}
+    roots.update((thing.place, body) for thing, body in things.items())
+    links = _add_all_links(Ground(spec, roots, stands), contents, marks)
     model = spec.compile()
     data = mujoco.MjData(model)
     built = Built(
         model=model,
         data=data,
-        figures={figure: (body, added.id) for figure, (body, added) in robots.items()},
-        geoms={geom.id: (shape, body, bit) for geom, shape, body, bit in marks},
+        figures={figure: (body, robots[figure].id) for figure, body in moving},
+        geoms={geom.id: (shape, body, bit) for geom, shape, body, bit in marks.entries},
         stands={place: added.id for place, added in stands.items()},
-        loose=tuple(
-            LooseBody(thing.place, model, data, added.id) for thing, added in zip(loose, things, strict=True)
-        ),
+        loose=tuple(LooseBody(it.place, model, data, added.id) for it, added in things.items()),
+        links=bodies(links, model, data),
+        own_geoms={
+            whose: [geom.id for it in some for geom in it.body.geoms] for whose, some in links.items()
+        },
     )
-    built.put_obstacles()
-    for index, (_, body) in enumerate(moving):
-        part = slice(3 * index, 3 * index + 3)
-        body.attach(built.data.qpos[part], built.data.qvel[part], built.data.ctrl[part])
+    _begin(built)
     for thing, course in zip(built.loose, courses, strict=True):
         thing.begin(course)
+    built.take()
     built.settle()
     return built
+
+
+def _spec() -> Any:
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.compiler.balanceinertia = True  # Webots takes any matrix
+    spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=STANDING, conaffinity=0, friction=FRICTION
+    )
+    return spec
+
+
+def _add_all_links(ground: Ground, contents: Contents, marks: Marks) -> dict[Figure | None, list[Added]]:
+    bodies_of = dict(contents.moving)
+    added: dict[Figure | None, list[Added]] = {
+        figure: add_links(ground, figure.links, marks, bodies_of.get(figure))
+        for figure in contents.figures
+        if figure.links
+    }
+    if contents.doors:
+        added[None] = add_links(ground, contents.doors, marks, None)
+    return added
+
+
+def _begin(built: Built) -> None:
+    """Put obstacles and robots where they are; what is on a robot makes its servos stronger."""
+    built.put_obstacles()
+    model, data = built.model, built.data
+    for figure, (body, number) in built.figures.items():
+        joints = model.body_jntadr[number]
+        at, dof = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        servos = slice(3 * list(built.figures).index(figure), 3 * list(built.figures).index(figure) + 3)
+        if figure.links:
+            for axis, inertia in enumerate(model.dof_M0[dof : dof + 3].tolist()):
+                gain, force = servo(axis, inertia)
+                model.actuator_gainprm[servos][axis, 0] = gain
+                model.actuator_biasprm[servos][axis, 2] = -gain
+                model.actuator_forcerange[servos][axis] = -force, force
+        body.attach(data.qpos[at : at + 3], data.qvel[dof : dof + 3], data.ctrl[servos])
 
 
 def _add_obstacle(
     spec: Any,
     shapes: Iterable[Shape],
     robots: Sequence[tuple[Figure, MujocoBody]],
-    marks: list[tuple[Any, Shape, MujocoBody | None, int]],
+    marks: Marks,
 ) -> Any:
-    added = spec.worldbody.add_body(mocap=True)  # MuJoCo looks at the pose of others once
+    # MuJoCo looks at the pose of bodies without mocap once.
+    added = spec.worldbody.add_body(mocap=True, name=f"stand {len(marks.entries)}")
     for shape in shapes:
         low, high = shape.heights()
-        bits = _STANDING
+        bits = STANDING
         for index, (figure, body) in enumerate(robots):
             height = figure.place.height_m
             bottom, top = body.build.heights
             if low < top + height and bottom + height < high:
-                bits |= _own_bit(index)
-        marks.append((_add_geom(added, shape, shape.local, contype=bits, conaffinity=0), shape, None, 0))
+                bits |= own_bit(index)
+        marks.note(add_geom(added, shape, shape.local, Touch(bits, 0)), shape)
     return added
 
 
-def _add_loose(spec: Any, thing: Loose, marks: list[tuple[Any, Shape, MujocoBody | None, int]]) -> Any:
-    added = spec.worldbody.add_body()
+def _add_loose(spec: Any, thing: Loose, marks: Marks) -> Any:
+    added = spec.worldbody.add_body(name=f"loose {len(marks.entries)}")
     added.add_freejoint()
     frame = thing.place.ground_pose.inverse
-    geoms = [
-        _add_geom(added, shape, frame.after(shape.pose), contype=_LOOSE, conaffinity=_STANDING | _LOOSE)
-        for shape in thing.shapes
-    ]
-    density = thing.density
+    touch = Touch(LOOSE, STANDING | LOOSE)
+    geoms = [add_geom(added, shape, frame.after(shape.pose), touch) for shape in thing.shapes]
     if thing.mass_kg is not None:
-        density = thing.mass_kg / max(sum(map(_volume_m3, thing.shapes)), _LEAST_M3)
+        spread(thing.mass_kg, thing.shapes, geoms)
     for geom, shape in zip(geoms, thing.shapes, strict=True):
-        geom.density = density
-        marks.append((geom, shape, None, 0))
+        if thing.mass_kg is None:
+            geom.density = thing.density
+        marks.note(geom, shape)
     return added
-
-
-def _volume_m3(shape: Shape) -> float:
-    x, y, z = shape.size
-    return x * y * z * {"box": 1.0, "cylinder": math.pi / 4.0, "ball": math.pi / 6.0}[shape.kind]
 
 
 def _add_robot(
@@ -182,9 +250,9 @@ def _add_robot(
     figure: Figure,
     body: MujocoBody,
     index: int,
-    marks: list[tuple[Any, Shape, MujocoBody | None, int]],
+    marks: Marks,
 ) -> Any:
-    added = spec.worldbody.add_body(pos=[0.0, 0.0, figure.place.height_m])
+    added = spec.worldbody.add_body(pos=[0.0, 0.0, figure.place.height_m], name=f"base {index}")
     added.explicitinertial = True
     mass = STANDING_KG if body.base.drive is None else MASS_KG
     added.mass = mass
@@ -204,33 +272,7 @@ def _add_robot(
             forcerange=[-force, force],
         )
         actuator.set_to_velocity(kv=gain)
-    own = _own_bit(index)
+    touch = Touch(ROBOTS, own_bit(index) | ROBOTS | LOOSE)
     for number, (shape, pose) in enumerate(zip(body.build.outline, body.poses, strict=True)):
-        geom = _add_geom(added, shape, pose, contype=_ROBOTS, conaffinity=own | _ROBOTS | _LOOSE)
-        marks.append((geom, shape, body, 1 << number))
+        marks.note(add_geom(added, shape, pose, touch), shape, body, 1 << number)
     return added
-
-
-def _add_geom(body: Any, shape: Shape, pose: Pose, *, contype: int, conaffinity: int) -> Any:
-    half = [length / 2.0 for length in shape.size]
-    size = {"box": half, "cylinder": [half[0], half[2], 0.0], "ball": [half[0], 0.0, 0.0]}[shape.kind]
-    geom = body.add_geom(
-        type=_GEOMS[shape.kind],
-        size=size,
-        contype=contype,
-        conaffinity=conaffinity,
-        friction=_FRICTION,
-        group=SEEN,
-    )
-    _put(geom.pos, geom.quat, pose)
-    return geom
-
-
-def _own_bit(index: int) -> int:
-    return 1 << min(_FIRST_ROBOT + index, _BITS - 2)
-
-
-def _put(position: Any, quaternion: Any, pose: Pose) -> None:
-    position[:] = pose.position
-    x, y, z, w = to_quaternion(pose.rotation)
-    quaternion[:] = np.array((w, x, y, z))

@@ -13,13 +13,14 @@ from typing import Final
 from palaestra_sim.mujoco.body import MujocoBody
 from palaestra_sim.mujoco.eye import MujocoEye
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.mujoco.model import Built, build
+from palaestra_sim.mujoco.model import Built, Contents, build
 from palaestra_sim.mujoco.pictures import Pictures
 from palaestra_sim.mujoco.rays import Beams
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
@@ -32,13 +33,11 @@ LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
 class MujocoPhysics:
     """The motion of one world; see `Physics`."""
 
-    abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True)
+    abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
 
     def __init__(self) -> None:
-        self._figures: tuple[Figure, ...] = ()
-        self._solids: tuple[Shape, ...] = ()
-        self._loose: tuple[Loose, ...] = ()
-        self._built: Built = build((), (), ())
+        self._contents = Contents()
+        self._built: Built = build(self._contents)
         self._settled = True
         self._pushes: list[tuple[Figure | Loose, Push]] = []
         self._pictures: Pictures | None = None
@@ -47,14 +46,22 @@ class MujocoPhysics:
         """Return the body of a robot that is being read."""
         return MujocoBody(build)
 
-    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> None:
-        """Take these robots, obstacles and loose things as the contents of the world, where they are now."""
-        contents = tuple(figures), tuple(solids), tuple(loose)
-        if contents == (self._figures, self._solids, self._loose):
+    def arrange(
+        self,
+        figures: Sequence[Figure],
+        solids: Sequence[Shape],
+        loose: Sequence[Loose],
+        doors: Sequence[Link] = (),
+    ) -> None:
+        """Take these robots, obstacles, loose things and doors as the contents of the world."""
+        contents = Contents(
+            figures=tuple(figures), solids=tuple(solids), loose=tuple(loose), doors=tuple(doors)
+        )
+        if contents == self._contents:
             self._built.put_obstacles()
         else:
-            self._figures, self._solids, self._loose = contents
-            self._built = build(*contents)
+            self._contents = contents
+            self._built = build(contents)
         self._settled = False
 
     def advance(self, step_s: float) -> None:
@@ -62,17 +69,22 @@ class MujocoPhysics:
         built = self._built
         steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
         built.model.opt.timestep = step_s / steps
-        built.put_loose()
+        built.take()
         for target, push in self._pushes:
             built.push(target, push)
         for figure, (body, _) in built.figures.items():
             body.command(step_s, powered=figure.powered)
+        for whose, links in built.links.items():
+            for link in links:
+                link.command(step_s, powered=whose is None or whose.powered)
         for _ in range(steps):
             mujoco.mj_step(built.model, built.data)
             if built.data.ncon:
                 self._feel()
         for body, _ in built.figures.values():
             body.follow(step_s)
+        for link in built.all_links():
+            link.follow()
         if self._pushes:
             self._pushes.clear()
             built.data.xfrc_applied[:] = 0.0
@@ -85,6 +97,8 @@ class MujocoPhysics:
         self._pushes.clear()
         for body, _ in self._built.figures.values():
             body.write()
+        for link in self._built.all_links():
+            link.forget()
         self._settled = False
 
     def look(self, figure: Figure, beams: Sequence[Beam]) -> Cast:
@@ -130,7 +144,7 @@ class MujocoPhysics:
                     found[1].touched |= found[2]
 
     def _settle(self) -> None:
-        if self._built.put_loose() or not self._settled:
+        if self._built.take() or not self._settled:
             self._built.settle()
             self._settled = True
 

@@ -9,8 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from palaestra_sim.mujoco.geoms import SEEN
 from palaestra_sim.mujoco.library import mujoco
-from palaestra_sim.mujoco.model import SEEN, Built
+from palaestra_sim.mujoco.model import Built
 from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.physics import Figure
 
@@ -44,8 +45,9 @@ class Beams:
         origins = self._origins @ turned.T + pose.position
         directions = self._directions @ turned.T
         own = built.body_of(self._figure)
-        for first, end in self._bundles:
-            self._cast(built, origins[first], directions[first:end].ravel(), own, slice(first, end))
+        with built.unseen(self._figure):
+            for first, end in self._bundles:
+                self._cast(built, origins[first], directions[first:end].ravel(), own, slice(first, end))
         distances = self._distances
         missed = (distances < 0.0) | (distances > self._reach)
         travelled: list[float] = np.where(missed, self._reach, distances).tolist()

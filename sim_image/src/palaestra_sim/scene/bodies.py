@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from palaestra_sim.scene.base import Base
+from palaestra_sim.scene.links import Link
+from palaestra_sim.scene.matter import Matter
 from palaestra_sim.scene.shapes import Shape
 
 
@@ -18,11 +20,15 @@ class Build:
         base: its wheels.
         outline: the shapes with which it runs into things, in its own frame.
         heights: z of the lower and upper end of the body, in its own frame.
+        links: what moves on its joints by forces; empty in a physics without such joints.
+        matter: the masses of what is on no link.
     """
 
     base: Base
     outline: Sequence[Shape]
     heights: tuple[float, float]
+    links: Sequence[Link] = ()
+    matter: Sequence[Matter] = ()
 
 
 class Body(Protocol):

@@ -8,10 +8,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Final, NamedTuple
 
 from palaestra_sim.scene.geometry import AxisAngle, Pose, Vector, from_axis_angle, to_axis_angle, turn
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.places import Place
+
+
+class Rubbing(NamedTuple):
+    """What resists the motion of a joint; of a slider in N instead of N m, and in m instead of rad.
+
+    Attributes:
+        damping: in N m s/rad.
+        friction: in N m; a motor that acts overcomes it.
+        spring: in N m/rad, toward position 0.
+    """
+
+    damping: float = 0.0
+    friction: float = 0.0
+    spring: float = 0.0
+
+
+FREE: Final = Rubbing()
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -23,8 +41,12 @@ class Joint:
         anchor: a point on the axis of a hinge, in meters.
         slides: whether it is a slider.
         start: the position in the file, in rad or m.
-        motor: that moves it; None: it stays where it is put.
+        motor: that moves it; None: it stays where it is put, unless a physics moves it.
+        stops: the positions that it never passes; equal ones: no stops.
+        rubbing: what resists its motion.
         position: where a joint without a motor is, in rad or m.
+        speed: of a joint without a motor, in rad/s or m/s.
+        brake: the damping by the brake of a joint without a motor, in N m s/rad.
     """
 
     axis: Vector
@@ -32,7 +54,11 @@ class Joint:
     slides: bool = False
     start: float = 0.0
     motor: Motor | None = None
+    stops: tuple[float, float] = (0.0, 0.0)
+    rubbing: Rubbing = FREE
     position: float = field(init=False)
+    speed: float = field(init=False, default=0.0)
+    brake: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
         self.position = self.start
@@ -42,10 +68,31 @@ class Joint:
         """Its position, in rad or m."""
         return self.position if self.motor is None else self.motor.angle_rad
 
+    @property
+    def turning(self) -> float:
+        """Its speed, in rad/s or m/s."""
+        return self.speed if self.motor is None else self.motor.speed_rad_s
+
+    @property
+    def braking(self) -> float:
+        """The damping by its brake, in N m s/rad."""
+        return self.brake if self.motor is None else self.motor.damping
+
+    def follow(self, position: float, speed: float) -> None:
+        """Take position and speed from a physics."""
+        if self.motor is None:
+            self.position, self.speed = position, speed
+        else:
+            self.motor.angle_rad, self.motor.speed_rad_s = position, speed
+
+    def halt(self) -> None:
+        """Stop its motion."""
+        self.follow(self.now, 0.0)
+
     def put(self, position: float) -> None:
         """Put it to a position, at rest there; a motor holds it, as in Webots."""
         if self.motor is None:
-            self.position = position
+            self.position, self.speed = position, 0.0
         else:
             self.motor.put(position)
 
@@ -71,6 +118,11 @@ class JointPlace(Place):
     def __init__(self, parent: Place | None, translation: Vector, rotation: AxisAngle, joint: Joint) -> None:
         super().__init__(parent, translation, rotation)
         self.joint = joint
+
+    @property
+    def start(self) -> Pose:
+        """The frame in the parent's, at the position of the joint in the world file."""
+        return Pose(self._translation, from_axis_angle(self._rotation))
 
     @property
     def pose(self) -> Pose:
@@ -99,6 +151,7 @@ class JointPlace(Place):
         """Put the joint back; its motor returns to its start by itself."""
         if self.joint.motor is None:
             self.joint.put(self.joint.start)
+            self.joint.brake = 0.0
 
 
 def unit(vector: Vector) -> Vector | None:

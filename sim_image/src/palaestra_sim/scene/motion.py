@@ -32,9 +32,8 @@ def motion_of(place: Place, body: Body | None) -> Motion:
         turning = (0.0, 0.0, omega)
         velocity = _sum((vx, vy, 0.0), _cross(turning, (point[0] - body.x, point[1] - body.y, 0.0)))
     for link in place.chain():
-        motor = link.joint.motor if isinstance(link, JointPlace) else None
-        if motor is not None and isinstance(link, JointPlace) and motor.speed_rad_s:
-            added = _of_joint(link, motor.speed_rad_s, point)
+        if isinstance(link, JointPlace) and link.joint.turning:
+            added = _of_joint(link, link.joint.turning, point)
             velocity, turning = _sum(velocity, added.velocity), _sum(turning, added.turning)
     return Motion(place.from_ground(velocity), place.from_ground(turning))
 

@@ -46,6 +46,9 @@ class Motor:
         angle_rad: of the shaft, since the start or the last reset.
         changed: whether a command came since the physics looked; the physics sets it back.
         damping: of the joint, in N m s/rad, set by its brake; 0 without one.
+        forceful: whether the physics moves it by forces.
+        effort_nm: the torque that a client set in place of a position; None: none.
+        feedback_nm: the torque with which it acted in the last basic step.
     """
 
     __slots__ = (
@@ -54,6 +57,9 @@ class Motor:
         "available_torque_nm",
         "changed",
         "damping",
+        "effort_nm",
+        "feedback_nm",
+        "forceful",
         "spec",
         "speed_rad_s",
         "target_rad",
@@ -62,6 +68,7 @@ class Motor:
 
     def __init__(self, spec: MotorSpec) -> None:
         self.spec = spec
+        self.forceful = False
         self.reset()
 
     @property
@@ -86,6 +93,8 @@ class Motor:
         self.acceleration_rad_s2 = self.spec.acceleration_rad_s2
         self.available_torque_nm = self.spec.max_torque_nm
         self.damping = 0.0
+        self.effort_nm: float | None = None
+        self.feedback_nm = 0.0
         self.speed_rad_s = 0.0
         self.angle_rad = self.spec.start_rad
         self.changed = True
@@ -106,6 +115,7 @@ class Motor:
         if low != high and math.isfinite(target_rad):
             target_rad = max(low, min(high, target_rad))
         self.target_rad = target_rad
+        self.effort_nm = None
         self.changed = True
 
     def set_velocity(self, velocity_rad_s: float) -> None:
@@ -131,6 +141,17 @@ class Motor:
         """Set the torque that a client reads back; ignored beyond the motor's limit."""
         if abs(torque_nm) <= self.spec.max_torque_nm:
             self.available_torque_nm = torque_nm
+
+    def set_effort(self, torque_nm: float) -> None:
+        """Act with a torque, clamped to the available one, until the next position. NaN is ignored.
+
+        Only a motor that is `forceful` does.
+        """
+        if math.isnan(torque_nm):
+            return
+        limit = abs(self.available_torque_nm)
+        self.effort_nm = max(-limit, min(limit, torque_nm))
+        self.changed = True
 
     def set_damping(self, constant: float) -> None:
         """Set the damping of the joint. NaN and negative values are ignored."""

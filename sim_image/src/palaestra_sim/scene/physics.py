@@ -16,6 +16,7 @@ from palaestra_sim.scene.bodies import Body, Build
 from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
@@ -37,6 +38,11 @@ class Figure(Protocol):
     body: Body | None
     powered: bool
 
+    @property
+    def links(self) -> Sequence[Link]:
+        """What moves on its joints by forces, outer ones first."""
+        ...
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Abilities:
@@ -47,12 +53,14 @@ class Abilities:
         loose: whether Solids with physics move when they are pushed.
         leaning: whether shapes may have any rotation.
         forces: whether a force moves anything.
+        joints: whether forces move what is on joints.
     """
 
     name: str
     loose: bool = False
     leaning: bool = False
     forces: bool = False
+    joints: bool = False
 
 
 class Push(NamedTuple):
@@ -86,8 +94,17 @@ class Physics(Protocol):
         """Return the body of a robot that is being read, at the origin of the world and at rest."""
         ...
 
-    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> None:
-        """Take these robots, obstacles and loose things as the contents of the world, where they are now."""
+    def arrange(
+        self,
+        figures: Sequence[Figure],
+        solids: Sequence[Shape],
+        loose: Sequence[Loose],
+        doors: Sequence[Link] = (),
+    ) -> None:
+        """Take these robots, obstacles and loose things as the contents of the world, where they are now.
+
+        `doors` are the links that are on no robot.
+        """
         ...
 
     def advance(self, step_s: float) -> None:

@@ -40,6 +40,7 @@ class Robot:
         place: its frame.
         body: None for a robot that only watches.
         powered: whether its motors turn; without energy they do not.
+        links: what moves on its joints by forces.
         battery: without energy if the robot has none.
     """
 
@@ -65,8 +66,12 @@ class Robot:
             for kind in DEVICES.values()
             if kind.sampler is not None and (devices := parts.devices.of(kind))
         )
+        self.links = parts.links
+        by_forces = {link.joint.motor for link in self.links if link.joint is not None}
         self._stray_motors = tuple(
-            it for it in self.motors.values() if self.body is None or not self.body.base.has(it)
+            it
+            for it in self.motors.values()
+            if it not in by_forces and (self.body is None or not self.body.base.has(it))
         )
         self.sow()
 
@@ -108,7 +113,7 @@ class Robot:
             trail.begin(step_s)
 
     def turn(self, step_s: float) -> None:
-        """Turn the motors that are on no wheel for one basic step."""
+        """Turn the motors that neither drive nor move by forces for one basic step."""
         if self.powered:
             for motor in self._stray_motors:
                 motor.advance(step_s)
@@ -133,6 +138,9 @@ class Robot:
         """Stop all motion."""
         if self.body is not None:
             self.body.halt()
+        for link in self.links:
+            if link.joint is not None:
+                link.joint.halt()
 
     def sow(self) -> None:
         """Restart the noise with the seed that is now in customData."""

@@ -1,8 +1,8 @@
 """Read a Robot node: its outline, its joints, its wheels, and its devices.
 
 Hinges and tracks with motors may be wheels (`wheels`). The wheels together are the drive (`drive`).
-Everything else on a joint moves with it, but touches nothing. A robot without an outline and without wheels
-only watches.
+Everything else on a joint moves with it, but touches nothing, unless the physics moves joints by forces
+(`robot_links`). A robot without an outline and without wheels only watches.
 """
 
 from __future__ import annotations
@@ -18,12 +18,16 @@ from palaestra_sim.scene.devices import DEVICES
 from palaestra_sim.scene.devices.kind import Devices, Kind, Part, Shaft
 from palaestra_sim.scene.drive import find_drive
 from palaestra_sim.scene.geometry import Vector, turn
+from palaestra_sim.scene.joint_reader import parameters_of, read_joint
 from palaestra_sim.scene.joints import Joint, JointPlace, unit
+from palaestra_sim.scene.links import Link
+from palaestra_sim.scene.matter import Matter
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place, YUp
 from palaestra_sim.scene.reading import ELSEWHERE, Reading
+from palaestra_sim.scene.robot_links import Parts, links_among, shapes_on
 from palaestra_sim.scene.robot_place import RobotPlace
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
 from palaestra_sim.scene.wheels import Driven, wheels_among
@@ -58,6 +62,7 @@ class RobotParts:
         body: None if nothing can collide with it.
         standing: the outline of a robot that cannot move and does not stand upright on the floor.
         arguments: its controllerArgs; None when its controller is not "ros".
+        links: what moves on its joints by forces.
     """
 
     node: SceneNode
@@ -67,6 +72,7 @@ class RobotParts:
     body: Body | None
     standing: tuple[Shape, ...] = ()
     arguments: Arguments | None = None
+    links: tuple[Link, ...] = ()
 
 
 def read_robot(reading: Reading, node: SceneNode, parent: Place | None, physics: Physics) -> RobotParts:
@@ -86,6 +92,8 @@ class _RobotReader:
         self._frame = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
         self._outline: list[Shape] = []  # of what is fixed to the robot
         self._on_joints: list[Shape] = []  # of what turns in place: wheels, casters
+        self._carried: list[Shape] = []  # of what motors move, if forces matter
+        self._measured: list[Link] = []
         self._driven: list[Driven] = []
         self._parts: list[tuple[SceneNode, Place]] = []
 
@@ -99,12 +107,19 @@ class _RobotReader:
         wheels = wheels_among(self._driven)
         drive = find_drive([found.wheel() for found in wheels])
         shapes = [shape for shape in (*self._on_joints, *self._outline) if not shape.node.left_out]
+        links: tuple[Link, ...] = ()
+        matter: tuple[Matter, ...] = ()
+        if self._forces:
+            links, matter = links_among(reading, self._all_parts(shapes, wheels))
+            shapes = list(shapes_on(None, links, shapes))
         moves = drive is not None or self._stands_free(shapes)
         heights = self._heights(wheels)
         body = None
         if moves:
             base = Base([it.motor for it in wheels], drive)
-            body = self._physics.body(Build(base=base, outline=shapes, heights=heights))
+            body = self._physics.body(
+                Build(base=base, outline=shapes, heights=heights, links=links, matter=matter)
+            )
         place = self._place(body)
         self._settle(place)
         return RobotParts(
@@ -115,6 +130,19 @@ class _RobotReader:
             body=body,
             standing=() if moves else tuple(shapes),
             arguments=read_arguments(reading, node) if self._by_ros else None,
+            links=links,
+        )
+
+    @property
+    def _forces(self) -> bool:
+        return self._physics.abilities.joints
+
+    def _all_parts(self, shapes: Sequence[Shape], wheels: Sequence[Driven]) -> Parts:
+        return Parts(
+            nodes=[(self._node, self._frame), *self._parts],
+            shapes=(*shapes, *self._carried),
+            wheels=wheels,
+            measured=self._measured,
         )
 
     def _stands_free(self, shapes: Sequence[Shape]) -> bool:
@@ -180,8 +208,9 @@ class _RobotReader:
         self._parts.append((node, place))
         if node.type_name in _MOUNTED:
             self._read_device(_MOUNTED[node.type_name], node, place)
-        elif node.type_name == "Solid" and not _moves(place):
-            self._outline += bounding_shapes(self._reading, node, place)
+        elif node.type_name == "Solid" and (self._forces or not _moves(place)):
+            kept = self._carried if _moves(place) else self._outline
+            kept += bounding_shapes(self._reading, node, place)
         elif node.type_name == "Track":
             self._read_track(node, place)
         self._read_children(node, place)
@@ -206,21 +235,10 @@ class _RobotReader:
         reading = self._reading
         if place.scale != 1.0:
             self._lacks(node, f"a {node.type_name} in a Transform with a scale")
-        slides = node.type_name == "SliderJoint"
-        parameters = next(iter(node.nodes("jointParameters")), node)
-        axis = unit(
-            _triple(reading.vector(parameters, "axis", (0.0, 0.0, 1.0) if slides else (1.0, 0.0, 0.0)))
-        )
-        if axis is None:
-            reading.refuse(parameters, "a joint with an axis of length 0", "write its direction")
+        joint = read_joint(reading, node, forces=self._forces)
+        if joint is None:
             return
-        joint = Joint(
-            axis=axis,
-            anchor=_triple(reading.vector(parameters, "anchor", (0.0, 0.0, 0.0))),
-            slides=slides,
-            start=reading.number(parameters, "position", 0.0),
-        )
-        joint.motor = self._read_devices_of(node, parameters, place, joint)
+        joint.motor = self._read_devices_of(node, parameters_of(node), place, joint)
         for end in node.nodes("endPoint"):
             if end.type_name == "Slot":
                 self._read_children(end, place)
@@ -312,6 +330,8 @@ class _RobotReader:
             place=place,
             shaft=shaft,
             outline=self._outline,
+            measured=self._measured,
+            forces=self._forces,
         )
         device: object = kind.read(part)
         if not node.left_out and name in self._devices.rows and self._by_ros:

@@ -12,6 +12,7 @@ from palaestra_sim.scene.beams import Beam
 from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.places import Place
@@ -47,9 +48,15 @@ class StubPhysics:
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         return StubBody(build.base, outline, rim, build.heights)
 
-    def arrange(self, figures: Sequence[Figure], solids: Sequence[Shape], loose: Sequence[Loose]) -> None:
+    def arrange(
+        self,
+        figures: Sequence[Figure],
+        solids: Sequence[Shape],
+        loose: Sequence[Loose],
+        doors: Sequence[Link] = (),
+    ) -> None:
         """Set the obstacles of each robot and of its rays."""
-        del loose  # refused, see `abilities`
+        del loose, doors  # refused, see `abilities`
         self._solids = tuple(solids)
         self._moving = [(it, it.body) for it in figures if isinstance(it.body, StubBody)]
         self._level = {it: beams for it, beams in self._level.items() if it in figures}

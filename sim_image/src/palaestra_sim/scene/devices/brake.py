@@ -1,7 +1,8 @@
 """Brake: the damping of a joint, which limits the speed that its motor reaches.
 
 A damper takes a torque of its constant times the speed of the shaft. A motor with a limited torque therefore
-turns no faster than the torque divided by the constant. A joint without a motor does not move here.
+turns no faster than the torque divided by the constant. A joint without a motor moves only by forces, where the
+physics has them.
 """
 
 from __future__ import annotations
@@ -28,8 +29,11 @@ def _read(part: Part) -> Brake:
 
 def _services(brake: Brake) -> tuple[Row, ...]:
     def set_damping_constant(request: Any) -> Fields:
+        joint = brake.shaft.joint
         if brake.shaft.motor is not None:
             brake.shaft.motor.set_damping(request.value)
+        elif joint is not None and request.value >= 0.0:
+            joint.brake = request.value
         return {"success": True}
 
     return (

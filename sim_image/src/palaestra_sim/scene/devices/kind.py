@@ -14,6 +14,7 @@ from palaestra_sim.scene.bodies import Body
 from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.joints import Joint
+from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.motion import Motion
 from palaestra_sim.scene.motors import Motor
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -82,6 +83,8 @@ class Part:
         place: its frame in the robot's; of a device on a joint, the frame of the joint.
         shaft: the joint that it is a device of.
         outline: the shapes with which the robot runs into things.
+        measured: the parts of the robot whose force on it is measured.
+        forces: whether the physics has forces.
     """
 
     reading: Reading
@@ -91,6 +94,8 @@ class Part:
     place: Place
     shaft: Shaft | None
     outline: list[Shape]
+    measured: list[Link]
+    forces: bool
 
     def number(self, name: str, default: float) -> float:
         """Return the number of a field; `default` if the field is refused."""
@@ -133,6 +138,12 @@ class Part:
         shapes = list(bounding_shapes(self.reading, self.node, self.place))
         self.outline += shapes
         return shapes
+
+    def measure(self) -> Link:
+        """Return this device as a part whose force on the robot is measured."""
+        link = Link(node=self.node, place=self.place, joint=None)
+        self.measured.append(link)
+        return link
 
 
 class Carrier(Protocol):

@@ -1,0 +1,125 @@
+"""Shapes as MuJoCo's geoms: their sizes, what they touch, and their masses.
+
+Which geoms meet is decided by 32 bits, one for each robot's heights and three for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.scene.geometry import Pose, to_quaternion
+from palaestra_sim.scene.matter import Matter, volume_m3
+from palaestra_sim.scene.shapes import Shape
+
+if TYPE_CHECKING:
+    from palaestra_sim.mujoco.body import MujocoBody
+
+SEEN: Final = 0  # the group of geoms that rays and contacts meet
+UNSEEN: Final = 1  # that of a robot's own links while it looks
+ROBOTS: Final = 1 << 0  # all robots touch each other
+LOOSE: Final = 1 << 1  # loose things touch each other and robots
+STANDING: Final = 1 << 2  # and whatever stands
+_FIRST_ROBOT: Final = 3
+_BITS: Final = 32
+_LEAST_M3: Final = 1e-9
+FRICTION: Final = (1.0, 0.005, 0.0001)  # sliding: Webots' coulombFriction of two materials without their own
+
+_GEOMS: Final = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "ball": mujoco.mjtGeom.mjGEOM_SPHERE,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """What a geom touches, as bits of MuJoCo: its own type, and the types that it meets."""
+
+    contype: int
+    conaffinity: int
+
+
+@dataclass(slots=True, eq=False)
+class Marks:
+    """The geoms of a model while it is made, each with its shape, and a robot's with its body and bit."""
+
+    entries: list[tuple[Any, Shape, MujocoBody | None, int]] = field(default_factory=list)
+
+    def note(self, geom: Any, shape: Shape, body: MujocoBody | None = None, bit: int = 0) -> None:
+        """Note whose a geom is."""
+        self.entries.append((geom, shape, body, bit))
+
+
+def own_bit(index: int) -> int:
+    """Return the bit of the heights of a robot; robots beyond the last bit share it."""
+    return 1 << min(_FIRST_ROBOT + index, _BITS - 2)
+
+
+def add_geom(body: Any, shape: Shape, pose: Pose, touch: Touch) -> Any:
+    """Add a shape to a body, at a pose in its frame; return the geom, whose mass is 0."""
+    half = [length / 2.0 for length in shape.size]
+    size = {"box": half, "cylinder": [half[0], half[2], 0.0], "ball": [half[0], 0.0, 0.0]}[shape.kind]
+    geom = body.add_geom(
+        type=_GEOMS[shape.kind],
+        size=size,
+        contype=touch.contype,
+        conaffinity=touch.conaffinity,
+        friction=FRICTION,
+        group=SEEN,
+        density=0.0,
+    )
+    put(geom.pos, geom.quat, pose)
+    return geom
+
+
+def add_matter(body: Any, matter: Matter, frame: Pose, geoms: Mapping[Shape, Any]) -> None:
+    """Give a body the mass of a Solid, whose frame is at `frame` in the body's; `geoms` are its shapes'."""
+    if matter.mass_kg <= 0.0:
+        return
+    if matter.shapes and matter.center is None and matter.inertia is None:
+        spread(matter.mass_kg, matter.shapes, [geoms[shape] for shape in matter.shapes])
+        return
+    inner = body.add_body()
+    put(inner.pos, inner.quat, frame)
+    inner.explicitinertial = True
+    inner.mass = matter.mass_kg
+    inner.ipos = list(matter.center or (0.0, 0.0, 0.0))
+    inner.fullinertia = list(matter.inertia or _inertia(matter))
+
+
+def spread(mass_kg: float, shapes: Sequence[Shape], geoms: Iterable[Any]) -> None:
+    """Give geoms a mass together, by their volumes."""
+    density = mass_kg / max(sum(map(volume_m3, shapes)), _LEAST_M3)
+    for geom in geoms:
+        geom.density = density
+
+
+def put(position: Any, quaternion: Any, pose: Pose) -> None:
+    """Write a pose to arrays of MuJoCo."""
+    position[:] = pose.position
+    x, y, z, w = to_quaternion(pose.rotation)
+    quaternion[:] = np.array((w, x, y, z))
+
+
+def _inertia(matter: Matter) -> tuple[float, ...]:
+    """Return the inertia of boxes around its shapes; without shapes, of a ball as dense as water."""
+    if not matter.shapes:
+        radius_m = (matter.mass_kg / 1000.0 * 0.239) ** (1.0 / 3.0)
+        turning = 0.4 * matter.mass_kg * radius_m**2
+        return turning, turning, turning, 0.0, 0.0, 0.0
+    whole = max(sum(map(volume_m3, matter.shapes)), _LEAST_M3)
+    xx = yy = zz = 0.0
+    for shape in matter.shapes:
+        part = matter.mass_kg * volume_m3(shape) / whole / 12.0
+        x, y, z = shape.size
+        xx, yy, zz = (
+            xx + part * (y * y + z * z),
+            yy + part * (x * x + z * z),
+            zz + part * (x * x + y * y),
+        )
+    return xx, yy, zz, 0.0, 0.0, 0.0

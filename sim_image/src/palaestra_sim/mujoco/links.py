@@ -1,0 +1,228 @@
+"""Links in MuJoCo: bodies on joints, servos that turn them, and sensors of the force on what is fixed.
+
+A servo aims at the speed that the motor demands, with a force of at most the motor's. It adds what gravity
+takes, so a motor that holds a weight does not sag. Links touch everything but their own robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any, Final
+
+from palaestra_sim.mujoco.body import GAIN, MujocoBody
+from palaestra_sim.mujoco.geoms import LOOSE, ROBOTS, STANDING, Marks, Touch, add_geom, add_matter, put
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.scene.joints import Joint
+from palaestra_sim.scene.links import Link, frames_between, link_around
+from palaestra_sim.scene.motors import Motor
+from palaestra_sim.scene.places import Place
+
+_STIFF: Final = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # of friction: with the default a held weight creeps
+_TOUCH: Final = Touch(ROBOTS, STANDING | LOOSE | ROBOTS)
+
+
+@dataclass(slots=True, eq=False)
+class Added:
+    """The parts of a link in a model that is being made.
+
+    Attributes:
+        body: its body.
+        joint, servo, sensor: None if it has none.
+    """
+
+    link: Link
+    body: Any
+    joint: Any = None
+    servo: Any = None
+    sensor: Any = None
+
+
+@dataclass(slots=True, eq=False)
+class Ground:
+    """What links are mounted on.
+
+    Attributes:
+        roots: the bodies of robots and loose things, by their places.
+        stands: the bodies of what stands, by their places; mounting adds to them.
+    """
+
+    spec: Any
+    roots: dict[Place, Any]
+    stands: dict[Place, Any]
+    names: Iterator[str] = field(default_factory=lambda: (f"link {number}" for number in range(10**9)))
+
+    def under(self, place: Place | None) -> tuple[Place | None, Any]:
+        """Return the body around a place, with the place of that body."""
+        around = () if place is None else place.chain()
+        for outer in around:
+            if outer in self.roots:
+                return outer, self.roots[outer]
+        if place is None:
+            return None, self.spec.worldbody
+        if place not in self.stands:
+            self.stands[place] = self.spec.worldbody.add_body(mocap=True, name=next(self.names))
+        return place, self.stands[place]
+
+
+def add_links(ground: Ground, links: Sequence[Link], marks: Marks, body: MujocoBody | None) -> list[Added]:
+    """Add the links of one robot, outer ones first, or one that is on none; `body` is the robot's."""
+    added: dict[Link, Added] = {}
+    bit = 0 if body is None else len(body.build.outline)
+    for link in links:
+        around = link_around(link.place.parent, links)
+        outer, root = (
+            ground.under(link.place.parent) if around is None else (around.place, added[around].body)
+        )
+        inner = root.add_body(name=next(ground.names))
+        put(inner.pos, inner.quat, frames_between(outer, link.place.parent).after(link.start))
+        added[link] = Added(link, inner)
+        geoms = {}
+        for shape in link.shapes:
+            frame = frames_between(link.place, shape.place)
+            geoms[shape] = add_geom(inner, shape, frame.after(shape.local), _TOUCH)
+            marks.note(geoms[shape], shape, body, 0 if body is None else 1 << bit)
+            bit += 1
+        for matter in link.matter:
+            add_matter(inner, matter, frames_between(link.place, matter.place), geoms)
+        _add_joint(ground, added[link])
+    _exclude(ground, list(added.values()))
+    return list(added.values())
+
+
+def _add_joint(ground: Ground, added: Added) -> None:
+    joint, link = added.link.joint, added.link
+    name = next(ground.names)
+    if joint is None:
+        added.body.add_site(name=name)
+        added.sensor = ground.spec.add_sensor(
+            type=mujoco.mjtSensor.mjSENS_FORCE, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name
+        )
+        return
+    frame = link.start.inverse
+    low, high = joint.stops
+    added.joint = added.body.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_SLIDE if joint.slides else mujoco.mjtJoint.mjJNT_HINGE,
+        axis=list(frame.turned(joint.axis)),
+        pos=list(frame.carry(joint.anchor)),
+        ref=joint.start,
+        range=[low, high],
+        limited=low < high,
+        damping=[joint.rubbing.damping, 0.0, 0.0],
+        stiffness=[joint.rubbing.spring, 0.0, 0.0],
+        solimp_friction=_STIFF,
+        frictionloss=joint.rubbing.friction if joint.motor is None else 0.0,
+    )
+    if joint.motor is not None:
+        added.servo = ground.spec.add_actuator(
+            trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name, forcelimited=True, forcerange=[-1.0, 1.0]
+        )
+        added.servo.set_to_velocity(kv=1.0)
+
+
+def _exclude(ground: Ground, added: Sequence[Added]) -> None:
+    """Let the links of a robot touch neither each other nor what they are mounted on."""
+    pairs = [(one.body.name, other.body.name) for one, other in combinations(added, 2)]
+    for it in added:
+        around = [place for place in it.link.place.chain() if place in ground.stands or place in ground.roots]
+        pairs += [(it.body.name, (ground.roots.get(place) or ground.stands[place]).name) for place in around]
+    for one, other in pairs:
+        ground.spec.add_exclude(bodyname1=one, bodyname2=other)
+
+
+class LinkBody:
+    """One link of a compiled model, which its joint and motor follow.
+
+    Args:
+        added: where it is in the model.
+        model: the model.
+        data: its data.
+
+    Attributes:
+        link: as in the scene.
+    """
+
+    def __init__(self, added: Added, model: Any, data: Any) -> None:
+        self.link = added.link
+        self._model, self._data = model, data
+        self._joint: Joint | None = added.link.joint
+        self._motor: Motor | None = None if self._joint is None else self._joint.motor
+        self._known: tuple[float, float] | None = None
+        self._aim = 0.0  # in rad/s or m/s: the acceleration limits its changes, as in Webots
+        self._set: tuple[float, float, bool] | None = None
+        self._sensor = -1 if added.sensor is None else int(model.sensor_adr[added.sensor.id])
+        self._servo = -1 if added.servo is None else int(added.servo.id)
+        if added.joint is not None:
+            self._at = int(model.jnt_qposadr[added.joint.id])
+            self._dof = int(model.jnt_dofadr[added.joint.id])
+            self._gain = GAIN * float(model.dof_M0[self._dof])
+
+    def forget(self) -> None:
+        """Write position and speed of the joint anew before the next step."""
+        self._known = None
+
+    def take(self) -> bool:
+        """Take what clients did to the joint; return whether they did anything."""
+        joint = self._joint
+        if joint is None or self._known == (joint.now, joint.turning):
+            return False
+        self._known = joint.now, joint.turning
+        self._aim = joint.turning
+        self._data.qpos[self._at], self._data.qvel[self._dof] = self._known
+        return True
+
+    def command(self, step_s: float, *, powered: bool) -> None:
+        """Set what the servo aims at in the next basic step."""
+        joint, motor = self._joint, self._motor
+        if joint is None:
+            return
+        self._limit(joint, motor)
+        if motor is None:
+            return
+        if motor.effort_nm is not None:
+            self._data.ctrl[self._servo] = motor.effort_nm if powered else 0.0
+            return
+        data, dof = self._data, self._dof
+        load = float(data.qfrc_bias[dof] - data.qfrc_passive[dof])
+        motor.speed_rad_s = self._aim
+        self._aim = motor.demand(step_s) if powered else 0.0
+        data.ctrl[self._servo] = self._aim + load / self._gain
+
+    def follow(self) -> None:
+        """Take what MuJoCo has computed."""
+        data, joint, motor = self._data, self._joint, self._motor
+        if joint is None:
+            x, y, z = data.sensordata[self._sensor : self._sensor + 3].tolist()
+            self.link.force = (x, y, z)
+            return
+        position, speed = float(data.qpos[self._at]), float(data.qvel[self._dof])
+        joint.follow(position, speed)
+        self._known = position, speed
+        if motor is not None:
+            motor.feedback_nm = float(data.actuator_force[self._servo])
+
+    def _limit(self, joint: Joint, motor: Motor | None) -> None:
+        """Set what limits and slows the joint, if that has changed."""
+        model, dof = self._model, self._dof
+        damping = joint.braking
+        limit, direct = 0.0, False
+        if motor is not None:
+            direct = motor.effort_nm is not None
+            limit = abs(motor.available_torque_nm)
+            limit = limit if direct else max(limit, joint.rubbing.friction)
+        if (damping, limit, direct) == self._set:
+            return
+        self._set = damping, limit, direct
+        model.dof_damping[dof] = joint.rubbing.damping + damping
+        if motor is not None:
+            model.dof_frictionloss[dof] = joint.rubbing.friction if direct else 0.0
+            model.actuator_forcerange[self._servo] = -limit, limit
+            model.actuator_gainprm[self._servo, 0] = 1.0 if direct else self._gain
+            model.actuator_biasprm[self._servo, 2] = 0.0 if direct else -self._gain
+
+
+def bodies(added: Mapping[Any, Sequence[Added]], model: Any, data: Any) -> dict[Any, tuple[LinkBody, ...]]:
+    """Return the links of a compiled model, by the robot that they are on."""
+    return {whose: tuple(LinkBody(it, model, data) for it in links) for whose, links in added.items()}

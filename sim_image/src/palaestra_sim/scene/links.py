@@ -1,0 +1,64 @@
+"""Links: what moves on a joint because of forces, or is measured for the force on it.
+
+A link is everything on the end of one joint, without what is on further joints. It is mounted on another
+link, on a robot, on a loose thing, or on what stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.joints import Joint, JointPlace
+from palaestra_sim.scene.matter import Matter
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.shapes import Shape
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Link:
+    """One link.
+
+    Attributes:
+        node: of its Solid.
+        place: its frame; that of the end of its joint, if it has one.
+        joint: that moves it; None: it is fixed, and the force on it is measured.
+        shapes: what it touches other things with.
+        matter: the masses of its Solids.
+        force: with which it acts on what it is mounted on, in N, in its own axes; set by the physics.
+    """
+
+    node: SceneNode
+    place: Place
+    joint: Joint | None
+    shapes: tuple[Shape, ...] = ()
+    matter: tuple[Matter, ...] = ()
+    force: Vector = field(default=(0.0, 0.0, 0.0))
+
+    @property
+    def start(self) -> Pose:
+        """Its frame in the frame around it, at the position of the joint in the world file."""
+        return self.place.start if isinstance(self.place, JointPlace) else self.place.pose
+
+
+def frames_between(outer: Place | None, inner: Place | None) -> Pose:
+    """Return the frame `inner` in the frame `outer` around it, with all joints between as they are now."""
+    pose = Pose()
+    while inner is not None and inner is not outer:
+        pose = _scaled(inner).after(pose)
+        inner = inner.parent
+    return pose
+
+
+def link_around(place: Place | None, links: Sequence[Link]) -> Link | None:
+    """Return the innermost link that a place is on; None if it is on none."""
+    by_place = {link.place: link for link in links}
+    around: Iterator[Place] = iter(()) if place is None else place.chain()
+    return next((by_place[it] for it in around if it in by_place), None)
+
+
+def _scaled(place: Place) -> Pose:
+    parent, pose = place.parent, place.pose
+    return pose if parent is None or parent.scale == 1.0 else pose.scaled(parent.scale)

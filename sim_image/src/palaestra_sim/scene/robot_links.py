@@ -1,0 +1,102 @@
+"""Which joints of a robot move by forces, in a physics that has them.
+
+Those with a motor that is no wheel's, and those without a motor whose end has physics. A joint on a wheel is
+part of the wheel. A caster on the floor of a robot that drives follows it without forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.scene.joints import JointPlace
+from palaestra_sim.scene.links import Link, link_around
+from palaestra_sim.scene.matter import Matter, read_matter
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.wheels import Driven
+
+_CLEARANCE_M: Final = 0.01  # what is lower above the floor rolls on it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """The parts of one robot, in its own frame, with all joints as in the world file.
+
+    Attributes:
+        nodes: each node with its frame, outer ones first.
+        shapes: all that may touch something.
+        wheels: what drives the robot.
+        measured: parts whose force on the robot is measured, so far without shapes and masses.
+    """
+
+    nodes: Sequence[tuple[SceneNode, Place]]
+    shapes: Sequence[Shape]
+    wheels: Sequence[Driven]
+    measured: Sequence[Link]
+
+    @property
+    def heavy(self) -> list[tuple[SceneNode, Place]]:
+        """The nodes with physics."""
+        return [(node, place) for node, place in self.nodes if node.nodes("physics")]
+
+
+def links_among(reading: Reading, parts: Parts) -> tuple[tuple[Link, ...], tuple[Matter, ...]]:
+    """Return the links of a robot, outer ones first, and the masses of what is on none of them."""
+    links = [
+        Link(node=node, place=place, joint=place.joint)
+        for node, place in parts.nodes
+        if isinstance(place, JointPlace) and _moves(place, parts)
+    ]
+    links += [link for link in parts.measured if link.node.nodes("physics")]
+    links.sort(key=lambda link: sum(1 for _ in link.place.chain()))
+    for link in links:
+        link.shapes = shapes_on(link, links, parts.shapes)
+        link.matter = _matter_on(link, links, reading, parts)
+        if link.joint is not None and link.joint.motor is not None:
+            link.joint.motor.forceful = True
+    return tuple(links), _matter_on(None, links, reading, parts)
+
+
+def shapes_on(link: Link | None, links: Sequence[Link], shapes: Sequence[Shape]) -> tuple[Shape, ...]:
+    """Return the shapes that are on a link, or on none of the links; each once."""
+    found = {
+        (shape.node.number, shape.place): shape
+        for shape in shapes
+        if link_around(shape.place, links) is link and not shape.node.left_out
+    }
+    return tuple(found.values())
+
+
+def _matter_on(
+    link: Link | None, links: Sequence[Link], reading: Reading, parts: Parts
+) -> tuple[Matter, ...]:
+    on_it = shapes_on(link, links, parts.shapes)
+    return tuple(
+        read_matter(reading, node, place, [shape for shape in on_it if shape.place is place])
+        for node, place in parts.heavy
+        if link_around(place, links) is link
+    )
+
+
+def _moves(end: JointPlace, parts: Parts) -> bool:
+    """Return whether forces move the end of a joint."""
+    motors = [place.joint.motor for place in end.chain() if isinstance(place, JointPlace)]
+    rolling = {found.motor for found in parts.wheels}
+    if any(motor in rolling for motor in motors if motor is not None):
+        return False
+    if not any(end in place.chain() for _, place in parts.heavy):
+        return False
+    return end.joint.motor is not None or not _rolls(end, parts)
+
+
+def _rolls(end: JointPlace, parts: Parts) -> bool:
+    """Return whether something on a joint reaches the floor on which the robot drives."""
+    if not parts.wheels:
+        return False
+    floor = min(found.bottom for found in parts.wheels)
+    lows = [shape.heights()[0] for shape in parts.shapes if end in shape.place.chain()]
+    return min(lows, default=floor + 2.0 * _CLEARANCE_M) < floor + _CLEARANCE_M
