@@ -1,11 +1,17 @@
-"""Read the joint of a HingeJoint or SliderJoint."""
+"""Read the joint of a HingeJoint or SliderJoint, and doors: links on joints that are on no robot."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from palaestra_sim.scene.geometry import Vector
-from palaestra_sim.scene.joints import Joint, Rubbing, unit
+from palaestra_sim.scene.joints import Joint, JointPlace, Rubbing, unit
+from palaestra_sim.scene.links import Link, link_around
+from palaestra_sim.scene.matter import read_matter
 from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading
+from palaestra_sim.scene.shapes import Shape
 
 
 def parameters_of(node: SceneNode) -> SceneNode:
@@ -36,6 +42,33 @@ def read_joint(reading: Reading, node: SceneNode, *, forces: bool) -> Joint | No
             spring=reading.number(parameters, "springConstant", 0.0),
         )
     return joint
+
+
+def read_door(reading: Reading, node: SceneNode, parent: Place | None) -> Link | None:
+    """Return the link on a joint that is on no robot, without shapes; None if its end has no physics."""
+    for end in node.nodes("endPoint"):
+        if end.type_name == "Solid" and end.nodes("physics"):
+            if parent is not None and parent.scale != 1.0:
+                reading.lacks(node, f"a {node.type_name} in a Transform with a scale")
+            joint = read_joint(reading, node, forces=True)
+            if joint is None:
+                return None
+            place = JointPlace(parent, reading.translation(end), reading.rotation(end), joint)
+            end.place = place
+            return Link(node=end, place=place, joint=joint)
+    return None
+
+
+def fill_door(reading: Reading, link: Link, inner: Sequence[Link], shapes: Sequence[Shape]) -> None:
+    """Give a link on no robot its shapes and masses; `inner` are the links on it, `shapes` all inside it."""
+    links = [link, *inner]
+    link.shapes = tuple(shape for shape in shapes if link_around(shape.place, links) is link)
+    nodes = [node for node in (link.node, *link.node.descendants()) if node.nodes("physics")]
+    link.matter = tuple(
+        read_matter(reading, node, place, [shape for shape in link.shapes if shape.place is place])
+        for node in nodes
+        if (place := node.place) is not None and link_around(place, links) is link
+    )
 
 
 def _triple(numbers: tuple[float, ...]) -> Vector:

@@ -13,7 +13,10 @@ from typing import Final
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.axes import read_axes
 from palaestra_sim.scene.devices import DEVICES
+from palaestra_sim.scene.joint_reader import fill_door, read_door
+from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose, LoosePlace
+from palaestra_sim.scene.matter import DENSITY
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place
@@ -42,9 +45,9 @@ DRAWN_ONLY: Final = frozenset(
 )
 # A device without a robot is a thing like others.
 _SOLIDS: Final = {"Solid", "Track"} | {name for name, kind in DEVICES.items() if kind.body}
-_DENSITY: Final = 1000.0  # kg/m3, the default of Physics.density
 _FRAMES: Final = _SOLIDS | {"Pose", "Transform"}
-_JOINTS: Final = frozenset(("BallJoint", "Hinge2Joint", "HingeJoint", "SliderJoint"))
+_ONE_AXIS: Final = frozenset(("HingeJoint", "SliderJoint"))
+_JOINTS: Final = _ONE_AXIS | frozenset(("BallJoint", "Hinge2Joint"))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -57,6 +60,7 @@ class Scene:
         random_seed: WorldInfo.randomSeed.
         solids: the obstacles.
         loose: what moves when it is pushed.
+        doors: what swings on joints that are on no robot.
         robots: in the order of the world file.
         top: the frame around everything; None if z of the world points up.
         left_out: what the stub lacks and the user left out, each with its place.
@@ -68,6 +72,7 @@ class Scene:
     random_seed: int = 0
     solids: list[Shape] = field(default_factory=list)
     loose: list[Loose] = field(default_factory=list)
+    doors: list[Link] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
     top: Place | None = None
     left_out: tuple[WorldError, ...] = ()
@@ -137,18 +142,40 @@ def _read(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene)
         scene.robots.append(robot)
         _stand(reading, robot.standing, scene)
     elif kind in _JOINTS:
-        # Without a robot nothing moves it; an end that would swing has physics, and is refused for that.
-        for end in node.nodes("endPoint"):
-            if end.type_name in _FRAMES:
-                _read_frame(reading, end, parent, scene)
-            else:
-                _read(reading, end, parent, scene)
+        _read_joint(reading, node, parent, scene)
     elif kind in _SOLIDS and scene.physics.abilities.loose and _is_loose(node):
         _read_loose(reading, node, parent, scene)
     elif kind in _FRAMES:
         _read_frame(reading, node, parent, scene)
     else:
         reading.lacks(node, node.unusable or f"{scene.physics.abilities.name} simulates no {kind}")
+
+
+def _read_joint(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
+    """Read a joint that is on no robot: without physics nothing moves its end."""
+    if scene.physics.abilities.joints and node.type_name in _ONE_AXIS:
+        link = read_door(reading, node, parent)
+        if link is not None:
+            _read_door_end(reading, link, scene)
+            return
+    for end in node.nodes("endPoint"):
+        if end.type_name in _FRAMES:
+            _read_frame(reading, end, parent, scene)
+        else:
+            _read(reading, end, parent, scene)
+
+
+def _read_door_end(reading: Reading, link: Link, scene: Scene) -> None:
+    """Read what is on a joint that swings; Solids without physics are fixed to it."""
+    inside = Scene(physics=scene.physics)
+    _read_children(reading, link.node, link.place, inside)
+    shapes = [*bounding_shapes(reading, link.node, link.place), *inside.solids]
+    if not link.node.left_out:
+        fill_door(reading, link, inside.doors, shapes)
+        scene.doors.append(link)
+    scene.doors += inside.doors
+    scene.loose += inside.loose
+    scene.robots += inside.robots
 
 
 def _read_frame(reading: Reading, node: SceneNode, parent: Place | None, scene: Scene) -> None:
@@ -181,7 +208,7 @@ def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: 
     # A stand-in has no physics of its own, but the mass of its PROTO.
     described = next(iter(node.nodes("physics")), node)
     mass_kg = reading.number(described, "mass", -1.0)
-    density = reading.number(described, "density", _DENSITY)
+    density = reading.number(described, "density", DENSITY)
     if shapes and not node.left_out:
         scene.loose.append(
             Loose(
@@ -189,10 +216,11 @@ def _read_loose(reading: Reading, node: SceneNode, parent: Place | None, scene: 
                 place=place,
                 shapes=tuple(shapes),
                 mass_kg=mass_kg if mass_kg > 0.0 else None,
-                density=density if density > 0.0 else _DENSITY,
+                density=density if density > 0.0 else DENSITY,
             )
         )
     scene.loose += fixed.loose
+    scene.doors += fixed.doors
     scene.robots += fixed.robots
 
 

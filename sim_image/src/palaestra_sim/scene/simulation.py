@@ -164,6 +164,9 @@ class Simulation:
             robot.halt()
         for thing in self.scene.loose:
             thing.place.halt()
+        for door in self.scene.doors:
+            if door.joint is not None:
+                door.joint.halt()
 
     def quit(self, status: int) -> None:
         """Ask for the end of the simulator."""
@@ -214,6 +217,7 @@ class Simulation:
         self._states.begin(inside for node in added for inside in (node, *node.descendants()))
         self.scene.solids += fresh.solids
         self.scene.loose += fresh.loose
+        self.scene.doors += fresh.doors
         self.scene.robots += fresh.robots
         self.robots += tuple(
             Robot(parts, self.scene.random_seed, self.scene.physics) for parts in fresh.robots
@@ -234,6 +238,7 @@ class Simulation:
         self._view.changes += 1
         self.scene.solids = [shape for shape in self.scene.solids if shape.node not in gone]
         self.scene.loose = [thing for thing in self.scene.loose if thing.node not in gone]
+        self.scene.doors = [link for link in self.scene.doors if link.node not in gone]
         self.scene.robots = [parts for parts in self.scene.robots if parts.node not in gone]
         self.robots = tuple(robot for robot in self.robots if robot.parts.node not in gone)
         self._assemble()
@@ -311,7 +316,7 @@ class Simulation:
             self._arrange()
 
     def _arrange(self) -> None:
-        self.scene.physics.arrange(self.robots, self.scene.solids, self.scene.loose)
+        self.scene.physics.arrange(self.robots, self.scene.solids, self.scene.loose, self.scene.doors)
 
     def _basic_step(self) -> None:
         if self._pending:
