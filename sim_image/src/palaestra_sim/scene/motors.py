@@ -21,7 +21,7 @@ class MotorSpec:
 
     Of a linear motor: m, m/s, N. `acceleration_rad_s2` of -1 is unlimited; equal `min_rad` and `max_rad` mean
     no limits of commands, equal `stops` no stops of the joint, which the shaft never passes. `start_rad` is
-    the position in the world file.
+    the position in the world file. `forces` is whether the physics has them.
     """
 
     name: str
@@ -34,6 +34,7 @@ class MotorSpec:
     start_rad: float = 0.0
     stops: tuple[float, float] = (0.0, 0.0)
     model: str = ""
+    forces: bool = False
 
 
 class Motor:

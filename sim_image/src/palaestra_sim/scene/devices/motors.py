@@ -1,11 +1,15 @@
-"""RotationalMotor and LinearMotor: every setter answers success, even if the motor ignores the value."""
+"""RotationalMotor and LinearMotor: every setter answers success, even if the motor ignores the value.
+
+Torques and forces are for motors that the physics moves by forces; others refuse them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part
+from palaestra_sim.scene.devices.kind import Kind, Part, Topic
 from palaestra_sim.scene.motors import Motor, MotorSpec
 from palaestra_sim.seam import Handler, Row, UnsimulatedError
 
@@ -33,6 +37,7 @@ def _reader(limit: str) -> Callable[[Part], Motor]:
                 max_torque_nm=number(limit, 10.0),
                 multiplier=number("multiplier", 1.0),
                 model=part.text("model"),
+                forces=part.forces,
             )
         )
 
@@ -57,12 +62,48 @@ def _commands(motor: Motor, effort: str) -> tuple[Row, ...]:
         ("set_position", "set_float", _setter(motor.set_position)),
         ("set_velocity", "set_float", _setter(motor.set_velocity)),
         ("set_acceleration", "set_float", _setter(motor.set_acceleration)),
-        (f"set_{effort}", "set_float", _unable(effort)),
+        (
+            f"set_{effort}",
+            "set_float",
+            _setter(motor.set_effort) if motor.forceful else _unable(motor, effort),
+        ),
         (f"set_available_{effort}", "set_float", _setter(motor.set_available_torque)),
         ("set_control_pid", "motor_set_control_pid", lambda _: {"success": 1}),
+        *(() if motor.forceful else _no_feedback(effort)),
+    )
+
+
+def _no_feedback(effort: str) -> tuple[Row, ...]:
+    """Return the services of a feedback that has no topic."""
+    return (
         (f"{effort}_feedback_sensor/enable", "set_int", lambda request: {"success": request.value == 0}),
         (f"{effort}_feedback_sensor/get_sampling_period", "get_int", lambda _: {"value": 0}),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """The torque or force of a motor in the last basic step."""
+
+    motor: Motor
+
+    @property
+    def value(self) -> float:
+        """In N m or N, positive if it turns the motor forward."""
+        return self.motor.feedback_nm
+
+
+def _topics(effort: str) -> Callable[[Motor], tuple[Topic, ...]]:
+    """Return the function that lists the topics of a motor; `effort` is "torque" or "force"."""
+
+    def topics(motor: Motor) -> tuple[Topic, ...]:
+        if not motor.forceful:
+            return ()
+        return (
+            Topic(name=f"{effort}_feedback", type_name="webots_ros/Float64Stamped", source=Feedback(motor)),
+        )
+
+    return topics
 
 
 def _answers(motor: Motor, effort: str) -> tuple[Row, ...]:
@@ -90,9 +131,13 @@ def _setter(command: Callable[[float], None]) -> Handler:
     return handle
 
 
-def _unable(effort: str) -> Handler:
+def _unable(motor: Motor, effort: str) -> Handler:
+    fact = f"the stub simulates no {effort}s"
+    if motor.spec.forces:
+        fact = f"no {effort} moves a driving wheel, nor what has no physics"
+
     def fail(_request: Any) -> dict[str, Any]:
-        raise UnsimulatedError(f"the stub simulates no {effort}s; set a position or velocity")
+        raise UnsimulatedError(f"{fact}; set a position or velocity")
 
     return fail
 
@@ -104,6 +149,8 @@ ROTATIONAL_MOTOR: Final = Kind(
     role="motor",
     read=_reader("maxTorque"),
     services=_services("torque", _ROTATIONAL),
+    topics=_topics("torque"),
+    sensor="torque_feedback_sensor",
 )
 LINEAR_MOTOR: Final = Kind(
     node="LinearMotor",
@@ -112,4 +159,6 @@ LINEAR_MOTOR: Final = Kind(
     role="motor",
     read=_reader("maxForce"),
     services=_services("force", _LINEAR),
+    topics=_topics("force"),
+    sensor="force_feedback_sensor",
 )
