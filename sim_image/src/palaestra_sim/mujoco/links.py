@@ -195,7 +195,7 @@ class LinkBody:
         data, joint, motor = self._data, self._joint, self._motor
         if joint is None:
             x, y, z = data.sensordata[self._sensor : self._sensor + 3].tolist()
-            self.link.force = (x, y, z)
+            self.link.force = (-x, -y, -z)  # MuJoCo measures what holds it
             return
         position, speed = float(data.qpos[self._at]), float(data.qvel[self._dof])
         joint.follow(position, speed)

@@ -1,34 +1,91 @@
-"""TouchSensor: a bumper around its robot."""
+"""TouchSensor: a bumper around its robot, or a part whose force on the robot is measured.
+
+A sensor of type `force` measures what presses it along its x axis, one of type `force-3d` the force in its
+own axes; both have to have physics, and a physics with forces. Source: WbTouchSensor.cpp of Webots.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.devices.response import Gauss, discrete, table_rows, table_service
+from palaestra_sim.scene.links import Link
+from palaestra_sim.scene.lookup import LookupTable, lookup_table
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.seam import Row
 
-_BUMPER: Final = 0  # what `get_type` answers; FORCE is 1, FORCE_3D 2
-_TABLE: Final = [0.0, 0.0, 0.0, 5000.0, 50000.0, 0.0]  # the default of TouchSensor.lookupTable
+_TYPES: Final = ("bumper", "force", "force-3d")  # by what `get_type` answers
+_BUMPER, _FORCE, _FORCE_3D = range(3)
+_TABLE: Final = ((0.0, 0.0, 0.0), (5000.0, 50000.0, 0.0))  # the default of TouchSensor.lookupTable
+_NOTHING: Final = (0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class TouchSensor:
-    """A bumper; `value` is whether its robot touched anything since the sensor was last sampled."""
+    """A sensor of touch.
+
+    Attributes:
+        outline: its shapes.
+        type: one of `_TYPES`, by its number.
+        link: the part whose force is measured; None for a bumper.
+        table: through which each force goes; None: the force itself.
+        resolution: of a force; -1: as fine as can be.
+        value: of a bumper, whether its robot touched anything since the sensor was last sampled; of others
+            the force, or three of them.
+    """
 
     name: str
     model: str
     outline: list[Shape]
-    value: bool = False
+    type: int = _BUMPER
+    link: Link | None = None
+    table: LookupTable | None = field(default_factory=lambda: lookup_table(*_TABLE))
+    resolution: float = -1.0
+    value: Any = False
+
+    def feel(self, gauss: Gauss) -> None:
+        """Take the force of this moment."""
+        x, y, z = _NOTHING if self.link is None else self.link.force
+        if self.type == _FORCE:
+            self.value = self._response(max(0.0, -x), gauss)  # a pull is no pressure
+        else:
+            self.value = tuple(self._response(part, gauss) for part in (x, y, z))
+
+    def _response(self, force: float, gauss: Gauss) -> float:
+        if self.table is not None:
+            force = self.table.response(force, gauss)
+        return discrete(force, self.resolution)
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench:
+    """The force of a sensor, as a geometry_msgs/Wrench without torque."""
+
+    sensor: TouchSensor
+
+    @property
+    def value(self) -> dict[str, Any]:
+        """Of the last sample."""
+        return {"force": self.sensor.value, "torque": _NOTHING}
 
 
 def _read(part: Part) -> TouchSensor:
-    if part.text("type", "bumper") != "bumper":
+    type_name = part.text("type", "bumper")
+    kind = _TYPES.index(type_name) if type_name in _TYPES else _BUMPER
+    if type_name != "bumper" and not part.forces:
         part.lack("a touch sensor that measures force")
     # Without physics of its own, a bumper is part of the robot in Webots too.
-    return TouchSensor(name=part.name, model=part.text("model"), outline=part.take_outline())
+    sensor = TouchSensor(name=part.name, model=part.text("model"), outline=part.take_outline(), type=kind)
+    if kind and part.forces:
+        rows = table_rows(part, _TABLE, "forces")
+        sensor.table = lookup_table(*rows) if rows else None
+        sensor.resolution = part.number("resolution", -1.0)
+        sensor.link = part.measure()
+        sensor.value = 0.0 if kind == _FORCE else _NOTHING
+    return sensor
 
 
 def _sampler(sensors: Sequence[TouchSensor], robot: Carrier) -> Sample:
@@ -36,28 +93,42 @@ def _sampler(sensors: Sequence[TouchSensor], robot: Carrier) -> Sample:
 
     All of them are read before the contacts are forgotten, so that each hears of its own.
     """
-    body = robot.body
-    if body is None:
-        return lambda: None
-    outer = [(sensor, bits) for sensor in sensors if (bits := body.bits(sensor.outline))]
+    body, gauss = robot.body, robot.gauss
+    forces = [sensor for sensor in sensors if sensor.link is not None]
+    bumpers = [sensor for sensor in sensors if sensor.link is None]
+    outer = (
+        [] if body is None else [(sensor, bits) for sensor in bumpers if (bits := body.bits(sensor.outline))]
+    )
 
     def sample() -> None:
-        for sensor, bits in outer:
-            sensor.value = bool(body.touched & bits)
-        body.touched = 0
+        if body is not None:
+            for sensor, bits in outer:
+                sensor.value = bool(body.touched & bits)
+            body.touched = 0
+        for sensor in forces:
+            sensor.feel(gauss)
 
     return sample
 
 
-def _services(_sensor: TouchSensor) -> tuple[Row, ...]:
+def _services(sensor: TouchSensor) -> tuple[Row, ...]:
+    rows = () if sensor.table is None else sensor.table.rows
     return (
-        ("get_type", "get_int", lambda _: {"value": _BUMPER}),
-        ("get_lookup_table", "get_float_array", lambda _: {"value": _TABLE}),
+        ("get_type", "get_int", lambda _: {"value": sensor.type}),
+        *table_service(rows),
     )
 
 
 def _topics(sensor: TouchSensor) -> tuple[Topic, ...]:
-    return (Topic(name="value", type_name="webots_ros/BoolStamped", source=sensor),)
+    if sensor.type == _BUMPER:
+        return (Topic(name="value", type_name="webots_ros/BoolStamped", source=sensor),)
+    if sensor.type == _FORCE:
+        return (Topic(name="value", type_name="webots_ros/Float64Stamped", source=sensor),)
+    return (
+        Topic(
+            name="values", type_name="geometry_msgs/WrenchStamped", source=Wrench(sensor), reading="wrench"
+        ),
+    )
 
 
 TOUCH_SENSOR: Final = Kind(
