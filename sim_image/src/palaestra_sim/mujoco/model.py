@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from palaestra_sim.mujoco.body import MujocoBody, servo
+from palaestra_sim.mujoco.friction import set_frictions
 from palaestra_sim.mujoco.geoms import (
     FRICTION,
     LOOSE,
@@ -36,8 +37,9 @@ from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.surroundings import Surroundings, material_of
 
-MASS_KG: Final = 23.0  # of a robot: a Robotino 3 with its batteries
+MASS_KG: Final = 23.0  # of a robot without physics: a Robotino 3 with its batteries
 STANDING_KG: Final = 1e5  # of one that nothing drives: it stands like a wall
 _LEAST_KG: Final = 1e-6
 _LEAST_KG_M2: Final = 1e-9
@@ -132,10 +134,10 @@ class Contents:
         return [(it, it.body) for it in self.figures if isinstance(it.body, MujocoBody)]
 
 
-def build(contents: Contents) -> Built:
+def build(contents: Contents, surroundings: Surroundings) -> Built:
     """Return the model of robots, obstacles, loose things and links, in their present state."""
     courses = [thing.place.course for thing in contents.loose]  # of the model before, if there was one
-    spec, marks, moving = _spec(), Marks(), contents.moving
+    spec, marks, moving = mujoco.MjSpec(), Marks(), contents.moving
     solids = contents.solids
     stands = {
         place: _add_obstacle(spec, [shape for shape in solids if shape.place is place], moving, marks)
@@ -146,6 +148,9 @@ def build(contents: Contents) -> Built:
     roots = {figure.place: body for figure, body in robots.items()}
     roots.update((thing.place, body) for thing, body in things.items())
     links = _add_all_links(Ground(spec, roots, stands), contents, marks)
+    floor = _begin_spec(spec, surroundings)
+    surfaces = [(geom, material_of(shape.node)) for geom, shape, _, _ in marks.entries]
+    set_frictions(spec, [(floor, surroundings.floor), *surfaces], surroundings)
     model = spec.compile()
     data = mujoco.MjData(model)
     built = Built(
@@ -168,17 +173,17 @@ def build(contents: Contents) -> Built:
     return built
 
 
-def _spec() -> Any:
-    spec = mujoco.MjSpec()
+def _begin_spec(spec: Any, surroundings: Surroundings) -> Any:
+    """Set what holds everywhere in a model; return the floor."""
+    spec.option.gravity = [0.0, 0.0, -surroundings.gravity_m_s2]
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # Webots takes any matrix
     spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
-    spec.worldbody.add_geom(
+    return spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=STANDING, conaffinity=0, friction=FRICTION
     )
-    return spec
 
 
 def _add_all_links(ground: Ground, contents: Contents, marks: Marks) -> dict[Figure | None, list[Added]]:
@@ -254,7 +259,9 @@ def _add_robot(
 ) -> Any:
     added = spec.worldbody.add_body(pos=[0.0, 0.0, figure.place.height_m], name=f"base {index}")
     added.explicitinertial = True
-    mass = STANDING_KG if body.base.drive is None else MASS_KG
+    mass = sum(matter.mass_kg for matter in body.build.matter) or MASS_KG
+    if body.base.drive is None:
+        mass = STANDING_KG
     added.mass = mass
     turning = 0.5 * mass * body.radius_m**2
     added.inertia = [turning, turning, turning]

@@ -26,6 +26,7 @@ from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.surroundings import Surroundings
 
 LONGEST_STEP_S: Final = 0.004  # of MuJoCo: contacts are soft beyond
 
@@ -36,8 +37,9 @@ class MujocoPhysics:
     abilities = Abilities(name="MuJoCo", loose=True, leaning=True, forces=True, joints=True)
 
     def __init__(self) -> None:
+        self._surroundings = Surroundings()
         self._contents = Contents()
-        self._built: Built = build(self._contents)
+        self._built: Built = build(self._contents, self._surroundings)
         self._settled = True
         self._pushes: list[tuple[Figure | Loose, Push]] = []
         self._pictures: Pictures | None = None
@@ -45,6 +47,11 @@ class MujocoPhysics:
     def body(self, build: Build) -> MujocoBody:
         """Return the body of a robot that is being read."""
         return MujocoBody(build)
+
+    def begin(self, surroundings: Surroundings) -> None:
+        """Take gravity and frictions of the world."""
+        self._surroundings = surroundings
+        self._built = build(self._contents, surroundings)
 
     def arrange(
         self,
@@ -61,7 +68,7 @@ class MujocoPhysics:
             self._built.put_obstacles()
         else:
             self._contents = contents
-            self._built = build(contents)
+            self._built = build(contents, self._surroundings)
         self._settled = False
 
     def advance(self, step_s: float) -> None:

@@ -21,6 +21,7 @@ from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.surroundings import Surroundings
 
 Cast = Callable[[], Sequence[float]]
 
@@ -92,6 +93,10 @@ class Physics(Protocol):
 
     def body(self, build: Build) -> Body:
         """Return the body of a robot that is being read, at the origin of the world and at rest."""
+        ...
+
+    def begin(self, surroundings: Surroundings) -> None:
+        """Take what holds everywhere in the world, before anything is arranged in it."""
         ...
 
     def arrange(

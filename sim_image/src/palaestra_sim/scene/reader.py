@@ -23,6 +23,7 @@ from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import ELSEWHERE, LeaveOut, Reading
 from palaestra_sim.scene.robot_reader import RobotParts, read_robot
 from palaestra_sim.scene.shapes import Shape, bounding_shapes
+from palaestra_sim.scene.surroundings import Surroundings, read_surroundings
 from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 # Visible to people and cameras only, or read elsewhere (WorldInfo).
@@ -63,6 +64,7 @@ class Scene:
         doors: what swings on joints that are on no robot.
         robots: in the order of the world file.
         top: the frame around everything; None if z of the world points up.
+        surroundings: what holds everywhere.
         left_out: what the stub lacks and the user left out, each with its place.
         leave_out: what the user leaves out.
     """
@@ -75,6 +77,7 @@ class Scene:
     doors: list[Link] = field(default_factory=list)
     robots: list[RobotParts] = field(default_factory=list)
     top: Place | None = None
+    surroundings: Surroundings = field(default_factory=Surroundings)
     left_out: tuple[WorldError, ...] = ()
     leave_out: LeaveOut = field(default_factory=LeaveOut)
 
@@ -97,6 +100,9 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
         reading.top = read_axes(reading, first)
     for node in tree.root.nodes():
         _read(reading, node, reading.top, scene)
+    if physics.abilities.forces:
+        floors = (node for node in tree.nodes.values() if node.type_name == "Plane" and node.outline)
+        scene.surroundings = read_surroundings(reading, reading.world_info, next(floors, None))
     reading.conclude()
     scene.top = reading.top
     scene.left_out = tuple(reading.left_out)

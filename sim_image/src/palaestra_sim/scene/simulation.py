@@ -68,6 +68,7 @@ class Simulation:
         self._assemble()
         self._step_s = scene.basic_step_ms / 1000.0
         self._solids_moved = False
+        scene.physics.begin(scene.surroundings)
         self._arrange()
 
     @classmethod

@@ -17,6 +17,7 @@ from palaestra_sim.scene.loose import Loose
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
+from palaestra_sim.scene.surroundings import Surroundings
 from palaestra_sim.stub.body import StubBody
 from palaestra_sim.stub.contacts import contact_points
 from palaestra_sim.stub.obstacles import Neighborhood
@@ -47,6 +48,9 @@ class StubPhysics:
         parts = covering(build.outline)
         outline, rim = [part for part, _ in parts], [shape for _, shape in parts]
         return StubBody(build.base, outline, rim, build.heights)
+
+    def begin(self, surroundings: Surroundings) -> None:
+        """Do nothing: there are no forces."""
 
     def arrange(
         self,
