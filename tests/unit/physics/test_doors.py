@@ -152,7 +152,7 @@ def test_a_lid_swings_on_a_crate(load):
       translation 0 1.2 1 boundingObject Box { size 0.3 0.3 0.3 } physics Physics { density -1 mass 5 }
       children [ HingeJoint {
         jointParameters HingeJointParameters { axis 0 1 0 anchor 0.15 0 0.15 dampingConstant 0.02 }
-        endPoint DEF LID Solid { translation 0.15 0 0.3 rotation 0 1 0 0.2 name "lid"
+        endPoint DEF LID Solid { translation 0.2 0 0.3 rotation 0 1 0 0.2 name "lid"
           boundingObject Box { size 0.02 0.3 0.3 } physics Physics { density -1 mass 0.5 } } } ] }"""
     simulation = load(crate)
 

@@ -27,11 +27,14 @@ class LooseBody:
         self._where = data.qpos[at : at + _PLACE]
         self._speed = data.qvel[speed : speed + _SPEED]
 
-    def begin(self, course: Course) -> None:
-        """Begin at a place with a speed."""
+    def begin(self, course: Course, changed: dict[LoosePlace, None]) -> None:
+        """Begin at a place with a speed; what clients do to the place puts it among `changed`."""
         self._write(course.pose)
         self._move(course)
         self.place.put = False
+        self.place.changed = changed
+        if self.place.speed is not None:
+            changed[self.place] = None
         self.place.follow = self._course
 
     def take(self) -> None:

@@ -32,8 +32,9 @@ from palaestra_sim.mujoco.geoms import (
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.links import Added, Ground, LinkBody, add_links, bodies
 from palaestra_sim.mujoco.loose import LooseBody
+from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.links import Link
-from palaestra_sim.scene.loose import Loose
+from palaestra_sim.scene.loose import Loose, LoosePlace
 from palaestra_sim.scene.physics import Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
@@ -56,6 +57,9 @@ class Built:
         loose: the loose things.
         links: what is on joints, by the robot; None: those on no robot.
         own_geoms: the numbers of the geoms on them.
+        fixed: where the obstacles are that do not move.
+        of_robots: whether a geom is a part of a robot, by number.
+        changed: the loose things that clients moved since the physics looked.
     """
 
     model: Any
@@ -63,9 +67,12 @@ class Built:
     figures: dict[Figure, tuple[MujocoBody, int]]
     geoms: dict[int, tuple[Shape, MujocoBody | None, int]]
     stands: dict[Place, int]
-    loose: tuple[LooseBody, ...]
+    loose: dict[LoosePlace, LooseBody]
     links: dict[Figure | None, tuple[LinkBody, ...]]
     own_geoms: dict[Figure | None, list[int]]
+    fixed: dict[Place, Pose]
+    of_robots: Any
+    changed: dict[LoosePlace, None]
 
     def body_of(self, figure: Figure) -> int:
         """Return the number of a robot's body; -1 if it has none."""
@@ -87,15 +94,30 @@ class Built:
         """Put the obstacles where their places are now."""
         for place, number in self.stands.items():
             mocap = self.model.body_mocapid[number]
+            if mocap < 0:
+                continue
             put(self.data.mocap_pos[mocap], self.data.mocap_quat[mocap], place.ground_pose)
         for figure, (_, number) in self.figures.items():
             self.model.body_pos[number][2] = figure.place.height_m
 
+    def displaced(self) -> frozenset[Place]:
+        """Return the places of the obstacles that are no longer where the model has them."""
+        return frozenset(place for place, pose in self.fixed.items() if place.ground_pose != pose)
+
+    def feel(self) -> None:
+        """Note which parts of robots are touched."""
+        touched = self.data.contact.geom.ravel()
+        for geom in touched[self.of_robots[touched]].tolist():
+            _, body, bit = self.geoms[geom]
+            if body is not None:
+                body.touched |= bit
+
     def take(self) -> bool:
         """Take what clients did to loose things and joints; return whether they did anything."""
-        changed = [thing for thing in self.loose if thing.place.put or thing.place.speed is not None]
-        for thing in changed:
-            thing.take()
+        changed = list(self.changed)
+        self.changed.clear()
+        for place in changed:
+            self.loose[place].take()
         moved = [link for link in self.all_links() if link.take()]
         return bool(changed or moved)
 
@@ -107,8 +129,8 @@ class Built:
     def push(self, target: Figure | Loose, push: Push) -> None:
         """Let a force act on a robot or a loose thing until the forces are cleared."""
         found = self.figures.get(target) if not isinstance(target, Loose) else None
-        numbers = [it.number for it in self.loose if it.place is target.place]
-        number = numbers[0] if found is None else found[1]
+        number = self.loose[target.place].number if isinstance(target, Loose) else -1
+        number = number if found is None else found[1]
         torque = np.array(push.torque)
         if push.point is not None:
             torque += np.cross(np.array(push.point) - self.data.xipos[number], push.force)
@@ -134,14 +156,23 @@ class Contents:
         return [(it, it.body) for it in self.figures if isinstance(it.body, MujocoBody)]
 
 
-def build(contents: Contents, surroundings: Surroundings) -> Built:
-    """Return the model of robots, obstacles, loose things and links, in their present state."""
+def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place] = frozenset()) -> Built:
+    """Return the model of robots, obstacles, loose things and links, in their present state.
+
+    What touches a body that can be put elsewhere never sleeps. So obstacles cannot, where there are things
+    that sleep, except those that have `moved`.
+    """
     courses = [thing.place.course for thing in contents.loose]  # of the model before, if there was one
     spec, marks, moving = mujoco.MjSpec(), Marks(), contents.moving
     solids = contents.solids
+    by_place: dict[Place, list[Shape]] = {}
+    for shape in solids:
+        by_place.setdefault(shape.place, []).append(shape)
+    movable = frozenset(by_place) if not (contents.loose or contents.doors) else moved
+    fixed = {place: place.ground_pose for place in by_place if place not in movable}
     stands = {
-        place: _add_obstacle(spec, [shape for shape in solids if shape.place is place], moving, marks)
-        for place in dict.fromkeys(shape.place for shape in solids)
+        place: _add_obstacle(spec, shapes, fixed.get(place), moving, marks)
+        for place, shapes in by_place.items()
     }
     robots = {figure: _add_robot(spec, figure, body, at, marks) for at, (figure, body) in enumerate(moving)}
     things = {thing: _add_loose(spec, thing, marks) for thing in contents.loose}
@@ -159,15 +190,18 @@ def build(contents: Contents, surroundings: Surroundings) -> Built:
         figures={figure: (body, robots[figure].id) for figure, body in moving},
         geoms={geom.id: (shape, body, bit) for geom, shape, body, bit in marks.entries},
         stands={place: added.id for place, added in stands.items()},
-        loose=tuple(LooseBody(it.place, model, data, added.id) for it, added in things.items()),
+        loose={it.place: LooseBody(it.place, model, data, added.id) for it, added in things.items()},
+        fixed=fixed,
+        of_robots=_of_robots(model.ngeom, marks),
+        changed={},
         links=bodies(links, model, data),
         own_geoms={
             whose: [geom.id for it in some for geom in it.body.geoms] for whose, some in links.items()
         },
     )
     _begin(built)
-    for thing, course in zip(built.loose, courses, strict=True):
-        thing.begin(course)
+    for thing, course in zip(built.loose.values(), courses, strict=True):
+        thing.begin(course, built.changed)
     built.take()
     built.settle()
     return built
@@ -198,6 +232,13 @@ def _add_all_links(ground: Ground, contents: Contents, marks: Marks) -> dict[Fig
     return added
 
 
+def _of_robots(count: int, marks: Marks) -> Any:
+    flags = np.zeros(count, dtype=bool)
+    for geom, _, body, _ in marks.entries:
+        flags[geom.id] = body is not None
+    return flags
+
+
 def _begin(built: Built) -> None:
     """Put obstacles and robots where they are; what is on a robot makes its servos stronger."""
     built.put_obstacles()
@@ -218,11 +259,14 @@ def _begin(built: Built) -> None:
 def _add_obstacle(
     spec: Any,
     shapes: Iterable[Shape],
+    pose: Pose | None,
     robots: Sequence[tuple[Figure, MujocoBody]],
     marks: Marks,
 ) -> Any:
     # MuJoCo looks at the pose of bodies without mocap once.
-    added = spec.worldbody.add_body(mocap=True, name=f"stand {len(marks.entries)}")
+    added = spec.worldbody.add_body(mocap=pose is None, name=f"stand {len(marks.entries)}")
+    if pose is not None:
+        put(added.pos, added.quat, pose)
     for shape in shapes:
         low, high = shape.heights()
         bits = STANDING

@@ -40,6 +40,8 @@ class MujocoPhysics:
         self._surroundings = Surroundings()
         self._contents = Contents()
         self._built: Built = build(self._contents, self._surroundings)
+        self._moved: frozenset[Place] = frozenset()  # obstacles that moved since the last reset
+        self._stale = False
         self._settled = True
         self._pushes: list[tuple[Figure | Loose, Push]] = []
         self._pictures: Pictures | None = None
@@ -51,7 +53,7 @@ class MujocoPhysics:
     def begin(self, surroundings: Surroundings) -> None:
         """Take gravity and frictions of the world."""
         self._surroundings = surroundings
-        self._built = build(self._contents, surroundings)
+        self._stale = True
 
     def arrange(
         self,
@@ -66,14 +68,17 @@ class MujocoPhysics:
         )
         if contents == self._contents:
             self._built.put_obstacles()
+            displaced = self._built.displaced()
+            self._moved |= displaced
+            self._stale = self._stale or bool(displaced)
         else:
             self._contents = contents
-            self._built = build(contents, self._surroundings)
+            self._stale = True
         self._settled = False
 
     def advance(self, step_s: float) -> None:
         """Move the bodies on by one basic step."""
-        built = self._built
+        built = self._fresh()
         steps = math.ceil(step_s / LONGEST_STEP_S - 1e-9)
         built.model.opt.timestep = step_s / steps
         built.take()
@@ -87,7 +92,7 @@ class MujocoPhysics:
         for _ in range(steps):
             mujoco.mj_step(built.model, built.data)
             if built.data.ncon:
-                self._feel()
+                built.feel()
         for body, _ in built.figures.values():
             body.follow(step_s)
         for link in built.all_links():
@@ -102,6 +107,8 @@ class MujocoPhysics:
         mujoco.mj_resetData(self._built.model, self._built.data)
         self._built.put_obstacles()
         self._pushes.clear()
+        self._stale = self._stale or bool(self._moved)
+        self._moved = frozenset()
         for body, _ in self._built.figures.values():
             body.write()
         for link in self._built.all_links():
@@ -141,17 +148,15 @@ class MujocoPhysics:
                 x, y, z = position
                 yield ContactPoint((x, y, z), (_solid(sides[0][0].node), _solid(sides[1][0].node)))
 
-    def _feel(self) -> None:
-        """Note which parts of robots are touched."""
-        geoms = self._built.geoms
-        for pair in self._built.data.contact.geom.tolist():
-            for geom in pair:
-                found = geoms.get(geom)
-                if found is not None and found[1] is not None:
-                    found[1].touched |= found[2]
+    def _fresh(self) -> Built:
+        """Return the model, made anew if things came, went, or moved that stood until now."""
+        if self._stale:
+            self._stale = False
+            self._built = build(self._contents, self._surroundings, self._moved)
+        return self._built
 
     def _settle(self) -> None:
-        if self._built.take() or not self._settled:
+        if self._fresh().take() or not self._settled:
             self._built.settle()
             self._settled = True
 

@@ -25,6 +25,7 @@ class LoosePlace(Place):
 
     Attributes:
         follow: returns where the physics has moved it; None before there is a physics.
+        changed: what the physics looks through; a place with news adds itself.
         put: whether it was put somewhere since the physics looked; the physics sets it back.
         speed: the velocity and turning that a client gave it, in the axes of the ground, until the physics
             takes them; None: no change.
@@ -38,6 +39,7 @@ class LoosePlace(Place):
         super().__init__(parent, translation, rotation, size)
         self.follow: Callable[[], Course] | None = None
         self.put = False
+        self.changed: dict[LoosePlace, None] | None = None
         self.speed: tuple[Vector, Vector] | None = None
 
     @property
@@ -50,7 +52,7 @@ class LoosePlace(Place):
         if not self._stays():
             self._rotation = to_axis_angle(self._local().rotation)
         self._translation = value
-        self.put = True
+        self._note_put()
 
     @property
     def rotation(self) -> AxisAngle:
@@ -62,7 +64,7 @@ class LoosePlace(Place):
         if not self._stays():
             self._translation = self._local().position
         self._rotation = value
-        self.put = True
+        self._note_put()
 
     @property
     def course(self) -> Course:
@@ -74,6 +76,8 @@ class LoosePlace(Place):
     def push(self, velocity: Vector, turning: Vector) -> None:
         """Give it a velocity in m/s and a turning in rad/s, in the axes of the ground."""
         self.speed = velocity, turning
+        if self.changed is not None:
+            self.changed[self] = None
 
     def halt(self) -> None:
         """Stop its motion."""
@@ -83,6 +87,11 @@ class LoosePlace(Place):
         """Return to the place in the world file, at rest."""
         super().return_to_start()
         self.halt()
+
+    def _note_put(self) -> None:
+        self.put = True
+        if self.changed is not None:
+            self.changed[self] = None
 
     def _stays(self) -> bool:
         return self.put or self.follow is None

@@ -40,7 +40,7 @@ def read_surroundings(
     material = DEFAULT if floor is None else material_of(floor)
     if world_info is None:
         return Surroundings(floor=material)
-    frictions = {}
+    frictions: dict[frozenset[str], float] = {}
     for node in world_info.nodes("contactProperties"):
         pair = frozenset(node.text(f"material{side}") or DEFAULT for side in (1, 2))
         frictions.setdefault(pair, _coefficient(node))
