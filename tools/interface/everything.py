@@ -23,6 +23,8 @@ _SETTINGS = {
     "Lidar": "numberOfLayers 2",
 }
 
+_MASS = "physics Physics { density -1 mass 1 }"  # without it no force moves a joint
+
 PHYSICS: Mapping[str, Callable[[], Physics]] = {"stub": StubPhysics, "mujoco": MujocoPhysics}
 # What a simulator cannot do fails, so that no client trains with a success that did nothing.
 _STUB = frozenset(  # pictures and forces
@@ -32,8 +34,12 @@ _STUB = frozenset(  # pictures and forces
         "camera/recognition_enable_segmentation",
         "camera/recognition_save_segmentation_image",
         "camera/save_image",
+        "linear_motor/force_feedback_sensor/enable",
+        "linear_motor/set_force",
         "range_finder/enable",
         "range_finder/save_image",
+        "rotational_motor/set_torque",
+        "rotational_motor/torque_feedback_sensor/enable",
         "supervisor/export_image",
         "supervisor/node/add_force",
         "supervisor/node/add_force_with_offset",
@@ -45,12 +51,8 @@ _EVERYWHERE = frozenset(
         "display/attach_camera",
         "display/image_load",
         "display/image_save",
-        "linear_motor/set_force",
-        "linear_motor/force_feedback_sensor/enable",
         "radar/enable",
         "robot/get_urdf",
-        "rotational_motor/set_torque",
-        "rotational_motor/torque_feedback_sensor/enable",
         "skin/get_bone_name",
         "skin/get_bone_orientation",
         "skin/get_bone_position",
@@ -119,4 +121,4 @@ def _part(kind: Kind[Any]) -> str:
     if not kind.on_joint:
         return node
     joint = "SliderJoint" if kind.node == "LinearMotor" else "HingeJoint"
-    return f"DEF {kind.node.upper()}_JOINT {joint} {{ device {node} endPoint Solid {{ }} }}"
+    return f"DEF {kind.node.upper()}_JOINT {joint} {{ device {node} endPoint Solid {{ {_MASS} }} }}"

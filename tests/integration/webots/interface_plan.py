@@ -93,7 +93,6 @@ ANSWERS = {
     "rotational_motor/get_velocity": {"value": 0.5},
     "rotational_motor/get_max_velocity": {"value": 10.0},
     "rotational_motor/get_max_torque": {"value": 10.0},
-    "rotational_motor/torque_feedback_sensor/get_sampling_period": {"value": 0},
     "linear_motor/get_type": {"value": 1},
     "linear_motor/get_node_type": {"value": 50},
     "brake/get_name": {"value": "brake"},
