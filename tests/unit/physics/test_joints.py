@@ -290,3 +290,15 @@ def test_an_arm_does_not_slow_its_robot():
 
     assert robot.body.x == pytest.approx(0.25 * 0.96, abs=0.02)
     assert robot.links
+
+
+def test_an_arm_on_a_table_holds_its_weight():
+    """A robot inside another node has no body, and its joints have forces all the same."""
+    source = arm().replace(b"Robot {", b"Pose { translation 1 2 0.5 rotation 0 0 1 1 children [ Robot {")
+    simulation, robot = load(source + b"] }")
+    assert robot.body is None
+
+    simulation.step(800)
+
+    assert robot.motors["motor"].feedback_nm == pytest.approx(-G, rel=1e-3)
+    assert simulation.tree.of_def("ROD").place.world_pose.position[2] == pytest.approx(2.0, abs=1e-3)

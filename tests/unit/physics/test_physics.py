@@ -185,6 +185,17 @@ def test_robots_run_into_each_other(load, drive):
     assert max(distances(simulation)) == distances(simulation)[0]
 
 
+def test_a_robot_inside_a_pose_stands_where_the_pose_puts_it(load, drive):
+    """It has no body of its own there, so it is an obstacle."""
+    simulation = load(builtin("arena") + b"Pose { translation 0.5 0 0 children [" + OTHER + b"] }")
+    standing = simulation.scene.solids[-1].pose.position
+
+    body = drive(simulation, 0.3, 0.0, 0.0, steps=25)
+
+    assert standing == pytest.approx((1.3, 0.0, 0.2))
+    assert body.x == pytest.approx(1.3 - 0.2 - RADIUS_M, abs=0.03)
+
+
 def test_mujoco_follows_the_stub_in_free_space(drive):
     """Ten random courses of ten seconds, a new command every 192 ms: within 5 cm and 2 degrees."""
     source = builtin("arena").decode()

@@ -8,7 +8,7 @@ Everything else on a joint moves with it, but touches nothing, unless the physic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from palaestra_sim.scene.arguments import Arguments, read_arguments
@@ -128,7 +128,7 @@ class _RobotReader:
             place=place,
             devices=self._devices,
             body=body,
-            standing=() if moves else tuple(shapes),
+            standing=() if moves else tuple(self._on(place, shape) for shape in shapes),
             arguments=read_arguments(reading, node) if self._by_ros else None,
             links=links,
         )
@@ -171,6 +171,10 @@ class _RobotReader:
         if not Place(self._parent, translation, rotation).ground_pose.upright:
             self._lacks(node, "a robot that drives, but does not stand upright")
         return RobotPlace(self._parent, translation, rotation, body)
+
+    def _on(self, place: Place, shape: Shape) -> Shape:
+        """Return a shape that was read in the robot's own frame, on the robot."""
+        return replace(shape, place=place) if shape.place is self._frame else shape
 
     def _settle(self, place: Place) -> None:
         """Put the parts, read in a frame of their own, on the robot."""
