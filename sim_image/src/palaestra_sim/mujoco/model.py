@@ -87,8 +87,10 @@ class Built:
             yield
             return
         self.model.geom_group[own] = UNSEEN
-        yield
-        self.model.geom_group[own] = SEEN
+        try:
+            yield
+        finally:
+            self.model.geom_group[own] = SEEN
 
     def put_obstacles(self) -> None:
         """Put the obstacles where their places are now."""
@@ -164,16 +166,7 @@ def build(contents: Contents, surroundings: Surroundings, moved: frozenset[Place
     """
     courses = [thing.place.course for thing in contents.loose]  # of the model before, if there was one
     spec, marks, moving = mujoco.MjSpec(), Marks(), contents.moving
-    solids = contents.solids
-    by_place: dict[Place, list[Shape]] = {}
-    for shape in solids:
-        by_place.setdefault(shape.place, []).append(shape)
-    movable = frozenset(by_place) if not (contents.loose or contents.doors) else moved
-    fixed = {place: place.ground_pose for place in by_place if place not in movable}
-    stands = {
-        place: _add_obstacle(spec, shapes, fixed.get(place), moving, marks)
-        for place, shapes in by_place.items()
-    }
+    stands, fixed = _add_obstacles(spec, contents, moved, marks)
     robots = {figure: _add_robot(spec, figure, body, at, marks) for at, (figure, body) in enumerate(moving)}
     things = {thing: _add_loose(spec, thing, marks) for thing in contents.loose}
     roots = {figure.place: body for figure, body in robots.items()}
@@ -254,6 +247,22 @@ def _begin(built: Built) -> None:
                 model.actuator_biasprm[servos][axis, 2] = -gain
                 model.actuator_forcerange[servos][axis] = -force, force
         body.attach(data.qpos[at : at + 3], data.qvel[dof : dof + 3], data.ctrl[servos])
+
+
+def _add_obstacles(
+    spec: Any, contents: Contents, moved: frozenset[Place], marks: Marks
+) -> tuple[dict[Place, Any], dict[Place, Pose]]:
+    """Add all obstacles; return their bodies, and the poses of those that are fixed."""
+    by_place: dict[Place, list[Shape]] = {}
+    for shape in contents.solids:
+        by_place.setdefault(shape.place, []).append(shape)
+    movable = frozenset(by_place) if not (contents.loose or contents.doors) else moved
+    fixed = {place: place.ground_pose for place in by_place if place not in movable}
+    stands = {
+        place: _add_obstacle(spec, shapes, fixed.get(place), contents.moving, marks)
+        for place, shapes in by_place.items()
+    }
+    return stands, fixed
 
 
 def _add_obstacle(
