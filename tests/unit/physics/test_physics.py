@@ -113,6 +113,18 @@ def test_an_obstacle_that_a_supervisor_moves_is_met_where_it_is(load, drive):
     assert body.x == pytest.approx(0.7 - 0.25 - RADIUS_M, abs=0.02)
 
 
+def test_an_obstacle_that_comes_out_of_the_floor_holds_a_robot(load, drive):
+    """An environment hides its cylinders below the floor until an episode has some."""
+    simulation = load(builtin("arena").replace(b"translation 0.8 0.8 0.2", b"translation 0.8 0.8 -0.7"))
+    node = simulation.tree.of_def("CYLINDER_0")
+    translation = simulation.tree.field_of(node, "translation", simulation)
+    translation.set(FieldType.VEC3F, 0, (0.7, 0.0, 0.2))
+
+    body = drive(simulation, 0.4, 0.0, 0.0, steps=10)
+
+    assert body.x == pytest.approx(0.7 - 0.25 - RADIUS_M, abs=0.02)
+
+
 def test_contact_points_name_both_sides(load, drive):
     """A supervisor asks which wall it is."""
     simulation = load()
