@@ -3,6 +3,9 @@
 - `cli`: `palaestra-mujoco`
 - `physics`: the bodies and obstacles of a world
 - `model`: from robots and shapes to MuJoCo's model
+- `geoms`: from shapes to parts of a model, and what they touch
+- `friction`: between materials
+- `links`: parts of robots on joints, and doors
 - `body`: a robot that drives
 - `loose`: a thing that moves when it is pushed
 - `library`: MuJoCo itself

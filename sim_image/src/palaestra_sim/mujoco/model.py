@@ -55,7 +55,7 @@ class Built:
         geoms: by number, the shapes that are obstacles or outlines, with the body of a robot's.
         stands: the number of the body of each place that has obstacles, or links mounted on it.
         loose: the loose things.
-        links: what is on joints, by the robot; None: those on no robot.
+        links: the links of each robot, and under None those on no robot.
         own_geoms: the numbers of the geoms on them.
         fixed: where the obstacles are that do not move.
         of_robots: whether a geom is a part of a robot, by number.

@@ -19,7 +19,7 @@ from palaestra_sim.scene.reading import Reading
 from palaestra_sim.scene.shapes import Shape
 from palaestra_sim.scene.wheels import Driven
 
-_CLEARANCE_M: Final = 0.01  # what is lower above the floor rolls on it
+_CLEARANCE_M: Final = 0.01  # an end that is lower above the floor rolls on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
