@@ -13,7 +13,7 @@ from pathlib import Path
 from palaestra_protocol.control import RobotName
 from palaestra_sim.errors import SidecarError, WorldError
 from palaestra_sim.sidecar import project
-from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots
+from palaestra_sim.world import RunIdentity, builtin_path, generate, rename, robots, suffix
 
 SLOTS = ("a", "b")  # the simulators of one sidecar: the first, and its standby
 _PROJECT = "project"
@@ -35,7 +35,7 @@ def read(world: Path) -> bytes:
     try:
         return world.read_bytes()
     except OSError as error:
-        raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt file") from error
+        raise SidecarError(f"--world: {world}: {error.strerror}; give a .wbt or .xml file") from error
 
 
 def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool, as_project: bool = False) -> Path:
@@ -48,20 +48,22 @@ def named(world: Path, work: Path, identity: RunIdentity, *, clock: bool, as_pro
         WorldError: the world is wrong.
         SidecarError: it cannot be read or written; no partial file is left.
     """
-    make = partial(generate, read(world), identity, clock=clock, name=str(world))
-    return _written(world, work / file_name(identity), make, as_project=as_project)
+    source = read(world)
+    make = partial(generate, source, identity, clock=clock, name=str(world))
+    return _written(world, work / file_name(identity, suffix(source)), make, as_project=as_project)
 
 
-def renamed(world: Path, work: Path, suffix: str, *, as_project: bool = False) -> Path:
-    """Write a copy of `world` with `suffix` appended to its ROS names into `work`; return its path.
+def renamed(world: Path, work: Path, ending: str, *, as_project: bool = False) -> Path:
+    """Write a copy of `world` with `ending` appended to its ROS names into `work`; return its path.
 
     `as_project` is as for `named`.
 
     Raises:
         WorldError, SidecarError: as `named` does.
     """
-    make = partial(rename, read(world), suffix, name=str(world))
-    return _written(world, work / f"{world.stem}{suffix}.wbt", make, as_project=as_project)
+    source = read(world)
+    make = partial(rename, source, ending, name=str(world))
+    return _written(world, work / f"{world.stem}{ending}{suffix(source)}", make, as_project=as_project)
 
 
 def _written(world: Path, path: Path, make: Callable[..., bytes], *, as_project: bool) -> Path:
@@ -79,10 +81,10 @@ def _written(world: Path, path: Path, make: Callable[..., bytes], *, as_project:
         raise SidecarError(f"--work: {work}: {error.strerror}; give a folder with room") from error
 
 
-def file_name(identity: RunIdentity) -> str:
+def file_name(identity: RunIdentity, ending: str = ".wbt") -> str:
     """Return the name of a simulator's own world: `collect-0.wbt`, `collect-0b.wbt` for its standby."""
     slot = "" if identity.slot == SLOTS[0] else identity.slot
-    return f"{identity.group}-{identity.index}{slot}.wbt"
+    return f"{identity.group}-{identity.index}{slot}{ending}"
 
 
 def described(source: bytes, name: str) -> tuple[RobotName, ...]:

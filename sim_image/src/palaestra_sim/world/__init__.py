@@ -1,13 +1,14 @@
-"""Worlds: read `.wbt` and `.proto` files, and generate a world for each simulator, with its own ROS names.
+"""Worlds: read `.wbt`, `.proto` and MJCF files, and generate a world for each simulator, with its own names.
 
 Pure: bytes in, bytes out. No clock, no network, and no file except what ships and the PROTOs beside a world.
 
-    parse(source)                              the tree of a world
+    parse(source)                              the tree of a `.wbt` world
     check(source)                              raises unless every simulator can have a world of it
     generate(source, identity, clock=False)    the world of one simulator
     rename(source, "_2")                       the world of one more, beside those that run
     robots(source)                             the robots in it that speak ROS
     own_controllers(source)                    the robots whose controllers are programs of their project
+    suffix(source)                             how its file ends: ".wbt" or ".xml"
     ros_name(identity, "robotino")             the name that such a robot gets
     builtin("arena")                           a world that ships
     builtin_protos()                           descriptions of robots that ship
@@ -19,19 +20,20 @@ Pure: bytes in, bytes out. No clock, no network, and no file except what ships a
 
 from palaestra_sim.errors import StandInError, UnknownWorldError, WorldError
 from palaestra_sim.world.builtin import builtin, builtin_path, builtin_protos
-from palaestra_sim.world.checks import check
 from palaestra_sim.world.externs import Protos, local_protos
-from palaestra_sim.world.generate import generate, rename
+from palaestra_sim.world.formats import MJCF, WBT, check, generate, own_controllers, rename, robots, suffix
 from palaestra_sim.world.names import RunIdentity, name_prefix, ros_name
 from palaestra_sim.world.parts import Part
 from palaestra_sim.world.proto import Proto, ProtoField, parse_proto
 from palaestra_sim.world.reader import parse, parse_nodes
-from palaestra_sim.world.robots import WorldRobot, own_controllers, robots
+from palaestra_sim.world.robots import WorldRobot
 from palaestra_sim.world.stand_ins import StandIn, expand, load_stand_ins
 from palaestra_sim.world.stand_ins import shipped as shipped_stand_ins
 from palaestra_sim.world.tree import Is, Item, Node, Value, World
 
 __all__ = [
+    "MJCF",
+    "WBT",
     "Is",
     "Item",
     "Node",
@@ -64,4 +66,5 @@ __all__ = [
     "robots",
     "ros_name",
     "shipped_stand_ins",
+    "suffix",
 ]

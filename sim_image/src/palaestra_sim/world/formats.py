@@ -1,0 +1,86 @@
+"""The two formats of worlds: `.wbt`, and MJCF, which begins with `<`.
+
+A world may come without a file, so its format is read from its first byte. The modules beside this one have
+`.wbt` worlds, `mjcf` has the others.
+"""
+
+from palaestra_sim.world import mjcf
+from palaestra_sim.world.checks import check as check_wbt
+from palaestra_sim.world.generate import generate as generate_wbt
+from palaestra_sim.world.generate import rename as rename_wbt
+from palaestra_sim.world.names import RunIdentity
+from palaestra_sim.world.robots import WorldRobot
+from palaestra_sim.world.robots import own_controllers as own_controllers_wbt
+from palaestra_sim.world.robots import robots as robots_wbt
+
+MJCF = ".xml"
+WBT = ".wbt"
+
+
+def suffix(source: bytes) -> str:
+    """Return the end of the file name of a world with these bytes: ".wbt" or ".xml"."""
+    return MJCF if mjcf.is_mjcf(source) else WBT
+
+
+def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
+    """Check that a world can be generated from the world `source` for every simulator.
+
+    `name` is the name of the world in errors. `relative_addresses`: the world stays beside the files that it
+    names, so they need no full address.
+
+    Raises:
+        WorldError: the world cannot be read, or a check fails.
+    """
+    checking = mjcf.check if mjcf.is_mjcf(source) else check_wbt
+    checking(source, name, relative_addresses=relative_addresses)
+
+
+def generate(
+    source: bytes,
+    identity: RunIdentity,
+    *,
+    clock: bool,
+    name: str = "world",
+    relative_addresses: bool = False,
+) -> bytes:
+    """Return the world of one simulator, generated from the world `source`.
+
+    `clock`: this simulator may publish `/clock` if its world asks for it; true for at most one simulator of a
+    ROS master. `name` and `relative_addresses` are as for `check`.
+
+    Raises:
+        WorldError: as for `check`.
+    """
+    generator = mjcf.generate if mjcf.is_mjcf(source) else generate_wbt
+    return generator(source, identity, clock=clock, name=name, relative_addresses=relative_addresses)
+
+
+def rename(source: bytes, ending: str, *, name: str = "world", relative_addresses: bool = False) -> bytes:
+    """Return the world with `ending` appended to each of its ROS names, and without any `--clock`.
+
+    It is for a second simulator of the same world on one ROS master. `name` and `relative_addresses` are as
+    for `check`.
+
+    Raises:
+        WorldError: as for `check`; or a robot has no ROS name, or its name would become too long.
+    """
+    renamer = mjcf.rename if mjcf.is_mjcf(source) else rename_wbt
+    return renamer(source, ending, name=name, relative_addresses=relative_addresses)
+
+
+def robots(source: bytes, name: str = "world") -> tuple[WorldRobot, ...]:
+    """Return every robot of a world that speaks ROS, in source order.
+
+    Raises:
+        WorldError: the bytes are no world file.
+    """
+    return mjcf.robots(source, name) if mjcf.is_mjcf(source) else robots_wbt(source, name)
+
+
+def own_controllers(source: bytes, name: str = "world") -> tuple[tuple[str, str], ...]:
+    """Return (robot, controller) for each robot whose controller is a program of its own, in source order.
+
+    Raises:
+        WorldError: the bytes are no world file.
+    """
+    return () if mjcf.is_mjcf(source) else own_controllers_wbt(source, name)

@@ -1,0 +1,34 @@
+"""Worlds in MJCF, the XML of MuJoCo: the description of the robot, checks, and names.
+
+Pure text, as all of `world`: MuJoCo itself is not needed to check or to name such a world.
+
+- `elements`: the elements of an XML file with their places
+- `description`: robot, arguments, basic step and devices, from the element `custom`
+- `files`: the files that a model names
+- `checks`: the mistakes that make a world unusable
+- `naming`: the world of one simulator
+"""
+
+from palaestra_sim.world.mjcf.checks import check
+from palaestra_sim.world.mjcf.description import LEFT_OUT, Description, describe, fits, is_mjcf, whole_step_ms
+from palaestra_sim.world.mjcf.elements import read
+from palaestra_sim.world.mjcf.files import named_folders, parts, stays_inside, strays
+from palaestra_sim.world.mjcf.naming import generate, rename, robots
+
+__all__ = [
+    "LEFT_OUT",
+    "Description",
+    "check",
+    "describe",
+    "fits",
+    "generate",
+    "is_mjcf",
+    "named_folders",
+    "parts",
+    "read",
+    "rename",
+    "robots",
+    "stays_inside",
+    "strays",
+    "whole_step_ms",
+]

@@ -1,0 +1,145 @@
+"""Checks for MJCF worlds that are XML, but from which no simulator's world can be made.
+
+Each check finds one kind of mistake, at all its places, as those of `.wbt` worlds do.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from itertools import chain
+from typing import Final
+
+from palaestra_sim.errors import WorldError, refusal
+from palaestra_sim.world.mjcf.description import (
+    BASIC_STEP,
+    DEVICE,
+    DEVICE_KINDS,
+    Description,
+    custom,
+    describe,
+    fits,
+    whole_step_ms,
+)
+from palaestra_sim.world.mjcf.files import named_files, parts, stays_inside, strays
+
+_ROS_REMAPPING: Final = re.compile(r"__\w+:=")
+
+Check = Callable[[Description], Iterator[WorldError]]
+
+
+def no_actuator(found: Description) -> Iterator[WorldError]:
+    """Nothing moves the robot; what another file of the model has is not seen here."""
+    if not any(it.children for it in found.root.named("actuator")) and not parts(found.root):
+        fact = "the model has no actuator, so a trainer can move nothing"
+        yield found.source.error(found.root.start, fact, "add <actuator> with a motor, position or velocity")
+
+
+def repeated(found: Description) -> Iterator[WorldError]:
+    """Two texts or numbers have the same name, of which MuJoCo takes none."""
+    for tag in ("text", "numeric"):
+        seen = set()
+        for name, element in custom(found.root, tag):
+            if name in seen:
+                yield found.source.error(element.start, f"a second {tag} is called {name!r}", "remove one")
+            seen.add(name)
+
+
+def without_data(found: Description) -> Iterator[WorldError]:
+    """A text or number has no data, or no name."""
+    for tag in ("text", "numeric"):
+        for element in found.root.named("custom", tag):
+            if not element.attributes.get("name") or not element.attributes.get("data", "").strip():
+                fact = f"a {tag} in <custom> without {'name' if element.attributes.get('data') else 'data'}"
+                yield found.source.error(element.start, fact, "write both")
+
+
+def renamed_behind_its_name(found: Description) -> Iterator[WorldError]:
+    """A ROS remapping such as `__name:=x` would overrule the generated name of the robot."""
+    for argument in found.arguments:
+        if _ROS_REMAPPING.match(argument):
+            element = found.texts["controllerArgs"]
+            fact = f"{argument} in controllerArgs overrules the generated ROS name"
+            yield found.source.error(element.start, fact, "remove it")
+
+
+def unfit_step(found: Description) -> Iterator[WorldError]:
+    """The basic step is no whole number of milliseconds and of MuJoCo's steps."""
+    timestep_s, step_ms = found.timestep_s, found.basic_step_ms
+    element = found.numbers.get(BASIC_STEP)
+    if not timestep_s > 0.0:
+        option = next(found.root.named("option"))
+        yield found.source.error(option.start, "the timestep is no positive number", "write seconds")
+    elif step_ms is None or element is None:
+        if whole_step_ms(timestep_s) is None:
+            fact = f"no whole number of milliseconds fits the timestep of {timestep_s:g} s"
+            option = next(found.root.named("option"))
+            yield found.source.error(option.start, fact, "change it, for example to 0.002")
+    elif not fits(step_ms, timestep_s):
+        fact = f"basicTimeStep {step_ms:g} is no multiple of the timestep of {timestep_s:g} s in whole ms"
+        yield found.source.error(element.start, fact, f"write {whole_step_ms(timestep_s) or 'another'}")
+
+
+def unknown_devices(found: Description) -> Iterator[WorldError]:
+    """A text that renames a device has another form, or gives no name."""
+    for key, name in found.devices.items():
+        kind, slash, old = key.partition("/")
+        if kind not in DEVICE_KINDS or not slash or not old or not name:
+            kinds = ", ".join(DEVICE_KINDS)
+            remedy = f'write "{DEVICE}KIND/NAME" with a KIND of {kinds}, and the new name or "-" as data'
+            yield found.source.error(
+                found.texts[DEVICE + key].start, f"{DEVICE + key!r} names no device", remedy
+            )
+
+
+def files_elsewhere(found: Description) -> Iterator[WorldError]:
+    """A name of a file leads out of the folder of the world."""
+    yield from strays(found.source, found.root)
+
+
+def relative_address(found: Description) -> Iterator[WorldError]:
+    """The model names a file, but the world has none and so no folder."""
+    for element, path in named_files(found.root):
+        if stays_inside(path):
+            fact = f"{path!r} is relative to the file of the world, and this one has none"
+            yield found.source.error(element.start, fact, "give the world as a file (world.file)")
+
+
+CHECKS: Final[tuple[Check, ...]] = (
+    no_actuator,
+    repeated,
+    without_data,
+    renamed_behind_its_name,
+    unfit_step,
+    unknown_devices,
+    files_elsewhere,
+)
+"""The checks for every MJCF world."""
+
+CHECKS_WITHOUT_FILE: Final[tuple[Check, ...]] = (*CHECKS, relative_address)
+"""The additional checks for a world without a file, which has no files beside it."""
+
+
+def checked(source: bytes, name: str = "world", *, relative_addresses: bool) -> Description:
+    """Return the description of a world that passes every check.
+
+    Raises:
+        WorldError: as `check` does.
+    """
+    found = describe(source, name)
+    checks = CHECKS if relative_addresses else CHECKS_WITHOUT_FILE
+    if error := refusal(chain.from_iterable(check(found) for check in checks)):
+        raise error
+    return found
+
+
+def check(source: bytes, name: str = "world", *, relative_addresses: bool = False) -> None:
+    """Check that a world can be generated from the MJCF world `source` for every simulator.
+
+    `name` is the name of the world in errors. `relative_addresses`: the world stays beside the files that it
+    names.
+
+    Raises:
+        WorldError: the world cannot be read, or a check of this module fails.
+    """
+    checked(source, name, relative_addresses=relative_addresses)

@@ -1,0 +1,160 @@
+"""The robot of an MJCF world, as the elements `text` and `numeric` of `custom` describe it.
+
+    <custom>
+      <text name="controllerArgs" data="--name=cartpole --synchronize"/>
+      <text name="robot" data="cartpole"/>
+      <numeric name="basicTimeStep" data="10"/>
+      <text name="device:actuator/slide" data="cart motor"/>
+      <text name="device:sensor/debug" data="-"/>
+    </custom>
+
+Each of them may be missing. MuJoCo itself ignores them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.world.mjcf.elements import Element, read
+from palaestra_sim.world.source import Source
+
+ARGUMENTS: Final = "controllerArgs"
+ROBOT: Final = "robot"
+BASIC_STEP: Final = "basicTimeStep"
+KEYFRAME: Final = "keyframe"
+DEVICE: Final = "device:"
+LEFT_OUT: Final = "-"  # the name of a device that the robot shall not have
+DEVICE_KINDS: Final = ("actuator", "camera", "sensor")
+_TIMESTEP_S: Final = 0.002  # MuJoCo's default
+_MOST_STEPS: Final = 1000
+_NEAR: Final = 1e-6
+_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Description:
+    """An MJCF world as text.
+
+    Attributes:
+        source: its bytes.
+        root: its elements.
+        texts: the elements `text` of `custom` that have a name, by name; the first of a name.
+        numbers: the elements `numeric` in the same way.
+    """
+
+    source: Source
+    root: Element
+    texts: Mapping[str, Element]
+    numbers: Mapping[str, Element]
+
+    @property
+    def robot(self) -> str:
+        """The name of the robot: its own, else that of the model, else "robot"."""
+        return self._text(ROBOT) or self.root.attributes.get("model") or "robot"
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """The arguments of the controller."""
+        return tuple(self._text(ARGUMENTS).split())
+
+    @property
+    def keyframe(self) -> str:
+        """The name of the keyframe at which the world begins; "" for the model's own positions."""
+        return self._text(KEYFRAME)
+
+    @property
+    def devices(self) -> Mapping[str, str]:
+        """The names of devices that differ from those in the model, by kind and name: "sensor/x"."""
+        return {name.removeprefix(DEVICE): self._text(name) for name in self.texts if name.startswith(DEVICE)}
+
+    @property
+    def timestep_s(self) -> float:
+        """The time that MuJoCo takes in one step, as far as this file sets it."""
+        given = [it.attributes["timestep"] for it in self.root.named("option") if "timestep" in it.attributes]
+        return _number(given[-1]) if given else _TIMESTEP_S
+
+    @property
+    def basic_step_ms(self) -> float | None:
+        """The basic step that the world sets, in ms; None: none."""
+        element = self.numbers.get(BASIC_STEP)
+        return None if element is None else _number(element.attributes.get("data", ""))
+
+    def error(self, section: str, name: str, fact: str, remedy: str) -> WorldError:
+        """Return an error at the element of a name in a section, such as "sensor"; else at the root."""
+        elements = (it for section_ in self.root.named(section) for it in section_.walk())
+        start = next((it.start for it in elements if name and it.attributes.get("name") == name), 0)
+        return self.source.error(start or self.root.start, fact, remedy)
+
+    def _text(self, name: str) -> str:
+        element = self.texts.get(name)
+        return "" if element is None else element.attributes.get("data", "").strip()
+
+
+def is_mjcf(source: bytes) -> bool:
+    """Return whether a world is XML; other worlds begin with a hash."""
+    return source.removeprefix(_BYTE_ORDER_MARK).lstrip().startswith(b"<")
+
+
+def describe(source: bytes, name: str = "world") -> Description:
+    """Return the description of an MJCF world.
+
+    Raises:
+        WorldError: the bytes are no such file.
+    """
+    origin = Source(data=source, name=name, kind="world")
+    root = read(origin)
+    if root.tag != "mujoco":
+        fact = f"the root of the file is <{root.tag}>"
+        raise origin.error(root.start, fact, "write a model of MuJoCo, whose root is <mujoco>")
+    return Description(
+        source=origin,
+        root=root,
+        texts=_by_name(root, "text"),
+        numbers=_by_name(root, "numeric"),
+    )
+
+
+def custom(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
+    """Yield the elements of a tag in `custom`, with their names."""
+    for element in root.named("custom", tag):
+        if "name" in element.attributes:
+            yield element.attributes["name"], element
+
+
+def whole_step_ms(timestep_s: float) -> int | None:
+    """Return the shortest time of whole milliseconds and whole steps of MuJoCo; None if it is too long."""
+    for steps in range(1, _MOST_STEPS + 1):
+        step_ms = steps * timestep_s * 1000.0
+        if round(step_ms) >= 1 and abs(step_ms - round(step_ms)) < _NEAR * step_ms:
+            return round(step_ms)
+    return None
+
+
+def fits(step_ms: float, timestep_s: float) -> bool:
+    """Return whether a basic step is a whole number of milliseconds and of steps of MuJoCo."""
+    if not step_ms >= 1.0 or step_ms != int(step_ms):
+        return False
+    steps = step_ms / (timestep_s * 1000.0)
+    return round(steps) >= 1 and abs(steps - round(steps)) < _NEAR * steps
+
+
+def _by_name(root: Element, tag: str) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    for name, element in custom(root, tag):
+        found.setdefault(name, element)
+    return found
+
+
+def _number(text: str) -> float:
+    """Return the number of a text, NaN for another text."""
+    words = re.findall(r"\S+", text)
+    try:
+        number = float(words[0]) if len(words) == 1 else math.nan
+    except ValueError:
+        return math.nan
+    return number if math.isfinite(number) else math.nan

@@ -1,0 +1,128 @@
+"""MJCF worlds as text: what is read, what is refused, and which bytes change."""
+
+import pytest
+
+from palaestra_sim.world import RunIdentity, WorldError, check, generate, rename, robots, suffix
+from palaestra_sim.world.mjcf import describe
+
+IDENTITY = RunIdentity(job="balance", replica=0, group="collect", index=1)
+NAMED = b"""<?xml version="1.0"?>
+<mujoco model="cart pole">
+  <custom>
+    <text name="controllerArgs" data='--clock --name=mine --verbose'/>
+  </custom>
+  <!-- a motor -->
+  <actuator><motor joint="x"/></actuator>
+</mujoco>
+"""
+PLAIN = b'<mujoco>\n  <actuator><motor joint="x"/></actuator>\n</mujoco>\n'
+
+
+def with_custom(inside, top=b""):
+    """Return a world with these elements in `custom`, and others at the top."""
+    return PLAIN.replace(b"<mujoco>", b"<mujoco><custom>" + inside + b"</custom>" + top)
+
+
+def test_only_the_arguments_change():
+    """Comments, quotes and blanks elsewhere stay as their author wrote them."""
+    made = generate(NAMED, IDENTITY, clock=False)
+    (robot,) = robots(made)
+
+    assert robot.robot == "cart pole"
+    assert robot.ros_name.startswith("balance_r0_collect_1a_cart_pole_")
+    assert robot.synchronize
+    assert robot.supervisor
+    arguments = f'"--name={robot.ros_name} --synchronize --verbose"'.encode()
+    assert made == NAMED.replace(b"'--clock --name=mine --verbose'", arguments)
+
+
+def test_a_clock_stays_in_the_one_simulator_that_may_keep_it():
+    """Two would publish two times on one topic."""
+    assert describe(generate(NAMED, IDENTITY, clock=True)).arguments[0] == "--clock"
+    assert "--clock" not in describe(generate(NAMED, IDENTITY, clock=False)).arguments
+
+
+def test_a_world_without_arguments_gets_them_behind_its_root():
+    """Most models of others have no such text."""
+    made = generate(PLAIN, IDENTITY, clock=False)
+
+    assert made.startswith(b'<mujoco><custom><text name="controllerArgs" data="--name=balance_')
+    assert made.endswith(PLAIN.removeprefix(b"<mujoco>"))
+
+
+@pytest.mark.parametrize("source", [NAMED, PLAIN])
+def test_the_world_of_a_generated_world_is_the_same(source):
+    """ConfigMaps of older releases hold generated worlds."""
+    made = generate(source, IDENTITY, clock=True)
+
+    assert generate(made, IDENTITY, clock=True) == made
+
+
+def test_a_standby_has_the_same_name_with_an_ending():
+    """It runs beside the first on one ROS master."""
+    assert robots(rename(NAMED, "_2"))[0].ros_name == "mine_2"
+
+
+def test_a_standby_of_a_world_without_a_name_is_refused():
+    """There is nothing to append to."""
+    with pytest.raises(WorldError, match='the robot "robot" has no ROS name; add <text'):
+        rename(PLAIN, "_2")
+
+
+def test_the_end_of_the_file_name_follows_from_the_content():
+    """A world of a ConfigMap has no file name of its own."""
+    assert suffix(b"\xef\xbb\xbf \n<mujoco/>") == ".xml"
+    assert suffix(b"#VRML_SIM R2023b utf8\n") == ".wbt"
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        (b"<mujoco>", "world:1:9: the file is no well-formed XML: "),
+        (b"<robot/>", "world:1:1: the root of the file is <robot>; write a model of MuJoCo"),
+        (b"<mujoco/>", "world:1:1: the model has no actuator, so a trainer can move nothing; add <actuator>"),
+        (
+            b'<!DOCTYPE m [<!ENTITY e SYSTEM "file:///etc/passwd">]>\n<mujoco>&e;</mujoco>',
+            r"world:1:\d+: the file has a document type .*; remove it",
+        ),
+        (b"<a>" * 300 + b"</a>" * 300, "elements are nested more than 200 deep; use fewer"),
+        (with_custom(b'<text name="a"/>'), "a text in <custom> without data; write both"),
+        (with_custom(b'<text name="a" data="1"/>' * 2), "a second text is called 'a'; remove one"),
+        (with_custom(b'<text name="controllerArgs" data="__name:=x"/>'), "__name:=x in controllerArgs"),
+        (
+            with_custom(b'<numeric name="basicTimeStep" data="7"/>', b'<option timestep="0.005"/>'),
+            "basicTimeStep 7 is no multiple of the timestep of 0.005 s in whole ms; write 5",
+        ),
+        (with_custom(b"", b'<option timestep="x"/>'), "the timestep is no positive number; write seconds"),
+        (with_custom(b'<text name="device:motor/x" data="y"/>'), "'device:motor/x' names no device; write"),
+    ],
+)
+def test_a_mistake_is_refused_with_its_place_and_what_to_write(source, message):
+    """The operator checks a world before it creates anything, without MuJoCo."""
+    with pytest.raises(WorldError, match=message):
+        check(source)
+
+
+@pytest.mark.parametrize("path", ["/etc/passwd", "../secret.obj", "a/../../b.obj", "file:x", "a\\b.obj"])
+@pytest.mark.parametrize("element", ['<mesh file="{}"/>', '<texture fileback="{}"/>'])
+def test_a_file_outside_of_the_folder_is_refused(path, element):
+    """A model of a stranger must not read files of the pod."""
+    source = with_custom(b"", f"<asset>{element.format(path)}</asset>".encode())
+
+    with pytest.raises(WorldError, match="is outside of the folder of the world; name a file beside"):
+        check(source, relative_addresses=True)
+
+
+def test_a_folder_of_meshes_outside_is_refused():
+    """Its files would be outside too."""
+    with pytest.raises(WorldError, match="'/usr' is outside of the folder"):
+        check(with_custom(b"", b'<compiler meshdir="/usr"/>'), relative_addresses=True)
+
+
+def test_files_beside_the_world_need_a_world_with_a_file():
+    """A ConfigMap has no folder."""
+    source = with_custom(b"", b'<asset><mesh file="meshes/arm.obj"/></asset>')
+
+    check(source, relative_addresses=True)
+    with pytest.raises(WorldError, match="relative to the file of the world, and this one has none; give"):
+        check(source)
