@@ -19,16 +19,18 @@ from pathlib import Path
 from palaestra_protocol.control import LEFT_OUT_FILE
 from palaestra_protocol.numbers import milliseconds
 from palaestra_sim import faults
-from palaestra_sim.errors import SimError, WorldRefusedError
+from palaestra_sim.errors import SimError, WorldError, WorldRefusedError
+from palaestra_sim.front.backend import Backend
 from palaestra_sim.front.left_out import write_left_out
 from palaestra_sim.front.options import FrontOptions
-from palaestra_sim.front.simulator import Simulator
+from palaestra_sim.front.simulator import Load, Simulator
 from palaestra_sim.ros import Loop, MasterUnreachable, RosNode
 from palaestra_sim.scene.loading import Loader
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.reading import LeaveOut
 from palaestra_sim.scene.summary import silent_devices, summary
+from palaestra_sim.world.mjcf import is_mjcf
 from palaestra_sim.world.stand_ins import StandIn, load_stand_ins
 
 log = logging.getLogger(__name__)
@@ -60,11 +62,13 @@ class Program:
         name: of the program.
         description: for its help.
         physics: returns the physics of a world that is about to be read.
+        mjcf: returns the simulation of an MJCF world; None: it simulates none.
     """
 
     name: str
     description: str
     physics: Callable[[], Physics]
+    mjcf: Callable[[Path, Mode, LeaveOut], Backend] | None = None
 
     def run(self, arguments: Sequence[str] | None = None) -> int:
         """Run the simulator until a client or a signal ends it; return the exit code."""
@@ -95,14 +99,24 @@ class Program:
     def _simulate(self, options: argparse.Namespace) -> int:
         return _Process(options, self._loader(options, _leave_out(options.leave_out))).run()
 
-    def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Loader:
-        return Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
+    def _loader(self, options: argparse.Namespace, leave_out: LeaveOut) -> Load:
+        """Return what loads a world, which is MJCF if it begins with `<`."""
+        wbt = Loader(physics=self.physics, stand_ins=_stand_ins(options.stand_ins), leave_out=leave_out)
+
+        def load(world_path: Path, mode: Mode) -> Backend:
+            if not is_mjcf(world_path.read_bytes()):
+                return wbt(world_path, mode)
+            if self.mjcf is None:
+                raise WorldError(world_path.name, 1, 1, f"{self.name} simulates no MJCF", "use driver mujoco")
+            return self.mjcf(world_path, mode, leave_out)
+
+        return load
 
 
 class _Process:
     """The loop, the nodes in it, and the simulator between them."""
 
-    def __init__(self, options: argparse.Namespace, load: Loader) -> None:
+    def __init__(self, options: argparse.Namespace, load: Load) -> None:
         self._ordered = faults.read_options(options, os.environ)
         self._course = None if self._ordered is None else faults.begin(self._ordered, load, options.world)
         self._loop = Loop()
@@ -222,7 +236,7 @@ def _parser(program: Program) -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--version", action="version", version=version("palaestra-sim"))
-    add("world", type=Path, help="the .wbt file to load")
+    add("world", type=Path, help="the file to load: .wbt, or .xml for MuJoCo")
     add("--check", action="store_true", help="print what becomes of the world, and start nothing")
     add("--mode", choices=_MODES, default="fast", help="how time passes at first (default: %(default)s)")
     add("--step-sleep-ms", type=milliseconds, default=0.0, help="real time that each step takes at least")

@@ -13,6 +13,7 @@
 - `eye`, `pictures`: what cameras see
 - `visible`: from visible shapes to a model of their own
 - `canvas`: OpenGL
+- `mjcf`: worlds in MuJoCo's own format, beside all of these
 
 Worlds, devices and the interface are those of all simulators: `scene` and `front`.
 """

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
+from pathlib import Path
 
+from palaestra_sim.front.backend import Backend
 from palaestra_sim.program import Program
+from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.physics import Physics
+from palaestra_sim.scene.reading import LeaveOut
+
+# MuJoCo is imported in these functions, so that the program can report its absence as its own error, and
+# `--help` needs no MuJoCo.
 
 
 def _physics() -> Physics:
@@ -15,15 +22,28 @@ def _physics() -> Physics:
     Raises:
         MissingLibraryError: MuJoCo is not installed.
     """
-    # Here, so that the program can report the error as its own, and `--help` needs no MuJoCo.
     physics: Physics = importlib.import_module("palaestra_sim.mujoco.physics").MujocoPhysics()
     return physics
+
+
+def _mjcf(world_path: Path, mode: Mode, leave_out: LeaveOut) -> Backend:
+    """Return the simulation of an MJCF world.
+
+    Raises:
+        MissingLibraryError: MuJoCo is not installed.
+        WorldError: the world is wrong.
+        OSError: it cannot be read.
+    """
+    loading = importlib.import_module("palaestra_sim.mujoco.mjcf.loading")
+    simulation: Backend = loading.load(world_path, mode, leave_out)
+    return simulation
 
 
 MUJOCO = Program(
     name="palaestra-mujoco",
     description="Simulate a world with MuJoCo, and answer over ROS 1 like the `ros` controller of Webots.",
     physics=_physics,
+    mjcf=_mjcf,
 )
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import logging
 from typing import Any
 
 from palaestra_sim.errors import SimError
+
+log = logging.getLogger(__name__)
 
 
 class MissingLibraryError(SimError, ImportError):
@@ -14,10 +17,17 @@ class MissingLibraryError(SimError, ImportError):
 
 def _imported() -> Any:
     try:
-        return importlib.import_module("mujoco")
+        library = importlib.import_module("mujoco")
     except ImportError as error:
         fact = f"MuJoCo cannot be imported ({error})"
         raise MissingLibraryError(f"{fact}; install palaestra-sim[mujoco]") from error
+    # Otherwise MuJoCo writes its warnings into a file MUJOCO_LOG.TXT where it runs.
+    library.set_mju_user_warning(_warn)
+    return library
+
+
+def _warn(text: str) -> None:
+    log.warning("MuJoCo: %s", text.strip())
 
 
 mujoco: Any = _imported()

@@ -125,6 +125,11 @@ class JointPlace(Place):
         return Pose(self._translation, from_axis_angle(self._rotation))
 
     @property
+    def placeable(self) -> bool:
+        """The joint alone moves it."""
+        return False
+
+    @property
     def pose(self) -> Pose:
         """The frame, in the parent's."""
         return self.joint.carry(Pose(self._translation, from_axis_angle(self._rotation)))

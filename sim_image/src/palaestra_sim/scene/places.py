@@ -58,6 +58,11 @@ class Place:
         self._rotation = value
 
     @property
+    def placeable(self) -> bool:
+        """Whether a client may put it somewhere."""
+        return True
+
+    @property
     def pose(self) -> Pose:
         """The frame, in the parent's."""
         return Pose(self.translation, from_axis_angle(self.rotation))

@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from typing import Final
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final, Protocol
 
-from palaestra_sim.errors import refusal
+from palaestra_sim.errors import WorldError, refusal
 from palaestra_sim.scene.robot import Robot
-from palaestra_sim.scene.simulation import Simulation
+from palaestra_sim.scene.tree.scene_tree import SceneTree
 
 _ROLLS_AND_TURNS: Final = 2
 
 
-def summary(simulation: Simulation) -> Iterator[str]:
+class Described(Protocol):
+    """A loaded world."""
+
+    tree: SceneTree
+
+    @property
+    def robots(self) -> Sequence[Robot]:
+        """Its robots."""
+        ...
+
+    @property
+    def left_out(self) -> Sequence[WorldError]:
+        """Nodes that were left out, each with its place."""
+        ...
+
+
+def summary(simulation: Described) -> Iterator[str]:
     """Yield lines about robots, stand-ins, and all that was left out.
 
     The world is read with everything left out that the stub lacks, so that the rest can be described.

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from palaestra_sim.scene.devices import DEVICES
-from palaestra_sim.scene.joints import JointPlace
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.nodes.types import is_base_type
 from palaestra_sim.seam import UnsimulatedError
@@ -124,7 +123,7 @@ def _reaches_robot(node: SceneNode, field: str) -> bool:
 
 def _moves(node: SceneNode, field: str) -> bool:
     """Return whether a write of a node's place moves it; rays and outlines of a robot do not move."""
-    if field not in _PLACING or node.place is None or isinstance(node.place, JointPlace):
+    if field not in _PLACING or node.place is None or not node.place.placeable:
         return False
     if node.type_name == "Robot" or not _on_robot(node):
         return True

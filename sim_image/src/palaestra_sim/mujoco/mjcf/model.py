@@ -1,0 +1,100 @@
+"""A compiled MJCF model with its state."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.scene.geometry import Pose
+
+HINGE: Final = int(mujoco.mjtJoint.mjJNT_HINGE)
+SLIDE: Final = int(mujoco.mjtJoint.mjJNT_SLIDE)
+FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
+_POSITIONS: Final = {FREE: 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}  # numbers of a joint; 1 of the others
+_SPEEDS: Final = {FREE: 6, int(mujoco.mjtJoint.mjJNT_BALL): 3}
+
+
+class Model:
+    """One model, and where everything in it is now.
+
+    MuJoCo computes poses and sensors at the beginning of a step. `settle` computes them for the state after
+    the last one, and changes nothing on which the next step depends.
+
+    Args:
+        model: of MuJoCo.
+        keyframe: the number of the keyframe at which the world begins; None: the model's own positions.
+
+    Attributes:
+        model, data: of MuJoCo.
+    """
+
+    def __init__(self, model: Any, keyframe: int | None = None) -> None:
+        self.model = model
+        self.data = mujoco.MjData(model)
+        # Numbers that are not finite reach the sensors, as a fault, instead of a reset that nobody sees.
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self._keyframe = keyframe
+        self._starts = (model.body_pos.copy(), model.body_quat.copy())
+        self._settled = False
+        self.reset()
+
+    def step(self, count: int) -> None:
+        """Let MuJoCo take so many steps."""
+        mujoco.mj_step(self.model, self.data, nstep=count)
+        self._settled = False
+
+    def reset(self) -> None:
+        """Return to the start, bit for bit."""
+        self.model.body_pos[:], self.model.body_quat[:] = self._starts
+        if self._keyframe is None:
+            mujoco.mj_resetData(self.model, self.data)
+        else:
+            mujoco.mj_resetDataKeyframe(self.model, self.data, self._keyframe)
+        self._settled = False
+
+    def changed(self) -> None:
+        """Compute everything anew when it is next asked for: the state was written."""
+        self._settled = False
+
+    def settle(self) -> None:
+        """Compute poses, velocities and sensors of this moment."""
+        if not self._settled:
+            warm_start = self.data.qacc_warmstart.copy()
+            mujoco.mj_forward(self.model, self.data)
+            self.data.qacc_warmstart[:] = warm_start
+            self._settled = True
+
+    def pose(self, body: int) -> Pose:
+        """Return where a body is in the world."""
+        self.settle()
+        x, y, z = self.data.xpos[body].tolist()
+        a, b, c, d, e, f, g, h, i = self.data.xmat[body].tolist()
+        return Pose((x, y, z), (a, b, c, d, e, f, g, h, i))
+
+    def velocity(self, kind: int, number: int) -> tuple[list[float], list[float]]:
+        """Return the velocity of an object in m/s and its turning in rad/s, in world axes."""
+        self.settle()
+        found = np.zeros(6)
+        mujoco.mj_objectVelocity(self.model, self.data, kind, number, found, 0)
+        return found[3:].tolist(), found[:3].tolist()
+
+    def joints_of(self, body: int) -> range:
+        """Return the numbers of the joints of a body."""
+        first = int(self.model.body_jntadr[body])
+        return range(first, first + int(self.model.body_jntnum[body]))
+
+    def free_joint_of(self, body: int) -> int | None:
+        """Return the number of the free joint of a body; None if it has none."""
+        return next((it for it in self.joints_of(body) if self.model.jnt_type[it] == FREE), None)
+
+    def positions(self, joint: int) -> Any:
+        """Return a view of the positions of a joint."""
+        at = int(self.model.jnt_qposadr[joint])
+        return self.data.qpos[at : at + _POSITIONS.get(int(self.model.jnt_type[joint]), 1)]
+
+    def speeds(self, joint: int) -> Any:
+        """Return a view of the speeds of a joint."""
+        at = int(self.model.jnt_dofadr[joint])
+        return self.data.qvel[at : at + _SPEEDS.get(int(self.model.jnt_type[joint]), 1)]

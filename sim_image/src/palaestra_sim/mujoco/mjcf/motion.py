@@ -1,0 +1,92 @@
+"""How bodies of a model move, and what pushes them, as a supervisor has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.mjcf.model import Model
+from palaestra_sim.scene.geometry import Pose, Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.seam import UnsimulatedError
+
+
+class BodyMotion:
+    """The motion of the bodies of one model.
+
+    Args:
+        model: see above.
+        bodies: the number of the body of a node.
+    """
+
+    def __init__(self, model: Model, bodies: Mapping[SceneNode, int]) -> None:
+        self._model = model
+        self._bodies = bodies
+        self._pushed = False
+
+    def velocity(self, node: SceneNode) -> tuple[Vector, Vector]:
+        """Return the velocity of a body in m/s and its turning in rad/s.
+
+        Raises:
+            UnsimulatedError: the node is no body.
+        """
+        (vx, vy, vz), (wx, wy, wz) = self._model.velocity(mujoco.mjtObj.mjOBJ_XBODY, self._body(node))
+        return (vx, vy, vz), (wx, wy, wz)
+
+    def set_velocity(self, node: SceneNode, velocity: Vector, turning: Vector) -> None:
+        """Give a free body a velocity.
+
+        Raises:
+            UnsimulatedError: joints move it.
+        """
+        free = self._model.free_joint_of(self._body(node))
+        if free is None:
+            fact = f"the body {node.def_name!r} is on joints or stands, so it takes no velocity"
+            raise UnsimulatedError(f"{fact}; command its motors, or give it a <freejoint>")
+        pose: Pose = self._model.pose(self._body(node))
+        self._model.speeds(free)[:] = (*velocity, *pose.inverse.turned(turning))
+        self._model.changed()
+
+    def halt(self, node: SceneNode) -> None:
+        """Stop a body and all that is on it."""
+        numbers = (self._bodies[it] for it in (node, *node.descendants()) if it in self._bodies)
+        for number in numbers:
+            for joint in self._model.joints_of(number):
+                self._model.speeds(joint)[:] = 0.0
+        self._model.changed()
+
+    def add_force(
+        self, node: SceneNode, force: Vector, *, relative: bool, offset: Vector | None = None
+    ) -> None:
+        """Let a force in N act in the next basic step; see `Motion`."""
+        body = self._body(node)
+        pose = self._model.pose(body)
+        world = np.array(pose.turned(force) if relative else force)
+        torque = np.zeros(3)
+        if offset is not None:
+            torque = np.cross(np.array(pose.carry(offset)) - self._model.data.xipos[body], world)
+        self._push(body, world, torque)
+
+    def add_torque(self, node: SceneNode, torque: Vector, *, relative: bool) -> None:
+        """Let a torque in N m act in the next basic step."""
+        body = self._body(node)
+        self._push(body, np.zeros(3), np.array(self._model.pose(body).turned(torque) if relative else torque))
+
+    def clear(self) -> None:
+        """End the forces of the last basic step."""
+        if self._pushed:
+            self._model.data.xfrc_applied[:] = 0.0
+            self._pushed = False
+
+    def _push(self, body: int, force: np.ndarray, torque: np.ndarray) -> None:
+        self._model.data.xfrc_applied[body] += np.concatenate((force, torque))
+        self._pushed = True
+        self._model.changed()
+
+    def _body(self, node: SceneNode) -> int:
+        number = self._bodies.get(node)
+        if number is None:
+            raise UnsimulatedError(f"a {node.type_name} has no motion; ask for a Robot or Solid")
+        return number

@@ -1,0 +1,238 @@
+"""Actuators as motors: what a command of Webots is for MuJoCo's `ctrl`.
+
+An actuator is a servo for a position, a servo for a velocity, or a force. A motor takes the commands of its
+actuator; a servo for a velocity also turns to a target as Webots does. Until a client commands a motor,
+MuJoCo's own value stays, 0 or that of the keyframe.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
+from palaestra_sim.scene.motors import Motor, MotorSpec
+from palaestra_sim.seam import UnsimulatedError
+
+_JOINTS: Final = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+_FIXED: Final = int(mujoco.mjtGain.mjGAIN_FIXED)
+_LINEAR: Final = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
+_DIRECT: Final = tuple(
+    int(it) for it in (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_FILTER, mujoco.mjtDyn.mjDYN_FILTEREXACT)
+)
+_INTEGRATED: Final = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
+_TURNED: Final = (*_JOINTS, int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SLIDERCRANK))
+
+
+class Control(Enum):
+    """What the control of an actuator is."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    FORCE = "force"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actuator:
+    """One actuator of a model.
+
+    Attributes:
+        control: what its control is.
+        scale: its control for a position, velocity or force of 1 at the joint.
+        length: returns the position of its joint or tendon, in rad or m; None if it has none.
+        write: sets its control.
+        force: returns the force or torque at the joint, in N or N m.
+    """
+
+    control: Control
+    scale: float
+    length: Callable[[], float] | None
+    write: Callable[[float], None]
+    force: Callable[[], float]
+
+
+class ActuatorMotor(Motor):
+    """The motor of an actuator."""
+
+    __slots__ = ("_actuator", "_aim", "_commanded")
+
+    def __init__(self, spec: MotorSpec, actuator: Actuator) -> None:
+        self._actuator = actuator
+        super().__init__(spec)
+        self.forceful = True  # MuJoCo moves everything by forces
+
+    def reset(self) -> None:
+        """Return to the state of a new world, without a command."""
+        super().reset()
+        self._commanded = False
+        self._aim: float | None = None  # where a servo for a position is to be now
+
+    def put(self, angle_rad: float) -> None:
+        """Take the position to which a client has put the joint; a motor with a command holds it."""
+        if self._commanded and self._actuator.control is not Control.FORCE:
+            super().put(angle_rad)
+        self._aim = None
+
+    def set_position(self, target_rad: float) -> None:
+        """Turn to `target_rad`, or with infinity at the commanded velocity; see `Motor`."""
+        self._require_servo()
+        super().set_position(target_rad)
+        self._commanded = True
+
+    def set_velocity(self, velocity_rad_s: float) -> None:
+        """Set the velocity; see `Motor`."""
+        self._require_servo()
+        super().set_velocity(velocity_rad_s)
+        self._commanded = True
+
+    def set_acceleration(self, acceleration_rad_s2: float) -> None:
+        """Limit the acceleration of a servo for a velocity; see `Motor`."""
+        if self._actuator.control is not Control.VELOCITY and acceleration_rad_s2 != -1.0:
+            raise UnsimulatedError(f"{self._what()}, whose acceleration MuJoCo does not limit")
+        super().set_acceleration(acceleration_rad_s2)
+
+    def set_effort(self, torque_nm: float) -> None:
+        """Let a force in N or a torque in N m act from now on; see `Motor`.
+
+        Raises:
+            UnsimulatedError: the actuator is a servo.
+        """
+        if self._actuator.control is not Control.FORCE:
+            raise UnsimulatedError(f"{self._what()}; set a position or velocity, or write <motor>")
+        super().set_effort(torque_nm)
+        self._commanded = self.effort_nm is not None
+
+    def set_available_torque(self, torque_nm: float) -> None:
+        """Refuse a limit of the force, which is the model's.
+
+        Raises:
+            UnsimulatedError: always.
+        """
+        del torque_nm
+        raise UnsimulatedError(f"{self._what()}, whose force the model limits; write forcerange there")
+
+    def feel(self) -> None:
+        """Take position and force of this moment."""
+        if self._actuator.length is not None:
+            self.angle_rad = self._actuator.length()
+        self.feedback_nm = self._actuator.force()
+
+    def command(self, step_s: float) -> None:
+        """Set the control for the next basic step, as the last command has it."""
+        if self._actuator.length is not None:
+            self.angle_rad = self._actuator.length()
+        if self._commanded:
+            self._actuator.write(self._actuator.scale * self._wanted(step_s))
+
+    def _wanted(self, step_s: float) -> float:
+        if self.effort_nm is not None:
+            return self.effort_nm
+        if self._actuator.control is Control.POSITION:
+            self._aim = self._next_aim(self.angle_rad if self._aim is None else self._aim, step_s)
+            return self._aim
+        if math.isinf(self.target_rad) and math.isinf(self.velocity_rad_s):
+            return 0.0
+        self.speed_rad_s = self.demand(step_s)
+        return self.speed_rad_s
+
+    def _next_aim(self, aim: float, step_s: float) -> float:
+        """Return where a servo for a position is to be after a basic step at the commanded velocity."""
+        reach = abs(self.velocity_rad_s) * step_s
+        if math.isfinite(self.target_rad):
+            return max(aim - reach, min(aim + reach, self.target_rad))
+        if math.isfinite(reach):
+            aim += math.copysign(reach, self.velocity_rad_s * math.copysign(1.0, self.target_rad))
+        low, high = self.spec.min_rad, self.spec.max_rad
+        return aim if low == high else max(low, min(high, aim))
+
+    def _require_servo(self) -> None:
+        if self._actuator.control is Control.FORCE:
+            remedy = "set a force or torque, or write <position> or <velocity>"
+            raise UnsimulatedError(f"{self._what()}; {remedy}")
+
+    def _what(self) -> str:
+        return f"the actuator of {self.name!r} takes a {self._actuator.control.value}"
+
+
+def control_of(model: Any, index: int) -> tuple[Control, float] | None:
+    """Return what the control of an actuator is, and its value for one unit at the joint; None: neither."""
+    gain, bias = model.actuator_gainprm[index], model.actuator_biasprm[index]
+    dynamics = int(model.actuator_dyntype[index])
+    known = (
+        int(model.actuator_gaintype[index]) == _FIXED
+        and int(model.actuator_biastype[index]) in _LINEAR
+        and dynamics in (*_DIRECT, _INTEGRATED)
+    )
+    integrated = dynamics == _INTEGRATED
+    gear = gear_of(model, index)
+    if not known or gain[0] == 0.0 or gear == 0.0:
+        return None
+    if bias[1] != 0.0:
+        scale = gear * -float(bias[1] / gain[0])
+        return (Control.VELOCITY if integrated else Control.POSITION), scale
+    if integrated:
+        return None
+    if bias[2] != 0.0 and bias[2] == -gain[0]:
+        return Control.VELOCITY, gear
+    return Control.FORCE, 1.0 / (float(gain[0]) * gear)
+
+
+def gear_of(model: Any, index: int) -> float:
+    """Return the force at the joint for a force of 1 of the actuator; at a site, in its direction."""
+    gear: list[float] = model.actuator_gear[index].tolist()
+    if model.actuator_trntype[index] in _TURNED:
+        return gear[0]
+    return math.hypot(*gear) if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SITE else 0.0
+
+
+def length_of(model: Model, index: int) -> Callable[[], float] | None:
+    """Return a function that returns the position of an actuator's joint or tendon; None if it has none."""
+    joint = joint_of(model.model, index)
+    if joint is not None:
+        positions = model.positions(joint)
+        return lambda: float(positions[0])
+    if model.model.actuator_trntype[index] not in _TURNED:
+        return None
+    gear, lengths = gear_of(model.model, index), model.data.actuator_length
+    return lambda: float(lengths[index]) / gear
+
+
+def force_of(model: Model, index: int) -> Callable[[], float]:
+    """Return a function that returns the force of an actuator at its joint, in N or N m."""
+    gear, forces = gear_of(model.model, index), model.data.actuator_force
+    return lambda: float(forces[index]) * gear
+
+
+def joint_of(model: Any, index: int) -> int | None:
+    """Return the number of the hinge or slider that an actuator moves; None if it moves something else."""
+    if model.actuator_trntype[index] not in _JOINTS:
+        return None
+    joint = int(model.actuator_trnid[index][0])
+    return joint if model.jnt_type[joint] in {HINGE, SLIDE} else None
+
+
+def spec_of(model: Any, index: int, name: str, control: Control, scale: float) -> MotorSpec:
+    """Return the limits of a motor: those that the model has, else none."""
+    low, high = 0.0, 0.0
+    limit = math.inf
+    if model.actuator_ctrllimited[index]:
+        ends = sorted(float(it) / scale for it in model.actuator_ctrlrange[index])
+        if control is Control.POSITION:
+            low, high = ends
+        else:
+            limit = max(map(abs, ends))
+    force = limit if control is Control.FORCE else math.inf
+    if model.actuator_forcelimited[index]:
+        strongest = float(max(map(abs, model.actuator_forcerange[index])))
+        force = min(force, strongest * abs(gear_of(model, index)))
+    return MotorSpec(
+        name=name,
+        max_velocity_rad_s=limit if control is Control.VELOCITY else math.inf,
+        min_rad=low,
+        max_rad=high,
+        max_torque_nm=force,
+    )

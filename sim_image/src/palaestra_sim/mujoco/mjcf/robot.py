@@ -1,0 +1,196 @@
+"""The robot of a model: all its actuators, sensors and cameras as devices with names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.mjcf import motors
+from palaestra_sim.mujoco.mjcf.model import HINGE, SLIDE, Model
+from palaestra_sim.mujoco.mjcf.motors import Actuator, ActuatorMotor
+from palaestra_sim.mujoco.mjcf.sensors import Sensor, camera, measured
+from palaestra_sim.scene.devices.kind import Devices, Kind, Sample, Shaft
+from palaestra_sim.scene.devices.motors import LINEAR_MOTOR, ROTATIONAL_MOTOR
+from palaestra_sim.scene.joints import Joint
+from palaestra_sim.scene.reading import LeaveOut
+from palaestra_sim.world.mjcf import LEFT_OUT, Description
+
+_ACTUATOR: Final = "actuator"
+_CAMERA: Final = "camera"
+_SENSOR: Final = "sensor"
+_KEEPS: Final = "write it in <actuator> as <motor>, <position> or <velocity>"
+
+
+@dataclass(slots=True, kw_only=True)
+class Equipment:
+    """The devices of a robot.
+
+    Attributes:
+        devices: by name.
+        joints: the number of the joint of each device that is on one, by name.
+        motors: those of actuators.
+        samples: give the sensors their values.
+        refused: mistakes with devices, each with its place.
+        left_out: sensors and actuators without a device, which the user left out.
+    """
+
+    devices: Devices = field(default_factory=Devices)
+    joints: dict[str, int] = field(default_factory=dict)
+    motors: list[ActuatorMotor] = field(default_factory=list)
+    samples: list[Sample] = field(default_factory=list)
+    refused: list[WorldError] = field(default_factory=list)
+    left_out: list[WorldError] = field(default_factory=list)
+
+
+def equip(model: Model, description: Description, leave_out: LeaveOut) -> Equipment:
+    """Return the devices of a model, with the names that the description gives them."""
+    return _Fitter(model, description, leave_out).fit()
+
+
+def body_of(model: Any) -> int | None:
+    """Return the number of the body that is the robot: at the top, under which an actuator moves a joint.
+
+    None if nothing is moved but tendons; then it is the first body.
+    """
+    for index in range(model.nu):
+        joint, site = motors.joint_of(model, index), int(model.actuator_trnid[index][0])
+        if joint is not None:
+            return int(model.body_rootid[model.jnt_bodyid[joint]])
+        if model.actuator_trntype[index] == mujoco.mjtTrn.mjTRN_SITE:
+            return int(model.body_rootid[model.site_bodyid[site]])
+    return 1 if model.nbody > 1 else None
+
+
+class _Fitter:
+    def __init__(self, model: Model, description: Description, leave_out: LeaveOut) -> None:
+        self._model = model
+        self._description = description
+        self._leave_out = leave_out
+        self._names = dict(description.devices)
+        self._known: set[str] = set()
+        self._shafts: dict[int, Shaft] = {}
+        self._found = Equipment()
+
+    def fit(self) -> Equipment:
+        """Return the devices."""
+        model = self._model.model
+        for index in range(model.nu):
+            self._add_actuator(index)
+        for index in range(model.nsensor):
+            self._add_sensor(index)
+        for index in range(model.ncam):
+            name = self._name(_CAMERA, model.camera(index).name or f"camera{index}")
+            if name is not None:
+                found = camera(model, index, name)
+                self._add(_CAMERA, found.kind, found.device, None)
+        self._found.refused += self._unknown()
+        return self._found
+
+    def _add_actuator(self, index: int) -> None:
+        model = self._model.model
+        joint = motors.joint_of(model, index)
+        own = model.actuator(index).name
+        default = own or ("" if joint is None else model.jnt(joint).name) or f"actuator{index}"
+        name = self._name(_ACTUATOR, default)
+        if name is None:
+            return
+        control = motors.control_of(model, index)
+        if control is None:
+            self._lack(_ACTUATOR, own, f"the actuator {default!r} is no motor of Webots", _KEEPS)
+            return
+        actuator = Actuator(
+            control=control[0],
+            scale=control[1],
+            length=motors.length_of(self._model, index),
+            write=self._writer(index),
+            force=motors.force_of(self._model, index),
+        )
+        motor = ActuatorMotor(motors.spec_of(model, index, name, *control), actuator)
+        turns = joint is not None and model.jnt_type[joint] == HINGE
+        if self._add(_ACTUATOR, ROTATIONAL_MOTOR if turns else LINEAR_MOTOR, motor, joint):
+            self._found.motors.append(motor)
+
+    def _add_sensor(self, index: int) -> None:
+        model = self._model.model
+        type_name = mujoco.mjtSensor(int(model.sensor_type[index])).name.removeprefix("mjSENS_").lower()
+        what, which = int(model.sensor_objtype[index]), int(model.sensor_objid[index])
+        own = model.sensor(index).name
+        target = mujoco.mj_id2name(model, what, which) if which >= 0 else None
+        name = self._name(_SENSOR, own or f"{target or index}_{type_name}")
+        if name is None:
+            return
+        start = int(model.sensor_adr[index])
+        joint = which if what == mujoco.mjtObj.mjOBJ_JOINT and self._is_simple(which) else None
+        found = measured(
+            Sensor(
+                model=self._model,
+                number=index,
+                name=name,
+                numbers=self._model.data.sensordata[start : start + int(model.sensor_dim[index])],
+                shaft=Shaft() if joint is None else self._shaft(joint),
+            )
+        )
+        if found is None:
+            fact = f"the sensor {name!r} of type {type_name} is no device of Webots"
+            self._lack(_SENSOR, own, fact, f"leave it out (--leave-out {type_name})", type_name)
+        elif self._add(_SENSOR, found.kind, found.device, joint):
+            self._found.samples.append(found.sample)
+
+    def _add(self, section: str, kind: Kind[Any], device: Any, joint: int | None) -> bool:
+        name: str = device.name
+        devices = self._found.devices
+        if name in devices.rows:
+            remedy = f'rename one: <text name="device:{section}/{name}" data="..."/> in <custom>'
+            error = self._description.error(section, name, f"a second device is called {name!r}", remedy)
+            self._found.refused.append(error)
+            return False
+        devices.rows[name] = kind, device
+        if joint is not None:
+            shaft = devices.shafts[name] = self._shaft(joint)
+            shaft.names.setdefault(kind.role, name)
+            if isinstance(device, ActuatorMotor) and shaft.motor is None:
+                shaft.motor = device
+            self._found.joints[name] = joint
+        return True
+
+    def _name(self, section: str, default: str) -> str | None:
+        """Return the name of a device; None if the robot shall not have it."""
+        key = f"{section}/{default}"
+        self._known.add(key)
+        name = self._names.get(key, default)
+        return None if name == LEFT_OUT else name
+
+    def _lack(self, section: str, name: str, fact: str, remedy: str, type_name: str = "") -> None:
+        error = self._description.error(section, name, fact, remedy)
+        if self._leave_out.everything or type_name in self._leave_out.types:
+            self._found.left_out.append(error)
+        else:
+            self._found.refused.append(error)
+
+    def _unknown(self) -> Iterator[WorldError]:
+        """Yield an error for each name in `custom` of a device that the model does not have."""
+        for key in self._names:
+            if key not in self._known:
+                section = key.partition("/")[0] + "/"
+                known = ", ".join(sorted(it for it in self._known if it.startswith(section))) or "none"
+                fact = f"the model has no {key}"
+                yield self._description.error("custom", f"device:{key}", fact, f"write one of: {known}")
+
+    def _is_simple(self, joint: int) -> bool:
+        return joint >= 0 and int(self._model.model.jnt_type[joint]) in {HINGE, SLIDE}
+
+    def _shaft(self, joint: int) -> Shaft:
+        slides = self._model.model.jnt_type[joint] == SLIDE
+        axis = (1.0, 0.0, 0.0)  # MuJoCo moves it
+        return self._shafts.setdefault(joint, Shaft(joint=Joint(axis=axis, slides=bool(slides))))
+
+    def _writer(self, index: int) -> Any:
+        controls = self._model.data.ctrl
+
+        def write(value: float) -> None:
+            controls[index] = value
+
+        return write

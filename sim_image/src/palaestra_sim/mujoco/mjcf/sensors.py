@@ -1,0 +1,206 @@
+"""Sensors and cameras of a model as devices of Webots.
+
+A sensor whose value is one number has the interface of a PositionSensor. Those with more numbers have a
+device of their own, or none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.mjcf.model import Model
+from palaestra_sim.scene.devices.accelerometer import ACCELEROMETER, Accelerometer
+from palaestra_sim.scene.devices.camera import CAMERA, Camera
+from palaestra_sim.scene.devices.distance_sensor import DISTANCE_SENSOR, DistanceSensor, DistanceSensorType
+from palaestra_sim.scene.devices.gps import GPS, Gps
+from palaestra_sim.scene.devices.gyro import GYRO, Gyro
+from palaestra_sim.scene.devices.inertial_unit import INERTIAL_UNIT, InertialUnit
+from palaestra_sim.scene.devices.kind import Carrier, DeviceT, Kind, Sample, Shaft
+from palaestra_sim.scene.devices.position_sensor import POSITION_SENSOR, PositionSensor
+from palaestra_sim.scene.devices.response import Axes
+from palaestra_sim.scene.devices.touch_sensor import TOUCH_SENSOR, TouchSensor
+from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.lookup import LookupTable
+from palaestra_sim.scene.places import Place
+
+_NOWHERE: Final = Place(None, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))  # MuJoCo measures, not a place
+_PLAIN: Final = Axes(table=None, on=(True, True, True), resolution=-1.0)
+_FORCE: Final = 1  # what `get_type` of a touch sensor answers
+_PIXELS: Final = (64, 64)  # Webots' own, for a camera without a resolution
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Measured:
+    """A device, its row of the table of devices, and what gives it its value."""
+
+    kind: Kind[Any]
+    device: Any
+    sample: Sample
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensor:
+    """A sensor of the model.
+
+    Attributes:
+        model: with all else.
+        number: of the sensor.
+        name: of the device.
+        numbers: a view of its value.
+        shaft: the joint that it measures; a new one without devices if there is none.
+    """
+
+    model: Model
+    number: int
+    name: str
+    numbers: Any
+    shaft: Shaft
+
+
+def measured(sensor: Sensor) -> Measured | None:
+    """Return the device of a sensor; None if Webots has nothing alike."""
+    type_ = int(sensor.model.model.sensor_type[sensor.number])
+    make = _MAKERS.get(type_)
+    if make is None and sensor.numbers.size == 1:
+        make = _number
+    return None if make is None else make(sensor)
+
+
+def camera(model: Any, number: int, name: str) -> Measured:
+    """Return the device of a camera."""
+    width, height = model.cam_resolution[number].tolist()
+    size = (width, height) if width > 1 and height > 1 else _PIXELS
+    upward = math.radians(float(model.cam_fovy[number]))
+    extent_m = float(model.stat.extent)
+    lens = Lens(
+        size=size,
+        field_of_view_rad=2.0 * math.atan(math.tan(upward / 2.0) * size[0] / size[1]),
+        near_m=float(model.vis.map.znear) * extent_m,
+        far_m=float(model.vis.map.zfar) * extent_m,
+    )
+    device = Camera(name=name, model="", place=_NOWHERE, lens=lens, spherical=False, exposure=1.0)
+    return Measured(kind=_CAMERA, device=device, sample=lambda: None)
+
+
+def _by_model(_devices: Sequence[Any], _robot: Carrier) -> Sample:
+    """Sample nothing here: the simulation samples what the model measures."""
+    return lambda: None
+
+
+def _own(kind: Kind[DeviceT]) -> Kind[DeviceT]:
+    return replace(kind, sampler=_by_model)
+
+
+def _number(sensor: Sensor) -> Measured:
+    device = PositionSensor(name=sensor.name, shaft=sensor.shaft, resolution=-1.0, noise=0.0)
+
+    def sample() -> None:
+        device.value = float(sensor.numbers[0])
+
+    return Measured(kind=_POSITION_SENSOR, device=device, sample=sample)
+
+
+def _distance(sensor: Sensor) -> Measured | None:
+    """Return a distance sensor, which measures its whole reach where it meets nothing."""
+    if sensor.numbers.size != 1:
+        return None
+    model = sensor.model.model
+    reach_m = float(model.sensor_cutoff[sensor.number]) or float(model.vis.map.zfar * model.stat.extent)
+    device = DistanceSensor(
+        name=sensor.name,
+        model="",
+        beams=(),
+        weights=(),
+        table=LookupTable([(0.0, 0.0, 0.0), (reach_m, reach_m, 0.0)]),
+        type=DistanceSensorType.LASER,
+        aperture_rad=0.0,
+    )
+
+    def sample() -> None:
+        distance_m = float(sensor.numbers[0])
+        device.value = reach_m if distance_m < 0.0 else min(reach_m, distance_m)
+
+    return Measured(kind=_DISTANCE_SENSOR, device=device, sample=sample)
+
+
+def _touch(sensor: Sensor) -> Measured:
+    device = TouchSensor(name=sensor.name, model="", outline=[], type=_FORCE, table=None, value=0.0)
+
+    def sample() -> None:
+        device.value = float(sensor.numbers[0])
+
+    return Measured(kind=_TOUCH_SENSOR, device=device, sample=sample)
+
+
+def _accelerometer(sensor: Sensor) -> Measured:
+    device = Accelerometer(name=sensor.name, model="", place=_NOWHERE, gravity=0.0, axes=_PLAIN)
+    return Measured(kind=_ACCELEROMETER, device=device, sample=_vector(device, sensor))
+
+
+def _gyro(sensor: Sensor) -> Measured:
+    device = Gyro(name=sensor.name, model="", place=_NOWHERE, axes=_PLAIN)
+    return Measured(kind=_GYRO, device=device, sample=_vector(device, sensor))
+
+
+def _inertial_unit(sensor: Sensor) -> Measured:
+    device = InertialUnit(name=sensor.name, model="", place=_NOWHERE, noise=0.0, resolution=-1.0)
+
+    def sample() -> None:
+        w, x, y, z = sensor.numbers.tolist()
+        device.value = x, y, z, w
+
+    return Measured(kind=_INERTIAL_UNIT, device=device, sample=sample)
+
+
+def _gps(sensor: Sensor) -> Measured:
+    model, number = sensor.model, sensor.number
+    what, which = int(model.model.sensor_objtype[number]), int(model.model.sensor_objid[number])
+    device = Gps(
+        name=sensor.name,
+        model="",
+        place=_NOWHERE,
+        reference=(0.0, 0.0, 0.0),
+        accuracy=0.0,
+        resolution=-1.0,
+        speed_noise=0.0,
+        speed_resolution=-1.0,
+    )
+    position = _vector(device, sensor)
+
+    def sample() -> None:
+        position()
+        (vx, vy, vz), _ = model.velocity(what, which)
+        device.speed_vector.value = vx, vy, vz
+        device.speed.value = math.hypot(vx, vy, vz)
+
+    return Measured(kind=_GPS, device=device, sample=sample)
+
+
+def _vector(device: Gps | Gyro | Accelerometer, sensor: Sensor) -> Sample:
+    def sample() -> None:
+        x, y, z = sensor.numbers.tolist()
+        device.value = x, y, z
+
+    return sample
+
+
+_POSITION_SENSOR: Final = _own(POSITION_SENSOR)
+_DISTANCE_SENSOR: Final = _own(DISTANCE_SENSOR)
+_ACCELEROMETER: Final = _own(ACCELEROMETER)
+_GYRO: Final = _own(GYRO)
+_INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
+_GPS: Final = _own(GPS)
+_TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
+_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # no eye: nothing draws models yet
+_MAKERS: Final[dict[int, Callable[[Sensor], Measured | None]]] = {
+    int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
+    int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,
+    int(mujoco.mjtSensor.mjSENS_ACCELEROMETER): _accelerometer,
+    int(mujoco.mjtSensor.mjSENS_GYRO): _gyro,
+    int(mujoco.mjtSensor.mjSENS_FRAMEQUAT): _inertial_unit,
+    int(mujoco.mjtSensor.mjSENS_FRAMEPOS): _gps,
+}

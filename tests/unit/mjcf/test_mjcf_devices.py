@@ -1,0 +1,197 @@
+"""Actuators, sensors and cameras of a model as devices of Webots."""
+
+import math
+
+import pytest
+
+from palaestra_sim.errors import WorldError
+from palaestra_sim.seam import UnsimulatedError
+from tests.unit.mjcf.conftest import FORCE, POSITION, VELOCITY
+
+
+def kinds(simulation):
+    """Return the types of the nodes of all devices by name."""
+    return {name: kind.node for name, (kind, _) in simulation.robots[0].parts.devices.rows.items()}
+
+
+def value(simulation, name):
+    """Return the value of a sensor."""
+    return simulation.robots[0].sensors[name].value
+
+
+def test_every_actuator_sensor_and_camera_is_a_device(load):
+    """A model needs no mapping; a sensor without a name has that of its joint and its type."""
+    assert kinds(load()) == {
+        "push": "LinearMotor",
+        "cart position": "PositionSensor",
+        "cart speed": "PositionSensor",
+        "hinge_jointpos": "PositionSensor",
+        "down": "DistanceSensor",
+        "gyro": "Gyro",
+        "accelerometer": "Accelerometer",
+        "gps": "GPS",
+        "imu": "InertialUnit",
+        "bump": "TouchSensor",
+        "eye": "Camera",
+    }
+
+
+def test_a_text_renames_a_device_or_leaves_it_out(load):
+    """Programs of users look for names of their own."""
+    texts = '<text name="device:actuator/push" data="motor"/><text name="device:camera/eye" data="-"/>'
+
+    found = kinds(load(FORCE, "", ("<custom>", f"<custom>{texts}")))
+
+    assert "motor" in found
+    assert not {"push", "eye"} & found.keys()
+
+
+def test_a_force_accelerates_its_joint(load):
+    """Through the gear: 1.1 N move 1.1 kg by 1 m/s2 for half a second."""
+    simulation = load(FORCE, "", ('damping="0.01"', 'damping="1000"'))
+    simulation.robots[0].motors["push"].set_effort(1.1)
+
+    simulation.step(500)
+
+    assert value(simulation, "cart speed") == pytest.approx(0.5, rel=0.01)
+    assert value(simulation, "cart position") == pytest.approx(0.125, rel=0.02)
+
+
+def test_a_servo_for_a_velocity_turns_at_it_and_to_a_target(load):
+    """As a motor of Webots, whose target of infinity means a velocity."""
+    simulation = load(VELOCITY)
+    motor = simulation.robots[0].motors["push"]
+    motor.set_position(math.inf)
+    motor.set_velocity(0.5)
+    simulation.step(1000)
+    assert value(simulation, "cart speed") == pytest.approx(0.5, abs=0.02)
+
+    motor.set_position(0.2)
+    simulation.step(3000)
+
+    assert value(simulation, "cart position") == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_servo_for_a_position_goes_there_at_the_commanded_velocity(load):
+    """Without a velocity it goes as fast as its force allows."""
+    simulation = load(POSITION)
+    motor = simulation.robots[0].motors["push"]
+    motor.set_position(1.0)
+    motor.set_velocity(0.5)
+    simulation.step(1000)
+    assert value(simulation, "cart position") == pytest.approx(0.5, abs=0.05)
+
+    motor.set_velocity(100.0)
+    simulation.step(3000)
+
+    assert value(simulation, "cart position") == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "command", "message"),
+    [
+        (FORCE, lambda motor: motor.set_position(1.0), "takes a force; set a force or torque, or write"),
+        (FORCE, lambda motor: motor.set_velocity(1.0), "takes a force; set a force or torque"),
+        (POSITION, lambda motor: motor.set_effort(1.0), "takes a position; set a position or velocity"),
+        (
+            VELOCITY,
+            lambda motor: motor.set_available_torque(1.0),
+            "whose force the model limits; write forcerange",
+        ),
+        (POSITION, lambda motor: motor.set_acceleration(1.0), "whose acceleration MuJoCo does not limit"),
+    ],
+)
+def test_a_command_that_the_actuator_cannot_follow_fails(load, actuator, command, message):
+    """A success without an effect would let a policy learn from a robot that stands still."""
+    motor = load(actuator).robots[0].motors["push"]
+
+    with pytest.raises(UnsimulatedError, match=message):
+        command(motor)
+
+
+def test_sensors_have_the_values_of_the_moment(load):
+    """MuJoCo computes them at the beginning of its step; here they are those after it."""
+    simulation = load()
+    simulation.robots[0].motors["push"].set_effort(5.0)
+
+    simulation.step(200)
+
+    data = simulation._model.data
+    assert value(simulation, "cart position") == float(data.qpos[0])
+    assert value(simulation, "cart speed") == float(data.qvel[0])
+
+
+def test_a_rangefinder_measures_meters_and_its_whole_reach_if_it_meets_nothing(load):
+    """MuJoCo's -1 would be nearer than everything."""
+    simulation = load(FORCE, '<rangefinder name="up" site="skin" cutoff="7"/>')
+
+    simulation.step(10)
+
+    assert value(simulation, "down") == pytest.approx(0.9)
+    assert value(simulation, "up") == 7.0
+
+
+def test_the_other_sensors_have_the_units_of_webots(load):
+    """Gravity is upward in an accelerometer; a quaternion ends with w."""
+    simulation = load()
+
+    simulation.step(10)
+
+    assert value(simulation, "imu") == pytest.approx((1.0, 0.0, 0.0, 0.0))
+    assert value(simulation, "accelerometer")[2] == pytest.approx(-9.81, abs=0.1)
+    assert value(simulation, "gps")[:2] == pytest.approx((1.0, 1.0))
+    assert value(simulation, "bump") == 0.0
+
+    simulation.step(1000)
+
+    assert value(simulation, "bump") == pytest.approx(4.19 * 9.81, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("texts", "message"),
+    [
+        (
+            (FORCE, '<framelinvel name="v" objtype="body" objname="cart"/>'),
+            "the sensor 'v' of type framelinvel is no device of Webots; leave it out",
+        ),
+        ((FORCE, '<jointpos name="push" joint="hinge"/>'), "a second device is called 'push'; rename one"),
+        (('<adhesion body="cart" ctrlrange="0 1"/>',), "the actuator 'actuator0' is no motor of Webots"),
+        (
+            (FORCE, "", ("<custom>", '<custom><text name="device:sensor/x" data="y"/>')),
+            "the model has no sensor/x; write one of: sensor/accelerometer, ",
+        ),
+        ((FORCE.replace("slider", "slide"),), r"cartpole.xml:\d+:1: .*unknown transmission target 'slide'"),
+        ((FORCE, "", ("<custom>", '<custom><text name="keyframe" data="home"/>')), "no keyframe 'home'"),
+        ((FORCE, "", ("--synchronize", "")), "controllerArgs without --synchronize"),
+    ],
+)
+def test_what_cannot_be_a_device_is_refused_before_anything_starts(load, texts, message):
+    """One message has the fact and the remedy."""
+    with pytest.raises(WorldError, match=message):
+        load(*texts)
+
+
+def test_a_sensor_without_a_device_is_left_out_by_its_type(load):
+    """The trainer logs it, and the status of the job has it."""
+    simulation = load(
+        FORCE, '<framelinvel name="v" objtype="body" objname="cart"/>', leave_out=["framelinvel"]
+    )
+
+    assert "v" not in kinds(simulation)
+    assert len(simulation.left_out) == 1
+
+
+def test_a_part_of_the_model_that_leads_outside_is_refused(load, tmp_path):
+    """An included file may name files too."""
+    (tmp_path / "part.xml").write_text('<mujoco><asset><mesh file="/etc/x.obj"/></asset></mujoco>')
+
+    with pytest.raises(WorldError, match=r"part\.xml:1:16: '/etc/x.obj' is outside of the folder"):
+        load(FORCE, "", ("<worldbody>", '<include file="part.xml"/><worldbody>'))
+
+
+def test_a_part_of_the_model_that_is_missing_is_refused(load):
+    """MuJoCo would not say where it looked."""
+    with pytest.raises(
+        WorldError, match=r"the file 'part\.xml', of which the model consists too, is missing"
+    ):
+        load(FORCE, "", ("<worldbody>", '<include file="part.xml"/><worldbody>'))

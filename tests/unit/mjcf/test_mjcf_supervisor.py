@@ -1,0 +1,205 @@
+"""Bodies and joints of a model as nodes, resets, and what a supervisor may change."""
+
+import math
+
+import pytest
+
+from palaestra_sim.scene.tree.fields import FieldType
+from palaestra_sim.seam import UnsimulatedError
+from tests.unit.mjcf.conftest import FORCE, VELOCITY
+
+
+def positions(simulation):
+    """Return the positions of cart and ball."""
+    return [simulation.tree.of_def(name).place.world_position for name in ("cart", "ball", "pole")]
+
+
+def play(simulation, steps=20):
+    """Push the cart back and forth; return every value on the way."""
+    seen = []
+    robot = simulation.robots[0]
+    for step in range(steps):
+        robot.motors["push"].set_effort(8.0 * math.sin(step))
+        simulation.step(50)
+        seen.append([sensor.value for sensor in robot.sensors.values()])
+        seen.append(positions(simulation))
+    return seen
+
+
+def test_a_body_is_a_node_with_its_name_as_def_and_the_first_that_is_driven_is_the_robot(load):
+    """A supervisor finds all of them; joints have their names too."""
+    simulation = load()
+    of_def = simulation.tree.of_def
+
+    assert of_def("cart").type_name == "Robot"
+    assert of_def("cart.pole").type_name == "Solid"
+    assert of_def("slider").type_name == "SliderJoint"
+    assert of_def("hinge").type_name == "HingeJoint"
+    assert of_def("target").place.world_position == (3.0, 0.0, 0.5)
+    assert simulation.robot_of(of_def("cart")) is simulation.robots[0]
+
+
+def test_a_reset_returns_to_the_start_bit_for_bit(load):
+    """Whatever happened before, and whenever somebody looked."""
+    simulation = load()
+    first = play(simulation)
+    simulation.reset()
+    simulation.step(10)
+
+    assert simulation.time_ms == 10
+    assert positions(simulation)[0] == (0.0, 0.0, 1.0)
+    assert play(simulation) == first
+
+
+def test_looking_changes_nothing(load):
+    """Poses are computed when they are asked for, and the next step starts from the same numbers."""
+    watched, other = load(), load()
+    for simulation in (watched, other):
+        simulation.robots[0].motors["push"].set_effort(3.0)
+    for _ in range(40):
+        watched.step(10)
+        positions(watched)
+    other.advance(400)
+
+    assert positions(watched) == positions(other)
+
+
+def test_a_world_begins_at_its_keyframe(load):
+    """Legged robots stand there; at their model's own positions they would fall."""
+    changes = (
+        ("<custom>", '<custom><text name="keyframe" data="tilted"/>'),
+        ("<sensor>", '<keyframe><key name="tilted" qpos="0.5 0.3 1 1 0.5 1 0 0 0"/></keyframe><sensor>'),
+    )
+    simulation = load(FORCE, "", *changes)
+    assert positions(simulation)[0][0] == 0.5
+
+    simulation.step(100)
+    simulation.reset()
+    simulation.step(10)
+
+    assert positions(simulation)[0][0] == 0.5
+
+
+@pytest.mark.parametrize("name", ["ball", "target"])
+def test_a_field_moves_what_is_free_or_stands(load, name):
+    """Tasks put their targets somewhere at each reset; a reset of the world returns them."""
+    simulation = load()
+    node = simulation.tree.of_def(name)
+    start = node.place.world_position
+    simulation.tree.field_of(node, "translation", simulation).set(FieldType.VEC3F, 0, (2.0, 1.0, 0.7))
+
+    simulation.step(10)
+
+    assert node.place.world_position == pytest.approx((2.0, 1.0, 0.7), abs=0.01)
+    simulation.reset()
+    simulation.step(10)
+    assert node.place.world_position == start
+
+
+def test_a_field_does_not_move_what_joints_move(load):
+    """The write would be read back, and change nothing."""
+    simulation = load()
+    field = simulation.tree.field_of(simulation.tree.of_def("cart"), "translation", simulation)
+
+    with pytest.raises(UnsimulatedError, match=r"cannot change Robot\.translation"):
+        field.set(FieldType.VEC3F, 0, (1.0, 0.0, 1.0))
+
+
+def test_a_joint_is_put_within_its_range(load):
+    """A cart-pole begins at random positions."""
+    simulation = load()
+
+    simulation.set_joint_position(simulation.tree.of_def("slider"), 9.0, 1)
+
+    assert positions(simulation)[0] == (2.0, 0.0, 1.0)
+    for node, index in (("cart", 1), ("slider", 2)):
+        with pytest.raises(UnsimulatedError):
+            simulation.set_joint_position(simulation.tree.of_def(node), 0.0, index)
+
+
+def test_velocities_and_forces_of_free_bodies(load):
+    """3 m/s2 for a tenth of a second, on a ball of 4.19 kg."""
+    simulation = load(FORCE, "", ("<option", '<option gravity="0 0 0"'))
+    ball = simulation.tree.of_def("ball")
+    simulation.motion.set_velocity(ball, (1.0, 0.0, 0.0), (0.0, 0.0, 2.0))
+    assert simulation.motion.velocity(ball) == (pytest.approx((1, 0, 0)), pytest.approx((0, 0, 2)))
+
+    for _ in range(10):
+        simulation.motion.add_force(ball, (0.0, 4.19 * 3.0, 0.0), relative=False)
+        simulation.step(10)
+    simulation.step(10)
+
+    assert simulation.motion.velocity(ball)[0] == pytest.approx((1.0, 0.3, 0.0), abs=0.01)
+    simulation.motion.halt(ball)
+    assert simulation.motion.velocity(ball)[0] == (0.0, 0.0, 0.0)
+
+
+def test_a_body_on_joints_takes_no_velocity(load):
+    """Its joints have speeds; those of a client would not fit."""
+    simulation = load()
+
+    with pytest.raises(UnsimulatedError, match="'pole' is on joints or stands, so it takes no velocity"):
+        simulation.motion.set_velocity(simulation.tree.of_def("pole"), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_contact_points_are_where_a_body_touches(load):
+    """The ball lies on the floor after a while, and nowhere before."""
+    simulation = load()
+    ball = simulation.tree.of_def("ball")
+    assert simulation.contact_points(ball, descendants=False) == []
+
+    simulation.step(2000)
+    ((point, number),) = simulation.contact_points(ball, descendants=False)
+
+    assert point == pytest.approx((1.0, 1.0, 0.0), abs=0.01)
+    assert number == ball.number
+
+
+def test_a_state_of_a_node_is_saved_and_loaded(load):
+    """Only the joints inside the node return."""
+    simulation = load()
+    cart = simulation.tree.of_def("cart")
+    simulation.set_joint_position(simulation.tree.of_def("slider"), 0.5, 1)
+    simulation.save_state(cart, "half")
+    simulation.step(500)
+    fallen = positions(simulation)[1]
+
+    simulation.load_state(cart, "__init__")
+    assert positions(simulation)[0] == (0.0, 0.0, 1.0)
+    simulation.load_state(cart, "half")
+
+    assert positions(simulation)[0] == (0.5, 0.0, 1.0)
+    assert positions(simulation)[1] == fallen
+    with pytest.raises(UnsimulatedError, match="no state 'other'; save it first"):
+        simulation.load_state(cart, "other")
+
+
+def test_nothing_is_added_to_or_removed_from_a_model(load):
+    """MuJoCo compiles a model once."""
+    simulation = load()
+    root = simulation.tree.field_of(simulation.tree.root, "children", simulation)
+
+    with pytest.raises(UnsimulatedError, match="keeps its bodies while it runs"):
+        simulation.add("Solid { }", root, -1)
+    with pytest.raises(UnsimulatedError, match="keeps its bodies while it runs"):
+        simulation.remove(simulation.tree.of_def("ball"))
+
+
+def test_a_model_that_explodes_has_values_that_are_no_numbers(load):
+    """MuJoCo would start again without a word; a client takes NaN as a fault."""
+    simulation = load(VELOCITY)
+    simulation._model.data.qvel[0] = math.nan
+
+    simulation.step(20)
+
+    assert math.isnan(simulation.robots[0].sensors["cart position"].value)
+
+
+def test_the_basic_step_is_the_shortest_that_fits_the_timestep(load):
+    """The controller counts whole milliseconds."""
+    without = ('<numeric name="basicTimeStep" data="10"/>', "")
+
+    assert load(FORCE, "", without).basic_step_ms == 2
+    assert load(FORCE, "", without, ('timestep="0.002"', 'timestep="0.0025"')).basic_step_ms == 5
+    with pytest.raises(ValueError, match="3 ms is no multiple of the basic step; use one of 2 ms"):
+        load(FORCE, "", without).step(3)
