@@ -13,6 +13,7 @@ from palaestra.api.simulators import Builtin
 from palaestra_sim.world import builtin
 
 EXAMPLES = [
+    "cartpole-mjcf",
     "chaos",
     "minimal",
     "move-to-target",

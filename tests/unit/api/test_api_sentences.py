@@ -84,7 +84,7 @@ SENTENCES = [
      "write a number and a unit, as 500m, 2, 512Mi or 1Gi")),
     ({"simulators.0.world": {"file": "hall.wbt"}},
      ('spec.simulators[0].world.file: "hall.wbt" is not the path of a world; '
-     "give the absolute path of a .wbt file")),
+     "give the absolute path of a .wbt or .xml file")),
     ({"trainer.environment.id": "MoveToTarget"},
      ('spec.trainer.environment.id: "MoveToTarget" is not the id of an environment; '
      "write it as in gymnasium's registry, such as MoveToTargetEnv-v0")),

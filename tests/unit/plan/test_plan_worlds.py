@@ -208,3 +208,24 @@ def test_what_is_switched_off_is_absent(in_cluster):
 
     assert "recycle" not in training(planned)["simulators"][0]
     assert "command" not in training(planned)
+
+
+MODEL = '<mujoco model="arm"><actuator><motor joint="x"/></actuator></mujoco>'
+
+
+def test_a_model_of_mujoco_is_a_file_that_ends_with_xml(in_cluster):
+    """Its sidecar writes the name into it, as into a world of Webots."""
+    planned = in_cluster(simulators=[group(driver="mujoco", world={"inline": MODEL}), EVALUATE])
+
+    assert data(planned)["collect.xml"] == MODEL
+    assert sidecars(planned)[0]["args"][:2][-1].endswith("/worlds/collect.xml")
+    assert "--name=" in named(planned)["sim-collect-0"]
+
+
+@pytest.mark.parametrize("world", [{"inline": MODEL}, {"file": "/robots/arm.xml"}])
+def test_a_model_of_mujoco_needs_a_driver_that_reads_it(in_cluster, world):
+    """The stub would refuse it at each start."""
+    with pytest.raises(
+        PlanError, match=r"spec\.simulators\[0\]\.driver: stub reads no MJCF.*set driver mujoco"
+    ):
+        in_cluster(simulators=[group(world=world), EVALUATE])

@@ -35,7 +35,7 @@ LABEL_VALUE = "^([A-Za-z0-9]([-A-Za-z0-9_.]*[A-Za-z0-9])?)?$"
 QUANTITY = "^[0-9]+([.][0-9]+)?(m|k|M|G|T|P|Ki|Mi|Gi|Ti|Pi)?$"
 MEMORY = "^[1-9][0-9]*(M|G|T|Mi|Gi|Ti)$"
 FOLDER = "^[A-Za-z0-9][-A-Za-z0-9._]*$"
-WORLD_FILE = "^/.+[.]wbt$"
+WORLD_FILE = "^/.+[.](wbt|xml)$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
 # The message for a value that does not match: <value> is not <first text>; <second text>
@@ -51,7 +51,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     MEMORY: ("an amount of memory", "write a whole number and a unit, as 400Mi or 2Gi"),
     LABEL_VALUE: ("the value of a label", "use letters, digits, '-', '_' and '.'"),
     FOLDER: ("the name of a folder", "use letters, digits, '-', '_' and '.', no '/'"),
-    WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt file"),
+    WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt or .xml file"),
     ENVIRONMENT_ID: (
         "the id of an environment",
         "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",

@@ -157,7 +157,7 @@ ROWS: dict[Reason, Row] = {
     ),
     Reason.WORLD_INVALID: Row(
         "{problem}",
-        "a world is not a readable `.wbt` file, or refers to other files",
+        "a world is not a readable `.wbt` file or model of MuJoCo, or refers to other files",
         "correct the world; the operator reads a changed ConfigMap automatically",
     ),
     Reason.CONFIG_MAP_NOT_FOR_JOBS: Row(

@@ -50,30 +50,33 @@ class ConfigMapKey(ApiModel):
     """Name of the ConfigMap."""
 
     key: FileKey
-    """Key whose value is the text of a `.wbt` file."""
+    """Key whose value is the text of a `.wbt` file, or of a model of MuJoCo."""
 
 
 class World(ApiModel):
     """The source of the world: exactly one of four.
 
     Every simulator runs its own copy. In the copy, only the `controllerArgs` of robots whose controller is
-    `ros` change: `--name=` is set, `--synchronize` is added, and at most one simulator keeps `--clock`.
+    `ros` change: `--name=` is set, `--synchronize` is added, and at most one simulator keeps `--clock`. A
+    model of MuJoCo has them in a text of `<custom>`.
     """
 
     inline: Annotated[str, Field(min_length=1, max_length=200_000)] | None = None
-    """Text of a `.wbt` file. It must not refer to other files: relative URLs are refused. If the inline
-    worlds of a job are larger than 256 KiB together, use `kubectl apply --server-side`."""
+    """Text of a `.wbt` file, or of a model of MuJoCo (MJCF) with driver `mujoco`. It must not refer to
+    other files: relative URLs are refused. If the inline worlds of a job are larger than 256 KiB together,
+    use `kubectl apply --server-side`."""
 
     config_map: ConfigMapKey | None = None
-    """ConfigMap key with the text of a `.wbt` file; relative URLs are refused."""
+    """ConfigMap key with such a text; relative URLs are refused."""
 
     builtin: Builtin | None = Field(default=None, strict=False)
     """A world that ships with Palaestra. `arena`: four by four meters with four cylinders and a Robotino.
     `seeing`: an arena without cylinders, with a red pole, and a Robotino with a color and a depth camera."""
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
-    """Absolute path of a `.wbt` file in the simulator's image (`palaestra run`: on this machine). PROTOs and
-    textures are beside it; the rest of its Webots project, such as `controllers/`, is beside its folder."""
+    """Absolute path of a `.wbt` file, or of a model of MuJoCo (`.xml`), in the simulator's image (`palaestra
+    run`: on this machine). PROTOs, meshes and textures are beside it; the rest of its Webots project, such as
+    `controllers/`, is beside its folder."""
 
     rules = (
         Rule(

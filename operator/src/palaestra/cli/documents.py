@@ -109,7 +109,7 @@ def _add_plan(commands: Commands) -> None:
 
 def _add_world(commands: Commands) -> None:
     parser = command(commands, "world", _world, "print one simulator's own world", WORLD)
-    parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt)")
+    parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt, or .xml of MuJoCo)")
     parser.add_argument("--check", action="store_true", help="print what each simulator makes of it")
     parser.add_argument("--job", metavar="NAME", help="name of the job")
     parser.add_argument("--namespace", default="default", help="namespace of the job")

@@ -7,13 +7,15 @@ lie in the image, and are left to the sidecar altogether.
 
 from collections.abc import Mapping
 
-from palaestra.api import SimulatorGroup, TrainingJob, World
+from palaestra.api import Driver, SimulatorGroup, TrainingJob, World
 from palaestra.errors import PlanError
 from palaestra.plan.replica import PlannedSimulator, Replica
-from palaestra_sim.world import builtin, check, generate
+from palaestra_sim.world import MJCF, WBT, builtin, check, generate, suffix
 
 MOST_BYTES = 900_000  # of all worlds; an object is 1 MiB at most, and training.yaml is in it too
 FOLDER = "worlds"
+
+_READ_MJCF = (Driver.MUJOCO, Driver.COMMAND)
 
 ConfigMaps = Mapping[tuple[str, str], bytes]  # (name, key) -> content
 Files = Mapping[str, bytes]  # what goes into a ConfigMap, by file name
@@ -31,12 +33,13 @@ def source_files(job: TrainingJob, config_maps: ConfigMaps) -> Files:
     for place, group in enumerate(job.spec.simulators):
         field = f"spec.simulators[{place}].world"
         source = _source(group, field, config_maps)
+        _require_reader(group, source, place)
         if source is None:
             continue
         if group.world.builtin is None and source not in checked:  # those that ship pass every check
             check(source, f"{field}.{_kind(group.world)}")
             checked.add(source)
-        files[_of_group(group)] = source
+        files[_of_group(group, source)] = source
     if _size(files) > MOST_BYTES:
         raise PlanError(
             f"spec.simulators: their worlds take {_size(files)} bytes and {MOST_BYTES} fit in a "
@@ -51,13 +54,13 @@ def named_files(replica: Replica, sources: Files) -> Files:
     They wrote the names in already, a world for each simulator, unless those were too big together.
     A Job that mounts such a ConfigMap gets the same one again.
     """
-    copies = {
-        _of_simulator(simulator): generate(
-            sources[_of_group(simulator.group)], simulator.identity, clock=simulator.keeps_clock
-        )
-        for simulator in replica.simulators
-        if _of_group(simulator.group) in sources
-    }
+    copies: dict[str, bytes] = {}
+    for simulator in replica.simulators:
+        source = _file_of(simulator.group, sources)
+        if source is not None:
+            copies[f"{simulator.name}{suffix(source)}"] = generate(
+                source, simulator.identity, clock=simulator.keeps_clock
+            )
     return copies if _size(copies) <= MOST_BYTES else sources
 
 
@@ -65,17 +68,39 @@ def world_path(replica: Replica, simulator: PlannedSimulator, files: Files) -> s
     """Return the path of the world that a simulator's sidecar is given."""
     if simulator.group.world.file is not None:
         return simulator.group.world.file
-    own = _of_simulator(simulator)
-    name = own if own in files else _of_group(simulator.group)
-    return f"{replica.places(simulator.container).config}/{FOLDER}/{name}"
+    folder = f"{replica.places(simulator.container).config}/{FOLDER}"
+    for stem in (simulator.name, simulator.group.name):
+        for ending in (WBT, MJCF):
+            if f"{stem}{ending}" in files:
+                return f"{folder}/{stem}{ending}"
+    return f"{folder}/{simulator.group.name}{WBT}"
 
 
-def _of_group(group: SimulatorGroup) -> str:
-    return f"{group.name}.wbt"
+def _of_group(group: SimulatorGroup, source: bytes) -> str:
+    return f"{group.name}{suffix(source)}"
 
 
-def _of_simulator(simulator: PlannedSimulator) -> str:
-    return f"{simulator.name}.wbt"
+def _file_of(group: SimulatorGroup, sources: Files) -> bytes | None:
+    """Return the world of a group; None: it lies in the image."""
+    return next(
+        (sources[name] for ending in (WBT, MJCF) if (name := f"{group.name}{ending}") in sources), None
+    )
+
+
+def _require_reader(group: SimulatorGroup, source: bytes | None, place: int) -> None:
+    """Check that the simulator of a group reads worlds of this format.
+
+    Raises:
+        PlanError: the world is MJCF, and the driver reads no such world.
+    """
+    mjcf = group.world.file.endswith(MJCF) if group.world.file is not None else False
+    if source is not None:
+        mjcf = suffix(source) == MJCF
+    if mjcf and group.driver not in _READ_MJCF:
+        raise PlanError(
+            f"spec.simulators[{place}].driver: {group.driver.value} reads no MJCF, and the world is a model "
+            "of MuJoCo; set driver mujoco"
+        )
 
 
 def _source(group: SimulatorGroup, field: str, config_maps: ConfigMaps) -> bytes | None:

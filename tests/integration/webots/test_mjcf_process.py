@@ -1,0 +1,87 @@
+"""A cart-pole in MJCF in `palaestra-mujoco`, driven over ROS like any robot of Webots."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.ros import RosService
+from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots.devices import PositionSensor
+
+STEP_MS = 40
+EXAMPLE = Path(__file__).parents[3] / "manifests/examples/cartpole-mjcf.yaml"
+
+
+class CartPole:
+    """A running simulator, and the services of its robot."""
+
+    def __init__(self, world):
+        self.launcher = ProcessLauncher(world, driver="mujoco")
+        self.webots = Webots("cartpole", world, launcher=self.launcher, start_deadline_s=30.0)
+        self.webots.start()
+        self.webots.supervisor.set_mode(Mode.FAST)
+        self.position = PositionSensor("cartpole", "cart position")
+        self.position.enable(STEP_MS)
+        self._services = []
+
+    def call(self, path, type_name, **request):
+        """Return the answer of a service."""
+        service = RosService(f"/cartpole/{path}", f"webots_ros/{type_name}")
+        self._services.append(service)
+        return service(**request)
+
+    def step(self):
+        """Step once, and return the position of the cart."""
+        assert self.call("robot/time_step", "set_int", value=STEP_MS).success
+        assert self.position.read()
+        return self.position.value
+
+    def node(self, name):
+        """Return the handle of a node."""
+        return self.call("supervisor/get_from_def", "supervisor_get_from_def", name=name).node
+
+    def close(self):
+        """End the simulator and its sidecar."""
+        for each in (*self._services, self.position):
+            each.close()
+        self.webots.stop()
+        self.webots.close()
+        self.launcher.close()
+
+
+@pytest.fixture
+def cartpole(master, tmp_path):
+    """The world of the example, running under the name cartpole."""
+    del master
+    job = yaml.safe_load(EXAMPLE.read_text())
+    world = tmp_path / "cartpole.xml"
+    world.write_text(job["spec"]["simulators"][0]["world"]["inline"])
+    running = CartPole(world)
+    yield running
+    running.close()
+
+
+def test_a_model_of_mujoco_is_driven_measured_moved_and_reset_over_ros(cartpole):
+    """The same services and facades as for a robot of Webots."""
+    devices = cartpole.call("robot/get_device_list", "robot_get_device_list", ask=True).list
+    assert list(devices) == ["push", "cart position", "cart speed", "pole angle", "pole speed"]
+    start = cartpole.step()
+
+    assert cartpole.call("push/set_force", "set_float", value=5.0).success
+    pushed = [cartpole.step() for _ in range(5)]
+    place = cartpole.call("supervisor/node/get_position", "node_get_position", node=cartpole.node("cart"))
+    cartpole.call("supervisor/simulation_reset", "get_bool", ask=True)
+    again = cartpole.step()
+    cartpole.call("push/set_force", "set_float", value=5.0)
+
+    assert start == again == 0.0
+    assert pushed[-1] > 0.05
+    assert place.position.x == pushed[-1]
+    assert [cartpole.step() for _ in range(5)] == pushed
+
+    tilted = {"node": cartpole.node("hinge"), "position": 0.2, "index": 1}
+    assert cartpole.call("supervisor/node/set_joint_position", "node_set_joint_position", **tilted).success
+    velocity = cartpole.call("supervisor/node/get_velocity", "node_get_velocity", node=cartpole.node("pole"))
+    assert velocity.velocity.linear.x > 0.1
