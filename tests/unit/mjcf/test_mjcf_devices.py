@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from palaestra_sim.errors import WorldError
@@ -44,6 +45,24 @@ def test_a_text_renames_a_device_or_leaves_it_out(load):
 
     assert "motor" in found
     assert not {"push", "eye"} & found.keys()
+
+
+def test_a_camera_shows_the_model_as_mujoco_draws_it(load):
+    """Blue comes first; the camera looks down on a red plate, and moves with its body."""
+    plate = '<geom type="box" pos="0 0 0.1" size="0.5 0.5 0.01" rgba="1 0 0 1" contype="0" conaffinity="0"/>'
+    simulation = load(FORCE, "", ('<geom name="floor"', f'{plate}<geom name="floor"'))
+    _, camera = simulation.robots[0].parts.devices.rows["eye"]
+    camera.enabled(10)
+
+    picture = np.frombuffer(camera.value, np.uint8).reshape(16, 32, 4)
+    blue, green, red, alpha = picture[8, 16].tolist()
+
+    assert red > 100 > max(blue, green)
+    assert alpha == 255
+    before = bytes(camera.value)
+    simulation.robots[0].motors["push"].set_effort(10.0)
+    simulation.step(500)
+    assert bytes(camera.value) != before
 
 
 def test_a_force_accelerates_its_joint(load):

@@ -12,7 +12,7 @@
 - `rays`: how far the beams of sensors travel
 - `eye`, `pictures`: what cameras see
 - `visible`: from visible shapes to a model of their own
-- `canvas`: OpenGL
+- `canvas`, `pixels`: OpenGL
 - `mjcf`: worlds in MuJoCo's own format, beside all of these
 
 Worlds, devices and the interface are those of all simulators: `scene` and `front`.

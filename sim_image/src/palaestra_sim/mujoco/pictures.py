@@ -15,13 +15,13 @@ import numpy as np
 
 from palaestra_sim.mujoco.canvas import canvas
 from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.pixels import blue_first
 from palaestra_sim.mujoco.visible import SKY, SUN, Visible, build, glow
 from palaestra_sim.scene.drawn import Drawn, View
 from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.geometry import Pose
 from palaestra_sim.scene.places import Place
 
-_OPAQUE: Final = 255
 _HORIZON_M: Final = 1000.0  # how far a camera without `far` sees
 _BEYOND: Final = 1.1  # times the distance of the sky, so that the sky itself is drawn: the end of the frustum
 # Webots' cameras look along x with z up; MuJoCo's look along -z with y up. Columns: right, up, back.
@@ -60,11 +60,7 @@ class Pictures:
         width, height = lens.size
         read = np.empty((height, width, 3), np.uint8)
         mujoco.mjr_readPixels(read, None, rect, context)
-        pixels = np.empty((height, width, 4), np.uint8)
-        for channel in range(3):  # one by one: four times as fast as all at once
-            pixels[:, :, channel] = read[::-1, :, 2 - channel]
-        pixels[:, :, 3] = _OPAQUE
-        return pixels.data.cast("B")
+        return blue_first(read)
 
     def depths(self, place: Place, lens: Lens) -> Any:
         """Return how far along the axis of the lens each pixel is, in meters: (height, width) float32.

@@ -84,7 +84,7 @@ class _Fitter:
         for index in range(model.ncam):
             name = self._name(_CAMERA, model.camera(index).name or f"camera{index}")
             if name is not None:
-                found = camera(model, index, name)
+                found = camera(self._model, index, name)
                 self._add(_CAMERA, found.kind, found.device, None)
         self._found.refused += self._unknown()
         return self._found

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from palaestra_sim.mujoco.library import mujoco
+from palaestra_sim.mujoco.mjcf.eye import ModelEye
 from palaestra_sim.mujoco.mjcf.model import Model
 from palaestra_sim.scene.devices.accelerometer import ACCELEROMETER, Accelerometer
 from palaestra_sim.scene.devices.camera import CAMERA, Camera
@@ -70,8 +71,9 @@ def measured(sensor: Sensor) -> Measured | None:
     return None if make is None else make(sensor)
 
 
-def camera(model: Any, number: int, name: str) -> Measured:
-    """Return the device of a camera."""
+def camera(parent: Model, number: int, name: str) -> Measured:
+    """Return the device of a camera, which shows the model as MuJoCo draws it."""
+    model = parent.model
     width, height = model.cam_resolution[number].tolist()
     size = (width, height) if width > 1 and height > 1 else _PIXELS
     upward = math.radians(float(model.cam_fovy[number]))
@@ -82,7 +84,8 @@ def camera(model: Any, number: int, name: str) -> Measured:
         near_m=float(model.vis.map.znear) * extent_m,
         far_m=float(model.vis.map.zfar) * extent_m,
     )
-    device = Camera(name=name, model="", place=_NOWHERE, lens=lens, spherical=False, exposure=1.0)
+    eye = ModelEye(parent, number, lens)
+    device = Camera(name=name, model="", place=_NOWHERE, lens=lens, spherical=False, exposure=1.0, eye=eye)
     return Measured(kind=_CAMERA, device=device, sample=lambda: None)
 
 
@@ -195,7 +198,7 @@ _GYRO: Final = _own(GYRO)
 _INERTIAL_UNIT: Final = _own(INERTIAL_UNIT)
 _GPS: Final = _own(GPS)
 _TOUCH_SENSOR: Final = _own(TOUCH_SENSOR)
-_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # no eye: nothing draws models yet
+_CAMERA: Final = replace(CAMERA, attach=lambda _camera, _robot: None)  # it has its eye already
 _MAKERS: Final[dict[int, Callable[[Sensor], Measured | None]]] = {
     int(mujoco.mjtSensor.mjSENS_RANGEFINDER): _distance,
     int(mujoco.mjtSensor.mjSENS_TOUCH): _touch,
