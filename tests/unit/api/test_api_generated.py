@@ -94,7 +94,11 @@ def test_the_example_for_mujoco_is_the_same_job_with_another_driver(repository) 
 def test_make_run_takes_the_example_of_the_simulator(chosen, example, repository) -> None:
     """Each has a run directory of its own, so no run is resumed in another simulator."""
     shown = subprocess.run(
-        ["make", "--dry-run", "run", *chosen], cwd=repository, capture_output=True, text=True, check=True
+        ["make", "--no-print-directory", "--dry-run", "run", *chosen],
+        cwd=repository,
+        capture_output=True,
+        text=True,
+        check=True,
     )
 
     assert shown.stdout.splitlines()[-1].endswith(f"palaestra run manifests/examples/{example}.yaml")
