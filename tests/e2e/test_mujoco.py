@@ -18,11 +18,13 @@ TRAINER = {
     "evaluation": {"everySteps": 300, "episodes": 1},
     "checkpoint": {"everySteps": 300, "keep": 2},
 }
+# Of the simulator itself: this program has its name in its own command line too.
 ENVIRONMENT = """
 from pathlib import Path
 for process in Path("/proc").glob("[0-9]*"):
     try:
-        if b"palaestra-mujoco" in (process / "cmdline").read_bytes():
+        words = (process / "cmdline").read_bytes().split(bytes(1))
+        if any(word.endswith(b"/palaestra-mujoco") for word in words[:2]):
             print(*(process / "environ").read_text().split(chr(0)), sep=chr(10))
     except OSError:
         pass
