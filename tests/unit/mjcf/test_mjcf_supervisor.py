@@ -40,7 +40,7 @@ def test_a_body_is_a_node_with_its_name_as_def_and_the_first_that_is_driven_is_t
 
 
 def test_a_reset_returns_to_the_start_bit_for_bit(load):
-    """Whatever happened before, and whenever somebody looked."""
+    """It depends neither on the past nor on readings between steps."""
     simulation = load()
     first = play(simulation)
     simulation.reset()

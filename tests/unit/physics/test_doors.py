@@ -46,7 +46,7 @@ def angle(simulation, name="DOOR"):
 
 
 def test_a_robot_pushes_a_door_open(load, drive):
-    """The knob goes with it, and a door that nobody pushes stays shut in its frame."""
+    """The knob goes with it, and a door without a push stays shut in its frame."""
     simulation = load()
     simulation.step(1920)
     assert angle(simulation) == pytest.approx(0.0, abs=1e-3)

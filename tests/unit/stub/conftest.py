@@ -35,7 +35,7 @@ class FakePublisher:
 
     @property
     def heard(self):
-        """Whether somebody is subscribed."""
+        """Whether there is a subscriber."""
         return bool(self.topic.inboxes)
 
     def send(self, fields):

@@ -44,7 +44,7 @@ def test_simulators_have_a_line_each_with_what_is_wrong_with_them():
 
 
 def test_what_simulators_leave_out_has_lines_of_its_own():
-    """Whoever reads the numbers of a job has to know that its world was not whole."""
+    """The numbers of a job mean less if its world was not whole."""
     line = "collect: the stub simulates no Drone: 1 node left out (line 7)"
     job = make_job()
     status = job.status.model_copy(update={"left_out": (line,)})

@@ -1,6 +1,6 @@
 """The physics of the stub: every robot moves by itself, and sees and touches what is around it.
 
-Heights are checked when the world is arranged; what is left is seen from above.
+Heights are checked when the world is arranged. Motion and rays are then computed as seen from above.
 """
 
 from __future__ import annotations

@@ -231,7 +231,7 @@ def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
 
 
 def test_a_scene_that_moves_nothing_has_no_cylinders():
-    """A scene of somebody else's, with reset alone."""
+    """A scene from another package, with reset alone."""
 
     class Bare:
         def reset(self, seed, start, target):

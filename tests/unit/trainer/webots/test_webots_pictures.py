@@ -82,7 +82,7 @@ def test_the_array_has_shape_and_type_of_the_sensor(kind):
 
 
 def test_no_pixel_is_copied(kind):
-    """The array lies in the message, and nobody may write into it."""
+    """The array lies in the message and is read-only."""
     read, make_message, _ = kind
     message = make_message()
 

@@ -62,7 +62,7 @@ class Feed:
     def publish(self, elapsed_ms: int) -> None:
         """Send the value to the subscribers, by each publisher that is due.
 
-        A value that nobody would get is not read: a picture takes time to draw.
+        Without a subscriber the value is not read: a picture takes time to draw.
         """
         source = self.source
         if source is None:

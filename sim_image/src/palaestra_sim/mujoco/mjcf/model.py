@@ -33,7 +33,7 @@ class Model:
     def __init__(self, model: Any, keyframe: int | None = None) -> None:
         self.model = model
         self.data = mujoco.MjData(model)
-        # Numbers that are not finite reach the sensors, as a fault, instead of a reset that nobody sees.
+        # Numbers that are not finite reach the sensors as a fault; MuJoCo would reset silently.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._keyframe = keyframe
         self._starts = (model.body_pos.copy(), model.body_quat.copy())
