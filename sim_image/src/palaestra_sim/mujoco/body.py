@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import add, sub
 from typing import Any, Final
 
 from palaestra_sim.scene.base import ACCELERATIONS
@@ -16,6 +17,7 @@ from palaestra_sim.scene.bodies import Build
 from palaestra_sim.scene.shapes import Shape
 
 X, Y, HEADING = 0, 1, 2  # of the three joints
+_REST: Final = (0.0, 0.0, 0.0)
 
 
 class MujocoBody:
@@ -40,6 +42,11 @@ class MujocoBody:
         self._joints: Any = None  # views of MuJoCo's arrays, once there is a model
         self._speeds: Any = None
         self._controls: Any = None
+        # In the robot's axes: see `command`.
+        self._wanted: Sequence[float] = _REST
+        self._changes: Sequence[float] = _REST
+        self._aims: Sequence[float] = _REST
+        self._lags: Sequence[float] = _REST
         self.x = self.y = self.heading_rad = self.s = 0.0
         self.c = 1.0
 
@@ -76,10 +83,18 @@ class MujocoBody:
         self._set_speed(vx, vy, omega)
 
     def command(self, step_s: float, *, powered: bool) -> None:
-        """Turn the wheels for one basic step, and set what the servos aim at."""
+        """Turn the wheels for one basic step, and set the speeds of the servos.
+
+        A servo needs a part of the step to reach a new speed, and the next step makes up for the distance
+        that this cost. So a robot stops where the law of its wheels says.
+        """
         if powered:
             self.base.turn(step_s)
-        self._controls[:] = self.base.vx, self.base.vy, self.base.omega
+        wanted = (self.base.vx, self.base.vy, self.base.omega)
+        self._changes = list(map(sub, wanted, self._wanted))
+        self._wanted = wanted
+        self._aims = list(map(add, wanted, self._lags))
+        self._controls[:] = self._aims
 
     def follow(self, step_s: float) -> None:
         """Take the pose that MuJoCo has computed."""
@@ -87,9 +102,29 @@ class MujocoBody:
         heading = math.remainder(turned, 2.0 * math.pi)
         omega = math.remainder(heading - self.heading_rad, 2.0 * math.pi) / step_s
         self.velocity = ((x - self.x) / step_s, (y - self.y) / step_s, omega)
+        self._lags = self._lagged(heading - 0.5 * omega * step_s)
         self._stand(x, y, heading)
 
+    def _lagged(self, heading_rad: float) -> list[float]:
+        """Return the mean speed that the servos missed in this step, seen from the middle of it.
+
+        It is at most the change of the speed that was wanted. An obstacle that holds a robot back changes
+        nothing that was wanted, so the robot does not jump when it is free again.
+        """
+        c, s = math.cos(heading_rad), math.sin(heading_rad)
+        vx, vy, omega = self.velocity
+        driven = (vx * c + vy * s, vy * c - vx * s, omega)
+        return [
+            math.copysign(min(abs(aim - speed), abs(change)), aim - speed)
+            for aim, speed, change in zip(self._aims, driven, self._changes, strict=True)
+        ]
+
+    def _forget(self) -> None:
+        """Let the servos begin again from rest."""
+        self._wanted = self._changes = self._aims = self._lags = _REST
+
     def _set_speed(self, vx: float, vy: float, omega: float) -> None:
+        self._forget()
         self.velocity = (vx, vy, omega)
         if self._speeds is not None:
             self._speeds[:] = self.velocity

@@ -206,7 +206,8 @@ def _begin_spec(spec: Any, surroundings: Surroundings) -> Any:
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # Webots takes any matrix
     spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_KG, _LEAST_KG_M2
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # The fast one drops terms between x and y: a robot is then slower across the axes than along them.
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
     spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     return spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], contype=STANDING, conaffinity=0, friction=FRICTION
