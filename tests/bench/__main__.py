@@ -10,6 +10,7 @@ import sys
 import time
 
 from tests.bench import (
+    abroad,
     learning,
     newcomer,
     operator,
@@ -34,6 +35,8 @@ PARTS = {
     "plain": plain.measure,
     "learning": learning.measure,
     "sparse": learning.measure_sparse,
+    "transfer": abroad.measure_transfer,
+    "seeing": abroad.measure_seeing,
 }
 
 

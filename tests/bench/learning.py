@@ -41,23 +41,30 @@ def measure_sparse():
 
 def train_and_measure(name, seed):
     """Return the success rate, on fresh episodes, of the policy that an example trains with `seed`."""
+    job = example(name)
+    job["spec"]["seed"] = seed
     with tempfile.TemporaryDirectory() as folder:
-        job = example(name)
-        job["spec"]["seed"] = seed
-        file = Path(folder) / "job.yaml"
-        file.write_text(yaml.safe_dump(job))
-        subprocess.run(
-            [PALAESTRA, "run", file, "--dir", folder],
-            check=True,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        result = subprocess.run(
-            [EVAL, Path(folder) / name / "0", f"--episodes={EPISODES}", f"--seeds={STREAM}"],
-            check=True,
-            capture_output=True,
-            text=True,
-        )
+        return success_rate(train(job, Path(folder)))
+
+
+def train(job, folder):
+    """Return the directory, inside `folder`, of the finished run of a job."""
+    file = folder / "job.yaml"
+    file.write_text(yaml.safe_dump(job))
+    subprocess.run(
+        [PALAESTRA, "run", file, "--dir", folder],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    return folder / job["metadata"]["name"] / "0"
+
+
+def success_rate(run):
+    """Return the success rate of the policy of a run directory, on fresh episodes."""
+    result = subprocess.run(
+        [EVAL, run, f"--episodes={EPISODES}", f"--seeds={STREAM}"], check=True, capture_output=True, text=True
+    )
     return json.loads(result.stdout)["success_rate"]
 
 
