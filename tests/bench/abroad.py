@@ -23,7 +23,7 @@ def measure_transfer():
 
 
 def measure_seeing():
-    """Return the success of policies that see: without cylinders, and with them by one and by three frames."""
+    """Return the success of policies that see: on an empty floor, and among cylinders by 1 and 3 frames."""
     return {
         "empty": _see(),
         "cylinders_1_frame": _see(cylinders=True, frames=1),
