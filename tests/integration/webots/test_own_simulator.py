@@ -1,4 +1,4 @@
-"""An environment by its name alone, and gymnasium's checker, on a real stub."""
+"""An environment by its name alone, on a stub or on MuJoCo, and gymnasium's checker."""
 
 import gymnasium
 import pytest
@@ -32,6 +32,18 @@ def test_an_environment_made_by_its_name_alone_starts_a_simulator_that_ends_with
 
     assert began[0] == began[1]
     assert names[0] != names[1]
+
+
+@pytest.mark.usefixtures("nothing_configured")
+def test_an_environment_that_sees_starts_mujoco_by_its_name_alone():
+    """The stub renders no images."""
+    env = gymnasium.make("SeeTarget-v0")
+
+    image, _ = env.reset(seed=1)
+    env.close()
+
+    assert image.shape == (48, 64, 3)
+    assert image.std() > 0
 
 
 @pytest.mark.filterwarnings(WRAPPED)

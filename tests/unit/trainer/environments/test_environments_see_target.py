@@ -255,7 +255,7 @@ def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
     robot, scene = fake_arena()
     taken = type("Taken", (), {"robot": robot, "scene": scene, "release": lambda: released.append(True)})
     monkeypatch.setenv("PALAESTRA_CONFIG", "training.yaml")
-    monkeypatch.setattr("palaestra_trainer.simulators.configured.simulator_for", lambda _role: taken)
+    monkeypatch.setattr("palaestra_trainer.simulators.configured.simulator_for", lambda *_: taken)
 
     with pytest.raises(NoSuchSensor):
         make_seeing()
@@ -276,11 +276,12 @@ def test_an_image_of_another_size_is_refused():
         SeeTargetEnv(Large(cameras=True), scene).reset(seed=1)
 
 
-def test_without_a_simulator_nothing_is_started(monkeypatch):
-    """The stub would start, and refuse the camera."""
+def test_without_mujoco_an_environment_of_its_own_is_refused(monkeypatch):
+    """The message names what to install; nothing is started."""
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
 
-    with pytest.raises(ConfigurationError, match="the stub renders no images; give simulator="):
+    with pytest.raises(ConfigurationError, match=r"is not installed; install palaestra-sim\[mujoco\]"):
         make_seeing()
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
+from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.connect import Arena, connect
@@ -31,26 +33,32 @@ class Configured:
     release: Callable[[], None]
 
 
-def simulator_for(role: Role) -> Configured:
+def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Configured:
     """Return a started simulator for an environment that was created without one.
 
-    It is one of PALAESTRA_CONFIG. If that is not set, as in a notebook, it is a stub with the arena, which
-    ends when it is released, or with this process.
+    It is one of PALAESTRA_CONFIG. If that is not set, as in a notebook, it is a new one with this world and
+    driver, which ends when it is released, or with this process.
 
     Raises:
-        ConfigurationError: each simulator with this role has an environment.
+        ConfigurationError: each simulator with this role has an environment, or MuJoCo is not installed.
         SimulatorFault: the simulator does not start.
     """
-    return configured_simulator(role) if os.environ.get(CONFIG_VARIABLE) else own_simulator()
+    return configured_simulator(role) if os.environ.get(CONFIG_VARIABLE) else own_simulator(world, driver)
 
 
-def own_simulator() -> Configured:
-    """Return a stub with the arena, started for this environment alone.
+def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
+    """Return a simulator that is started for this environment alone.
 
     Raises:
+        ConfigurationError: the driver is mujoco, which is not installed.
         SimulatorFault: it does not start.
     """
-    arena = Arena()
+    if driver == "mujoco" and importlib.util.find_spec("mujoco") is None:
+        raise ConfigurationError(
+            "simulator: none was given, and the Python package mujoco, which starts one, is not installed; "
+            "install palaestra-sim[mujoco]"
+        )
+    arena = Arena(world, driver)
     return Configured(name=arena.webots.robot_name, robot=arena.robot, scene=arena.scene, release=arena.close)
 
 

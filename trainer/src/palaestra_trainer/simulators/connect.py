@@ -67,14 +67,18 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
 
 
 class Arena:
-    """A started stub with the arena, as a process of this program; `close` ends it.
+    """A started simulator with a Robotino, as a process of this program; `close` ends it.
+
+    Args:
+        world: the name of a world that ships: arena or seeing.
+        driver: stub or mujoco.
 
     Raises:
         SimulatorDead, SimulatorHung, WrongData: it does not start in time.
     """
 
-    def __init__(self) -> None:
-        self.webots = Webots("robotino", "arena")
+    def __init__(self, world: str = "arena", driver: str = "stub") -> None:
+        self.webots = Webots("robotino", world, driver=driver)
         self.robot = Robotino(self.webots)
         self.scene = RobotinoScene(self.webots, self.robot)
         try:

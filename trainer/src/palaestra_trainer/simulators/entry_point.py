@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from palaestra_protocol.pod.terms import Role
-from palaestra_trainer.configuration import CONFIG_VARIABLE
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.options import SeeOptions, parse, parse_as
 from palaestra_trainer.environments.see_target import SeeTargetEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
+
+# World and driver of the simulator that an environment starts for itself.
+_ARENA = ("arena", "stub")
+_SEEING = ("seeing", "mujoco")
 
 
 def make(
@@ -55,20 +57,15 @@ def make_seeing(
         robot: see `make`; it has a color camera.
         scene: see `make`.
         simulator: see `make`. `palaestra_trainer.testing.fake_seeing` needs no simulator.
-        role: see `make`. Without PALAESTRA_CONFIG no simulator is started: the stub renders no images.
+        role: see `make`. Without PALAESTRA_CONFIG it starts MuJoCo, because the stub renders no images.
         options: see `SeeOptions`; names of movements are text.
 
     Raises:
-        ConfigurationError: an option is wrong, or there is no simulator for it.
+        ConfigurationError: an option is wrong, no simulator with this role is left, or MuJoCo is missing.
         NoSuchSensor: the robot has no color camera.
     """
     chosen = parse_as(SeeOptions, options)
-    if (robot, scene, simulator) == (None, None, None) and not os.environ.get(CONFIG_VARIABLE):
-        raise ConfigurationError(
-            "simulator: SeeTarget-v0 was given none, and the stub renders no images; "
-            "give simulator=palaestra_trainer.testing.fake_seeing, or robot and scene"
-        )
-    place = _place(robot, scene, simulator, role)
+    place = _place(robot, scene, simulator, role, _SEEING)
     try:
         return SeeTargetEnv(place.robot, place.scene, chosen, place.release)
     except BaseException:
@@ -90,8 +87,9 @@ def _place(
     scene: Scene | None,
     simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None,
     role: str,
+    own: tuple[str, str] = _ARENA,
 ) -> _Place:
-    """Return the robot and scene that are given, made by `simulator`, or found with this role."""
+    """Return the robot and scene that are given, made by `simulator`, found with this role, or of its own."""
     if (robot is None) != (scene is None):
         raise ConfigurationError("robot, scene: only one of them was given; give both or neither")
     if robot is not None and scene is not None:
@@ -100,7 +98,7 @@ def _place(
         return _Place(*simulator())
     from palaestra_trainer.simulators.configured import simulator_for  # noqa: PLC0415 - it needs ROS
 
-    taken = simulator_for(_role(role))
+    taken = simulator_for(_role(role), *own)
     return _Place(taken.robot, taken.scene, taken.release)
 
 
