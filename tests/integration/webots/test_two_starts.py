@@ -1,0 +1,82 @@
+"""Two starts of MuJoCo with one seed and the same commands: every message is equal, but for its stamp."""
+
+import math
+
+import pytest
+
+from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.robots import Pose
+from palaestra_trainer.robots.robotino import PERIOD_MS, Robotino, RobotinoScene
+from palaestra_trainer.ros import RosService, RosSubscriber
+from palaestra_trainer.webots import Mode, Webots
+
+STEPS = 20
+START = Pose(0.9, 0.3, 0.2)  # in reach of the wall ahead
+STAMP = slice(4, 12)  # of a message: behind the number of its header
+DEADLINE_S = 30.0
+IMAGE, RANGE = "sensor_msgs/Image", "sensor_msgs/Range"
+FLOAT, BOOL = "webots_ros/Float64Stamped", "webots_ros/BoolStamped"
+TOPICS = {
+    "camera/image": IMAGE,
+    "depth_camera/range_image": IMAGE,
+    "touch_sensor/value": BOOL,
+    **{f"ir{number}/value": RANGE for number in range(1, 10)},
+    **{f"wheel{number}_joint_sensor/value": FLOAT for number in range(3)},
+}
+
+
+@pytest.fixture
+def messages(master):
+    """`messages(seed)`: what a new simulator sends of each topic, step by step, without stamps."""
+    del master
+
+    def messages(seed):
+        launcher = ProcessLauncher("seeing", driver="mujoco")
+        webots = Webots("robotino", "seeing", launcher=launcher, start_deadline_s=DEADLINE_S)
+        robot = Robotino(webots)
+        try:
+            webots.start()
+            webots.supervisor.set_mode(Mode.FAST)
+            return listen(RobotinoScene(webots, robot), robot, seed)
+        finally:
+            robot.close()
+            webots.stop()
+            webots.close()
+            launcher.close()
+
+    return messages
+
+
+def listen(scene, robot, seed):
+    """Begin an episode, drive in curves into a wall, and return the messages by topic."""
+    topics = {path: RosSubscriber(f"/robotino/{path}", kind, bytes) for path, kind in TOPICS.items()}
+    for path in TOPICS:
+        enable = RosService(f"/robotino/{path.partition('/')[0]}/enable", "webots_ros/set_int")
+        assert enable(value=PERIOD_MS).success
+        enable.close()
+    scene.reset(seed, START, (-1.0, 0.0))
+    for topic in topics.values():
+        topic.connect()
+    heard = {path: [] for path in TOPICS}
+    for step in range(STEPS):
+        robot.drive(0.5, 0.2 * math.sin(step), math.cos(step))
+        robot.advance()
+        for path, topic in topics.items():
+            heard[path].append(unstamped(topic.next()))
+    for topic in topics.values():
+        topic.close()
+    return heard
+
+
+def unstamped(message):
+    """Return a message without the seconds of its header."""
+    return message[: STAMP.start] + message[STAMP.stop :]
+
+
+def test_two_starts_with_one_seed_send_equal_messages(messages):
+    """Pictures, noise, contacts and encoders, in a world where all of them change on the way."""
+    first, second = messages(3), messages(3)
+
+    assert [path for path in TOPICS if first[path] != second[path]] == []
+    assert all(len(set(first[path])) > 1 for path in TOPICS)
+    assert {message[-1] for message in first["touch_sensor/value"]} == {0, 1}
