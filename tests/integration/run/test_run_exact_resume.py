@@ -7,8 +7,12 @@ import pytest
 
 from tests.local_run import LocalRun
 from tests.soak import resume
+from tests.soak.jobs import make_job
 
 STEPS = 900  # `make soak` takes more
+SEEING_STEPS = 384
+SEEING = {"builtin": "seeing"}
+PPO = {"n_steps": 64, "batch_size": 64, "n_epochs": 1}
 
 
 @pytest.mark.parametrize("driver", ["stub", "mujoco"])
@@ -19,14 +23,39 @@ def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, monkeypatch, driv
     job["spec"]["trainer"]["steps"] = STEPS
     for group in job["spec"]["simulators"]:
         group["driver"] = driver
+    assert_resumes_exactly(tmp_path, job, STEPS // 3)
+
+
+def test_an_interrupted_run_that_sees_ends_as_one_that_was_not(tmp_path, monkeypatch):
+    """Its observations are pictures, which a new simulator has to draw as the first one would have."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+
+    assert_resumes_exactly(tmp_path, seeing(), SEEING_STEPS // 3)
+
+
+def seeing():
+    """Return a short job of SeeTarget-v0 with MuJoCo that evaluates and saves a few times."""
+    return make_job(
+        collect={"driver": "mujoco", "world": SEEING},
+        evaluate={"driver": "mujoco", "world": SEEING},
+        environment={"id": "SeeTarget-v0", "options": {"max_steps": 40, "cylinders": True}},
+        algorithm={"name": "PPO", "cnn": "small", "hyperparameters": PPO},
+        steps=SEEING_STEPS,
+        evaluation={"everySteps": SEEING_STEPS // 2, "episodes": 2, "confirmEpisodes": 0},
+        checkpoint={"everySteps": SEEING_STEPS // 6, "keep": 3},
+    )
+
+
+def assert_resumes_exactly(folder, job, step):
+    """Compare a run that is asked to end past a step, and goes on, with one that is not."""
     for name in ("whole", "parts"):
-        (tmp_path / name).mkdir()
-    whole, parts = (LocalRun(tmp_path / name, job) for name in ("whole", "parts"))
+        (folder / name).mkdir()
+    whole, parts = (LocalRun(folder / name, job) for name in ("whole", "parts"))
     with whole:
         whole.end()
 
     with parts:
-        parts.wait_for_step(STEPS // 3)
+        parts.wait_for_step(step)
         os.kill(parts.trainer(), signal.SIGTERM)
         code, output = parts.end()
 
