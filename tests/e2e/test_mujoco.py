@@ -1,9 +1,14 @@
-"""Jobs with `driver: mujoco`: a training, and what the image of the simulator can do in a pod."""
+"""Jobs with `driver: mujoco`: trainings, and what the image of the simulator can do in a pod."""
+
+import io
+import zipfile
 
 import pytest
+import torch
 
 from tests.e2e.jobs import WAIT
-from tests.e2e.namespace import LONG_S
+from tests.e2e.namespace import LONG_S, example
+from tests.e2e.test_tools import typed
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -18,6 +23,8 @@ TRAINER = {
     "evaluation": {"everySteps": 300, "episodes": 1},
     "checkpoint": {"everySteps": 300, "keep": 2},
 }
+SEEING_STEPS = 256
+COLORS = 3
 # Of the simulator itself: this program has its name in its own command line too.
 ENVIRONMENT = """
 from pathlib import Path
@@ -58,6 +65,42 @@ def test_a_policy_is_trained_in_mujoco(namespace, job):
     replica = namespace.replica("mujoco")
     assert replica["step"] == 600
     assert replica["restarts"]["trainer"] == 0
+
+
+@pytest.fixture
+def seeing():
+    """Return manifests/examples/see-target.yaml with a few steps, and one simulator of a kind."""
+    job = example("see-target")
+    collect, _ = job["spec"]["simulators"]
+    collect |= {"count": 1, "env": SLOW}
+    trainer = job["spec"]["trainer"]
+    trainer["environment"]["options"]["max_steps"] = 40
+    trainer["algorithm"]["hyperparameters"] |= {"n_steps": 64, "batch_size": 64, "n_epochs": 1}
+    trainer |= {
+        "steps": SEEING_STEPS,
+        "evaluation": {"everySteps": SEEING_STEPS // 2, "episodes": 1, "confirmEpisodes": 0},
+        "checkpoint": {"everySteps": SEEING_STEPS // 2, "keep": 2},
+    }
+    return job
+
+
+def test_a_policy_is_trained_on_what_a_camera_sees(namespace, seeing, tmp_path):
+    """Its observations are pictures of 64 x 48 pixels, which Mesa draws on the simulator's own thread."""
+    namespace.apply(seeing)
+    pod = namespace.wait_for_pod("see-target")
+
+    said = namespace.wait(
+        lambda: namespace.execute(pod, "python3", "-c", ENVIRONMENT, container="sim-collect-0"), LONG_S
+    )
+
+    assert "LP_NUM_THREADS=0" in said.splitlines()
+    assert namespace.wait_for_end("see-target", LONG_S) == "Succeeded"
+    assert namespace.replica("see-target")["step"] == SEEING_STEPS
+    code, told = typed(namespace, "fetch", "see-target", f"--dir={tmp_path}")
+    assert code == 0, told
+    with zipfile.ZipFile(tmp_path / "see-target/0/model.zip") as file:
+        weights = torch.load(io.BytesIO(file.read("policy.pth")), weights_only=True)
+    assert any(weight.ndim == 4 and weight.shape[1] == COLORS for weight in weights.values())
 
 
 @pytest.mark.beside
