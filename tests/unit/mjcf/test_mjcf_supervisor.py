@@ -174,6 +174,19 @@ def test_a_state_of_a_node_is_saved_and_loaded(load):
         simulation.load_state(cart, "other")
 
 
+def test_the_same_follows_from_a_loaded_state_each_time(load):
+    """To the last bit: the solver keeps no memory of what was before."""
+    simulation = load()
+    simulation.step(2000)  # the ball lies on the floor, so that the solver has contacts to begin from
+    simulation.save_state(simulation.tree.root, "lying")
+    played = []
+    for _ in range(2):
+        simulation.load_state(simulation.tree.root, "lying")
+        played.append(play(simulation))
+
+    assert played[0] == played[1]
+
+
 def test_nothing_is_added_to_or_removed_from_a_model(load):
     """MuJoCo compiles a model once."""
     simulation = load()

@@ -46,6 +46,8 @@ class BodyStates:
         for joint, saved in wanted.items():
             self._model.positions(joint)[:] = saved
             self._model.speeds(joint)[:] = 0.0
+        # The solver begins anew too, so what follows depends on the state and not on what was before.
+        self._model.data.qacc_warmstart[:] = 0.0
         self._model.changed()
 
     def _joints(self, node: SceneNode) -> list[int]:
