@@ -21,6 +21,7 @@ ROBOT = "everything"
 _SETTINGS = {
     "Camera": "focus Focus { } zoom Zoom { } recognition Recognition { segmentation TRUE }",
     "Lidar": "numberOfLayers 2",
+    "Radar": "minRadialSpeed 0 maxRadialSpeed 0 verticalFieldOfView 1",
 }
 
 _MASS = "physics Physics { density -1 mass 1 }"  # without it no force moves a joint
@@ -51,7 +52,6 @@ _EVERYWHERE = frozenset(
         "display/attach_camera",
         "display/image_load",
         "display/image_save",
-        "radar/enable",
         "robot/get_urdf",
         "skin/get_bone_name",
         "skin/get_bone_orientation",
@@ -81,7 +81,7 @@ def world() -> str:
     parts = "\n".join(_part(kind) for kind in DEVICES.values())
     return f"""#VRML_SIM R2023b utf8
 WorldInfo {{ basicTimeStep 32 info [ "everything" ] }}
-DEF BOX Solid {{ translation 2 0 0.5 boundingObject Box {{ size 0.5 0.5 1 }} }}
+DEF BOX Solid {{ translation 2 0 0.5 radarCrossSection 1 boundingObject Box {{ size 0.5 0.5 1 }} }}
 DEF ROBOT Robot {{
   name "{ROBOT}" controller "ros" supervisor TRUE battery [ 100, 100, 0 ]
   controllerArgs [ "--name={ROBOT}" "--synchronize" "--clock" ]

@@ -343,10 +343,12 @@ def test_a_machine_that_cannot_draw_simulates_the_rest(environment, message):
 def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
     """The warning at the start is about devices that a client would wait for in vain."""
     simulation = load(
-        "", f"{CAMERA} {FINDER}", 'Radar { }] controller "ros" controllerArgs [ "--name=r" "--synchronize"'
+        "",
+        f"{CAMERA} {FINDER}",
+        'VacuumGripper { }] controller "ros" controllerArgs [ "--name=r" "--synchronize"',
     )
 
-    assert silent_devices(simulation.robots) == "1 Radar"
+    assert silent_devices(simulation.robots) == "1 VacuumGripper"
 
 
 def test_a_loose_thing_is_seen_where_it_has_fallen(load):

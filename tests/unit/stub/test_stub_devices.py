@@ -23,12 +23,15 @@ COMMON = {"get_model", "get_name", "get_node_type"}
 NAMES_ON_JOINT = {f"get_{role}_name" for role in ROLES}
 PUBLISHING = {"enable", "get_sampling_period"}
 NAMES = sorted(DEVICES)
+SETTINGS = {"Radar": "minRadialSpeed 0 maxRadialSpeed 0"}
 SENSORS = [name for name in NAMES if DEVICES[name].sampler is not None]
 
 
 def written(kind):
-    """The node of a device as a world has it, with no field but its name."""
-    node = f'{kind.node} {{ name "device" }}'
+    """The node of a device as a world has it, and what it needs to have a reading."""
+    node = f'{kind.node} {{ name "device" {SETTINGS.get(kind.node, "")} }}'
+    if kind.node == "Radar":
+        node += " Solid { translation 2 0 0 radarCrossSection 1 }"
     return f"HingeJoint {{ device {node} }}" if kind.on_joint else node
 
 
@@ -44,7 +47,9 @@ def numbers(topic, data):
 
 
 def flat(value):
-    """The numbers of a reading: of an image or a cloud, its words as float32."""
+    """The numbers of a reading: of an image or a cloud, its words; of a message, its last field."""
+    if isinstance(value, dict):
+        _, value = value.popitem()
     if isinstance(value, bytes):
         return struct.unpack(f"<{len(value) // 4}f", value)
     return tuple(value) if isinstance(value, tuple | list | array) else (value,)
@@ -157,6 +162,7 @@ def test_enable_0_ends_all_topics(device, name):
 def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, name):
     """The rest of the message is made once; a reading elsewhere would be written over other fields."""
     kind, found, node = device(name)
+    node.call("device/enable", value=32)
     node.call("robot/time_step", value=32)
 
     for topic in kind.topics(found):
@@ -167,8 +173,8 @@ def test_the_message_of_each_topic_has_its_reading_where_its_row_says(device, na
         wire.links.append(link)
         publisher = Publisher(wire, dict(topic.constants))
         value = value_of(topic)
-        if topic.reading:
-            publisher.send_stamped({topic.reading: value})
+        if topic.whole or topic.reading:
+            publisher.send_stamped(value if topic.whole else {topic.reading: value})
         else:
             publisher.send_value(value)
         (data,) = link.sent

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 from palaestra_sim.scene.axes import frame_of_shapes, standing
-from palaestra_sim.scene.geometry import IDENTITY, Pose, Vector
+from palaestra_sim.scene.geometry import IDENTITY, Matrix, Pose, Vector
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.reading import Reading
@@ -53,15 +53,17 @@ class Shape:
     def heights(self) -> tuple[float, float]:
         """Return z of its lower and its upper end."""
         pose = self.pose
-        z = pose.position[2]
-        if self.kind == "ball":
-            half = self.size[2] / 2.0
-        elif self.kind == "cylinder":
-            along = min(1.0, abs(pose.rotation[8]))
-            half = (self.size[2] * along + self.size[0] * math.sqrt(1.0 - along * along)) / 2.0
-        else:
-            half = sum(abs(pose.rotation[6 + axis]) * self.size[axis] for axis in range(3)) / 2.0
+        z, half = pose.position[2], self.half_along(pose.rotation, 2)
         return z - half, z + half
+
+    def half_along(self, rotation: Matrix, axis: int) -> float:
+        """Return half its length along an axis of a frame, 0 to 2, in which it has that rotation."""
+        if self.kind == "ball":
+            return self.size[2] / 2.0
+        if self.kind == "cylinder":
+            along = min(1.0, abs(rotation[3 * axis + 2]))
+            return (self.size[2] * along + self.size[0] * math.sqrt(1.0 - along * along)) / 2.0
+        return sum(abs(rotation[3 * axis + side]) * self.size[side] for side in range(3)) / 2.0
 
 
 def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:

@@ -19,7 +19,9 @@ from collections.abc import Callable
 from palaestra_sim.errors import SimError, WorldError
 from palaestra_sim.scene.air import Air
 from palaestra_sim.scene.devices.connector import Connector
+from palaestra_sim.scene.devices.radar import Radar
 from palaestra_sim.scene.drawn import View
+from palaestra_sim.scene.echoes import echoes_of
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
 from palaestra_sim.scene.node_motion import NodeMotion
@@ -297,7 +299,15 @@ class Simulation:
         connectors = tuple(it for robot in devices for it in robot if isinstance(it, Connector))
         for connector in connectors:
             connector.others = connectors
+        self._radars = tuple(it for robot in devices for it in robot if isinstance(it, Radar))
+        self._show_to_radars()
         self._samplers = tuple(sample for robot in self.robots for sample in robot.samplers)
+
+    def _show_to_radars(self) -> None:
+        if self._radars:
+            echoes = echoes_of(self.tree.nodes.values())
+            for radar in self._radars:
+                radar.show(echoes, lambda: self.time_ms)
 
     def _resize(self, node: SceneNode) -> None:
         """Read the outline of an obstacle anew, of which a part has another size."""
@@ -308,6 +318,7 @@ class Simulation:
             first = next((at for at, shape in enumerate(solids) if shape.place is owner.place), len(solids))
             kept = [shape for shape in solids if shape.place is not owner.place]
             self.scene.solids = [*kept[:first], *fresh, *kept[first:]]
+            self._show_to_radars()
             self._arrange()
 
     def _moved(self, place: Place) -> None:

@@ -33,6 +33,7 @@ class Feed:
         constants: the other fields, as they are when the topic begins.
         reading: the field of the value; "" is the last one.
         many: whether the value is a sequence, with a message for each of its items.
+        whole: whether a value has all fields by name.
         publishers: by period in ms.
     """
 
@@ -43,6 +44,7 @@ class Feed:
     source: Source | None
     reading: str = ""
     many: bool = False
+    whole: bool = False
     publishers: dict[int, Publisher] = field(default_factory=dict)
 
     def begin(self, node: Node, period_ms: int) -> None:
@@ -70,7 +72,9 @@ class Feed:
         for period_ms, publisher in self.publishers.items():
             if elapsed_ms % period_ms == 0 and publisher.heard:
                 for value in source.value if self.many else (source.value,):
-                    if self.reading:
+                    if self.whole:
+                        publisher.send_stamped(value)
+                    elif self.reading:
                         publisher.send_stamped({self.reading: value})
                     else:
                         publisher.send_value(value)
@@ -103,7 +107,16 @@ class Outlet:
         path = topic_name(device_name)
         header = {"header": {"frame_id": f"{node.name}/{path}"}}
         self.feeds = tuple(
-            Feed(f"{path}/{it.name}", it.type_name, header, it.constants, it.source, it.reading, it.many)
+            Feed(
+                f"{path}/{it.name}",
+                it.type_name,
+                header,
+                it.constants,
+                it.source,
+                reading=it.reading,
+                many=it.many,
+                whole=it.whole,
+            )
             for it in topics
         )
         self._node = node

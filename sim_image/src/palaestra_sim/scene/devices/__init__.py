@@ -16,7 +16,8 @@ has the steps.
 - `led`, `speaker`, `pen`, `display`: rows that only keep what a program sets
 - `camera`, `range_finder`: the rows of what sees
 - `pictures`, `recognition`: the lens that both have, and the objects that a camera finds
-- `radar`, `vacuum_gripper`: rows that nothing enables
+- `radar`: the row of what measures the distances of targets
+- `vacuum_gripper`: the row that nothing enables
 - `skin`: the row of meshes that move, of which there are none
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu

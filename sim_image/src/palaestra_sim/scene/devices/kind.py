@@ -196,6 +196,7 @@ class Topic:
         constants: the other fields.
         reading: the field of the value; "" is the last one, which must be of numbers and is the fastest.
         many: whether `value` is a sequence, with a message for each of its items.
+        whole: whether a value has all fields but the header, by name.
     """
 
     name: str
@@ -204,6 +205,7 @@ class Topic:
     constants: Fields = field(default_factory=dict)
     reading: str = ""
     many: bool = False
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,45 +1,290 @@
-"""Radar: its settings. The stub sends no radar waves, so `enable` answers failure."""
+"""Radar: how far the Solids with a `radarCrossSection` in its field of view are, and how fast they approach.
+
+A speed is the change of place since the sample before, so it is 0 in the first one.
+Without limits in the world, Webots sees only what moves away at 1 to 2 m/s; both limits 0 are none.
+Source: WbRadar.cpp of Webots.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic, always_silent
-from palaestra_sim.seam import Row
+from palaestra_sim.scene.axes import looking
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part, Sample, Topic
+from palaestra_sim.scene.echoes import Bounds, Echoes, Target
+from palaestra_sim.scene.geometry import Vector
+from palaestra_sim.scene.nodes.scene_node import SceneNode
+from palaestra_sim.scene.places import Place
+from palaestra_sim.seam import Fields, Row
 
-_ANSWERS: Final = {
-    "get_min_range": ("minRange", 1.0),
-    "get_max_range": ("maxRange", 50.0),
-    "get_vertical_fov": ("verticalFieldOfView", 0.1),
-    "get_horizontal_fov": ("horizontalFieldOfView", 0.78),
-}
+_LIGHT_M_S: Final = 299_792_458.0
+_MILLIWATT: Final = 0.001
+_Gauss = Callable[[float, float], float]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a radar detects.
+
+    Attributes:
+        range_m: lowest and highest distance.
+        field_of_view_rad: horizontal and vertical.
+        radial_m_s: lowest and highest speed at which a target moves away; None: any.
+        absolute_m_s: lowest speed, in either direction.
+        cell: distance in m and speed in m/s below which two targets are one; a speed of 0 does not matter.
+        power_w: the weakest signal.
+        noise: standard deviations of distance, speed and azimuth.
+    """
+
+    range_m: tuple[float, float]
+    field_of_view_rad: tuple[float, float]
+    radial_m_s: tuple[float, float] | None
+    absolute_m_s: float
+    cell: tuple[float, float]
+    power_w: float
+    noise: tuple[float, float, float]
+
+    def accept(self, speed: float) -> bool:
+        """Return whether a target that moves away at a speed is detected."""
+        if self.radial_m_s is not None and not self.radial_m_s[0] <= speed <= self.radial_m_s[1]:
+            return False
+        return abs(speed) >= self.absolute_m_s
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """One target as a radar sees it: meters, watts, m/s and rad; to the right is positive."""
+
+    distance: float
+    power_w: float
+    speed: float
+    azimuth: float
+
+    def message(self) -> Fields:
+        """Return it as a message, with the power in dBm."""
+        power_dbm = 10.0 * math.log10(self.power_w / _MILLIWATT)
+        return {
+            "distance": self.distance,
+            "receivedPower": power_dbm,
+            "speed": self.speed,
+            "azimuth": self.azimuth,
+        }
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
 class Radar:
-    """A radar that sees nothing; `settings` by the names of the services that answer them."""
+    """A radar.
+
+    Attributes:
+        place: its frame; it looks along x.
+        node: of the device.
+        limits: what it detects.
+        gain_w_m2: the power that comes back from 1 m2 at 1 m.
+        occlusion: whether things hide others.
+        seen: the targets of the last sample.
+    """
 
     name: str
     model: str
-    settings: dict[str, float]
+    node: SceneNode
+    place: Place
+    limits: Limits
+    gain_w_m2: float
+    occlusion: bool
+    seen: list[Echo] = field(default_factory=list)
+    _echoes: Echoes = field(default_factory=Echoes)
+    _robot: frozenset[SceneNode] = frozenset()
+    _now_ms: Callable[[], int] = field(default=lambda: 0)
+    _enabled: bool = False
+    _before_ms: int = 0
+    _before: dict[Place, Vector] = field(default_factory=dict)
+
+    @property
+    def value(self) -> list[Fields]:
+        """The targets of the last sample, as messages."""
+        return [echo.message() for echo in self.seen]
+
+    def show(self, echoes: Echoes, now_ms: Callable[[], int]) -> None:
+        """Take what is there to see; `now_ms` returns the time of the simulation."""
+        self._echoes, self._now_ms = echoes, now_ms
+        robot = next((it for it in self.node.ancestors() if it.type_name == "Robot"), self.node)
+        self._robot = frozenset((robot, *robot.descendants()))
+
+    def enabled(self, period_ms: int) -> None:
+        """Begin or end sampling."""
+        self._enabled = period_ms > 0
+        self._before = {}
+        self.seen = []
+
+    def sample(self, gauss: _Gauss) -> None:
+        """See what is there now, while it is enabled; `gauss` returns noise from mean and deviation."""
+        if not self._enabled:
+            return
+        targets = [it for it in self._echoes.targets if it.place is not self.place]
+        passed_s = (self._now_ms() - self._before_ms) / 1000.0
+        echoes = (self._echo(target, passed_s, gauss) for target in targets)
+        self.seen = merged([echo for echo in echoes if echo is not None], self.limits.cell)
+        places = (self.place, *(target.place for target in targets))
+        self._before = {place: place.ground_pose.position for place in places}
+        self._before_ms = self._now_ms()
+
+    def _echo(self, target: Target, passed_s: float, gauss: _Gauss) -> Echo | None:
+        """Return a target as it is now; None if it is not detected."""
+        limits = self.limits
+        radar = self.place.ground_pose
+        bounds = target.seen_from(radar, limits.field_of_view_rad)
+        if bounds is None or self._hidden(target, radar.position, bounds):
+            return None
+        distance = self._distance(bounds, gauss)
+        if distance is None:
+            return None
+        power_w = self.gain_w_m2 * target.cross_section_m2 / distance**4
+        speed = self._speed(target.place, passed_s) + _noise(limits.noise[1], gauss)
+        if power_w < limits.power_w or not limits.accept(speed):
+            return None
+        x, y, _ = radar.inverse.carry(target.place.ground_pose.position)
+        edge = limits.field_of_view_rad[0] / 2.0
+        azimuth = max(-edge, min(edge, -math.atan2(y, x))) + _noise(limits.noise[2], gauss)
+        return Echo(distance, power_w, speed, azimuth)
+
+    def _hidden(self, target: Target, eye: Vector, bounds: Bounds) -> bool:
+        """Return whether something is in the way, more than half the depth of the target before it."""
+        if not self.occlusion:
+            return False
+        free = self._echoes.free_path(target, eye, self._robot)
+        return math.dist(eye, target.place.ground_pose.position) - free > bounds.size[0] / 2.0
+
+    def _distance(self, bounds: Bounds, gauss: _Gauss) -> float | None:
+        """Return the distance of a target, as it is reported; None if it is too near or too far."""
+        low, high = self.limits.range_m
+        distance, slack = math.hypot(*bounds.middle), bounds.size[0] / 2.0
+        if distance > high + slack:
+            return None
+        distance += _noise(self.limits.noise[0], gauss)
+        return None if distance < low - slack else max(low, min(high, distance))
+
+    def _speed(self, place: Place, passed_s: float) -> float:
+        """Return how fast a target moves away; 0 if it, or the time, was not seen before."""
+        if passed_s <= 0.0 or place not in self._before or self.place not in self._before:
+            return 0.0
+        now = place.ground_pose.position, self.place.ground_pose.position
+        before = self._before[place], self._before[self.place]
+        way = [a - b for a, b in zip(*now, strict=True)]
+        moved = [a - b - (c - d) for a, b, c, d in zip(now[0], before[0], now[1], before[1], strict=True)]
+        return sum(a * b for a, b in zip(way, moved, strict=True)) / (math.hypot(*way) or 1.0) / passed_s
+
+
+def merged(echoes: Sequence[Echo], cell: tuple[float, float]) -> list[Echo]:
+    """Return targets, of which those that are in one cell are one, by the mean of their powers."""
+    rest = list(echoes)
+    at = 0
+    while cell[0] > 0.0 and at < len(rest):
+        first = rest[at]
+        near = [
+            it
+            for it in rest[at + 1 :]
+            if abs(it.distance - first.distance) < cell[0]
+            and (cell[1] <= 0.0 or abs(it.speed - first.speed) < cell[1])
+        ]
+        if near:
+            rest[at:] = [_mean([first, *near]), *(it for it in rest[at + 1 :] if it not in near)]
+        else:
+            at += 1
+    return rest
+
+
+def _mean(echoes: Sequence[Echo]) -> Echo:
+    power_w = sum(it.power_w for it in echoes)
+    distance, speed, azimuth = (
+        sum(getattr(it, name) * it.power_w for it in echoes) / power_w
+        for name in ("distance", "speed", "azimuth")
+    )
+    return Echo(distance, power_w, speed, azimuth)
+
+
+def _noise(deviation: float, gauss: _Gauss) -> float:
+    return gauss(0.0, deviation) if deviation > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Count:
+    """The number of targets."""
+
+    radar: Radar
+
+    @property
+    def value(self) -> int:
+        return len(self.radar.seen)
 
 
 def _read(part: Part) -> Radar:
-    settings = {service: part.number(*field) for service, field in _ANSWERS.items()}
-    return Radar(name=part.name, model=part.text("model"), settings=settings)
-
-
-def _services(radar: Radar) -> tuple[Row, ...]:
-    return tuple(
-        (name, "get_float", lambda _, value=value: {"value": value}) for name, value in radar.settings.items()
+    number = part.number
+    wavelength_m = _LIGHT_M_S / (number("frequency", 24.0) or 24.0) / 1e9
+    gain = 10.0 ** (number("antennaGain", 20.0) / 10.0)
+    return Radar(
+        name=part.name,
+        model=part.text("model"),
+        node=part.node,
+        place=looking(part.node, part.place),
+        limits=_limits(part),
+        gain_w_m2=_watts(number("transmittedPower", 1.0)) * (gain * wavelength_m) ** 2 / (4.0 * math.pi) ** 3,
+        occlusion=part.node.flag("occlusion", False),
     )
 
 
-def _topics(_radar: Radar) -> tuple[Topic, ...]:
+def _limits(part: Part) -> Limits:
+    """Return what a radar detects; ranges that are empty are those that Webots then takes."""
+    number = part.number
+    low, high = number("minRange", 1.0), number("maxRange", 50.0)
+    if high <= low:
+        low, high = (low, low + 1.0) if high <= 0.0 else (max(0.0, high - 1.0), high)
+    slowest, fastest = number("minRadialSpeed", 1.0), number("maxRadialSpeed", -1.0)
+    limited = bool(slowest or fastest)
+    return Limits(
+        range_m=(low, high),
+        field_of_view_rad=(number("horizontalFieldOfView", 0.78), number("verticalFieldOfView", 0.1)),
+        radial_m_s=(slowest, fastest if fastest > slowest else slowest + 1.0) if limited else None,
+        absolute_m_s=number("minAbsoluteRadialSpeed", 0.0),
+        cell=(number("cellDistance", 0.0), number("cellSpeed", 0.0)),
+        power_w=_watts(number("minDetectableSignal", -100.0)),
+        noise=(number("rangeNoise", 0.0), number("speedNoise", 0.0), number("angularNoise", 0.0)),
+    )
+
+
+def _watts(power_dbm: float) -> float:
+    return _MILLIWATT * math.pow(10.0, power_dbm / 10.0)
+
+
+def _sampler(radars: Sequence[Radar], robot: Carrier) -> Sample:
+    gauss = robot.gauss
+
+    def sample() -> None:
+        for radar in radars:
+            radar.sample(gauss)
+
+    return sample
+
+
+def _services(radar: Radar) -> tuple[Row, ...]:
+    (low, high), (across, up) = radar.limits.range_m, radar.limits.field_of_view_rad
+    answers = {
+        "get_min_range": low,
+        "get_max_range": high,
+        "get_vertical_fov": up,
+        "get_horizontal_fov": across,
+    }
+    return tuple(
+        (name, "get_float", lambda _, value=value: {"value": value}) for name, value in answers.items()
+    )
+
+
+def _topics(radar: Radar) -> tuple[Topic, ...]:
     return (
-        Topic(name="targets", type_name="webots_ros/RadarTarget", source=None),
-        Topic(name="number_of_targets", type_name="webots_ros/Int8Stamped", source=None),
+        Topic(name="targets", type_name="webots_ros/RadarTarget", source=radar, many=True, whole=True),
+        Topic(name="number_of_targets", type_name="webots_ros/Int8Stamped", source=_Count(radar)),
     )
 
 
@@ -52,7 +297,8 @@ RADAR: Final = Kind(
         speedNoise SFFloat 0; angularNoise SFFloat 0; antennaGain SFFloat 20; frequency SFFloat 24;
         transmittedPower SFFloat 1; minDetectableSignal SFFloat -100; occlusion SFBool FALSE""",
     read=_read,
+    sampler=_sampler,
     services=_services,
     topics=_topics,
-    silent=always_silent,
+    enabled=Radar.enabled,
 )

@@ -1,0 +1,167 @@
+"""Radar: which Solids it sees, and what it reports of them, in every physics."""
+
+import math
+
+import pytest
+
+from palaestra_sim.scene.devices.radar import Echo, merged
+
+ANY = "minRadialSpeed 0 maxRadialSpeed 0"
+BALL = "boundingObject Sphere { radius 0.1 } radarCrossSection 2"
+WALL = "Solid { translation 1.5 0 0.5 boundingObject Box { size 0.1 1 1 } }"
+
+
+@pytest.fixture
+def radar(load):
+    """`radar(objects, fields)`: the simulation and the radar at the origin, which looks along x."""
+
+    def begin(objects, fields=ANY):
+        source = f"""#VRML_SIM R2023b utf8
+WorldInfo {{ basicTimeStep 32 }}
+{objects}
+Robot {{ supervisor TRUE controller "ros" controllerArgs [ "--name=r" "--synchronize" ]
+  children [ Radar {{ translation 0 0 0.5 {fields} }} ] boundingObject Box {{ size 0.2 0.2 1 }} }}"""
+        simulation = load(source.encode())
+        (device,) = simulation.robots[0].parts.devices.sensors.values()
+        device.enabled(32)
+        return simulation, device
+
+    return begin
+
+
+def seen(radar, *arguments):
+    """What the radar sees after one step."""
+    simulation, device = radar(*arguments)
+    simulation.step(32)
+    return device.seen
+
+
+def solid(x, y=0.0, z=0.5, fields=BALL):
+    """A ball of 10 cm that radars see."""
+    return f'Solid {{ translation {x} {y} {z} name "{x} {y}" {fields} }}'
+
+
+def test_a_target_has_the_distance_azimuth_and_power_of_webots(radar):
+    """The azimuth is positive to the right; the power is that of the radar equation, in dBm."""
+    (echo,) = seen(radar, solid(4, -1))
+    wavelength, distance = 299_792_458.0 / 24e9, math.hypot(4, 1)
+    power_w = 0.001 * 10**0.1 * 100**2 * wavelength**2 * 2 / ((4 * math.pi) ** 3 * distance**4)
+
+    assert (echo.distance, echo.azimuth) == pytest.approx((distance, math.atan2(1, 4)))
+    assert echo.message()["receivedPower"] == pytest.approx(10 * math.log10(power_w / 0.001))
+
+
+@pytest.mark.parametrize(
+    ("objects", "fields", "count"),
+    [
+        (solid(2) + solid(3), ANY, 2),
+        (solid(0.5), ANY, 0),
+        (solid(60), ANY, 0),
+        (solid(2, 3), ANY, 0),
+        (solid(-2), ANY, 0),
+        (solid(2, z=1.5), ANY, 0),
+        (solid(2, fields="boundingObject Sphere { radius 0.1 }"), ANY, 0),
+        (solid(2, fields="radarCrossSection 1"), ANY, 1),
+        (solid(40), f"{ANY} minDetectableSignal -60", 0),
+        (solid(2), f"{ANY} minAbsoluteRadialSpeed 0.1", 0),
+        (solid(2), "", 0),
+    ],
+    ids=[
+        "two",
+        "too near",
+        "too far",
+        "beside",
+        "behind",
+        "above",
+        "no cross section",
+        "a point",
+        "too weak",
+        "at rest",
+        "the limits of speed that a Radar has by default",
+    ],
+)
+def test_a_target_is_seen_within_the_limits_of_the_radar(radar, objects, fields, count):
+    """As the fields of the node say."""
+    assert len(seen(radar, objects, fields)) == count
+
+
+def test_a_target_at_the_edge_is_where_its_visible_part_is(radar):
+    """A part is enough; the azimuth does not leave the field of view."""
+    (echo,) = seen(
+        radar, solid(2, 0.88, fields="boundingObject Box { size 0.1 0.2 0.2 } radarCrossSection 1")
+    )
+
+    assert echo.azimuth == -0.39
+    assert echo.distance < math.hypot(2, 0.88)
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        WALL,
+        "Solid { translation 1.5 0 0.5 boundingObject Cylinder { radius 0.2 height 1 } }",
+        "Solid { translation 1.5 0 0.5 boundingObject Sphere { radius 0.2 } }",
+    ],
+    ids=["box", "cylinder", "ball"],
+)
+def test_a_target_is_hidden_only_if_the_radar_knows_occlusion(radar, obstacle):
+    """And only by what is between them."""
+    assert len(seen(radar, obstacle + solid(3))) == 1
+    assert seen(radar, obstacle + solid(3), f"{ANY} occlusion TRUE") == []
+    assert len(seen(radar, obstacle + solid(3, 1.1), f"{ANY} occlusion TRUE")) == 1
+
+
+def test_a_speed_is_the_change_of_distance_between_two_samples(radar):
+    """Also of a Solid that a supervisor moves; it is positive if the target moves away."""
+    simulation, device = radar(f"DEF IT {solid(2)}")
+    simulation.step(32)
+    assert device.seen[0].speed == 0.0
+    node = simulation.tree.of_def("IT")
+    node.place.translation = (2.048, 0.0, 0.5)
+    simulation.step(32)
+
+    assert device.seen[0].speed == pytest.approx(1.5)
+
+
+def test_a_reset_begins_anew(radar):
+    """The way back to the start is no motion."""
+    simulation, device = radar(f"DEF IT {solid(2)}")
+    simulation.step(64)
+    simulation.tree.of_def("IT").place.translation = (3.0, 0.0, 0.5)
+    simulation.step(64)
+    simulation.reset()
+    simulation.step(64)
+
+    assert (device.seen[0].distance, device.seen[0].speed) == (2.0, 0.0)
+
+
+def test_a_target_that_is_imported_or_removed_comes_and_goes(radar):
+    """A supervisor may randomize a scene."""
+    simulation, device = radar("")
+    children = simulation.tree.field_of(simulation.tree.root, "children", simulation)
+    simulation.add(f"DEF IT {solid(2)}", children, -1)
+    simulation.step(32)
+    assert len(device.seen) == 1
+
+    simulation.remove(simulation.tree.of_def("IT"))
+    simulation.step(32)
+
+    assert device.seen == []
+
+
+def test_targets_in_one_cell_are_one_with_the_mean_by_power():
+    """Both distance and speed count, if the radar tells speeds apart."""
+    near, far, fast = Echo(2.0, 3.0, 0.0, 0.1), Echo(2.4, 1.0, 0.4, 0.5), Echo(2.2, 1.0, 9.0, 0.0)
+
+    assert merged([near, far], (0.5, 0.0)) == [Echo(2.1, 4.0, pytest.approx(0.1), pytest.approx(0.2))]
+    assert merged([near, fast], (0.5, 1.0)) == [near, fast]
+    assert merged([near, far], (0.0, 0.0)) == [near, far]
+
+
+def test_noise_is_drawn_for_each_reading(radar):
+    """With the deviations of the node."""
+    (echo,) = seen(radar, solid(3), f"{ANY} rangeNoise 0.1 speedNoise 0.1 angularNoise 0.1")
+
+    assert 0.0 < abs(echo.distance - 3.0) < 1.0
+    assert 0.0 < abs(echo.speed) < 1.0
+    assert 0.0 < abs(echo.azimuth) < 1.0
