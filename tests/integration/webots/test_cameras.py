@@ -62,7 +62,7 @@ def test_a_simulator_that_renders_nothing_does_not_fit(seer, sensor):
     """A restart would not help, and the message says what would."""
     seer.robot.simulation.add([sensor], [])
 
-    with pytest.raises(WorldMisfit, match="a simulator that renders images: the stub renders none"):
+    with pytest.raises(WorldMisfit, match="a simulator that renders images, such as driver mujoco"):
         seer.robot.connect()
 
 

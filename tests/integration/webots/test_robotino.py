@@ -100,7 +100,7 @@ def test_cameras_that_a_simulator_does_not_render_are_refused(start):
     """The world has them, and the stub does not."""
     seeing = start(world="seeing")
 
-    with pytest.raises(NoSuchSensor, match="the stub renders none"):
+    with pytest.raises(NoSuchSensor, match="such as driver mujoco"):
         seeing.robot.use_cameras(color=True)
 
     assert seeing.robot.advance() == 0

@@ -134,7 +134,7 @@ def test_the_stub_has_no_feedback():
     """Its services answer failure."""
     services, topics = rows(Simulation.load(ARM, StubPhysics()).robots[0], "lift")
 
-    with pytest.raises(UnsimulatedError, match="the stub simulates no forces; set a position or velocity"):
+    with pytest.raises(UnsimulatedError, match="forces are not simulated; set a position or velocity"):
         services["set_force"](None)
     assert not topics
     assert "force_feedback_sensor/enable" in services

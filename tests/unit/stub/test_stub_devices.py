@@ -118,7 +118,7 @@ def test_a_write_to_a_field_that_is_read_at_the_start_is_refused(stub, name):
     node = next(it for it in tree.nodes.values() if it.type_name == name)
     *_, field = field_kinds(name)
 
-    with pytest.raises(UnsimulatedError, match=f"the stub cannot change {name}.{field}"):
+    with pytest.raises(UnsimulatedError, match=f"{name}.{field} cannot be changed while"):
         require_effect(node, field)
 
 

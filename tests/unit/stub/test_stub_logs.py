@@ -14,7 +14,7 @@ def test_a_refusal_is_logged(robot):
     (message,) = inbox
     assert message["name"] == "/robotino"
     assert message["level"] == 8
-    assert message["msg"].startswith("wheel0_joint/set_torque: the stub simulates no torques")
+    assert message["msg"].startswith("wheel0_joint/set_torque: torques are not simulated")
     assert message["header"]["stamp"]["secs"] > 0
 
 

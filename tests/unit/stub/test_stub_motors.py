@@ -90,7 +90,7 @@ def test_available_torque_is_kept_within_the_limit(robot):
 
 def test_torque_control_fails(robot):
     """The stub's wheels have speeds, no torques."""
-    with pytest.raises(Exception, match="no torques; set a position or velocity"):
+    with pytest.raises(Exception, match="torques are not simulated; set a position or velocity"):
         robot.call("wheel0_joint/set_torque", value=1.0)
     assert robot.get("wheel0_joint/torque_feedback_sensor/enable", value=32) is False
 

@@ -8,7 +8,7 @@ from typing import Final
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.reading import Reading
 
-# They let the controller step by itself or hand the motors to others, which the stub does not do.
+# They let the controller step by itself or hand the motors to others, which no simulator of ours does.
 _REFUSED: Final = ("--use-sim-time", "--use-ros-control")
 
 
@@ -37,10 +37,10 @@ def read_arguments(reading: Reading, node: SceneNode) -> Arguments:
     if not names and not reading.leave_out.names:
         reading.refuse(node, "controllerArgs without --name=", "generate the world")
     if "--synchronize" not in texts and not reading.leave_out.names:
-        fact = "controllerArgs without --synchronize: the stub steps only when it is asked to"
+        fact = f"controllerArgs without --synchronize: {reading.simulator} steps only when it is asked to"
         reading.refuse(node, fact, "add it")
     for text in texts:
         if text in _REFUSED:
-            reading.lacks(node, f"the stub knows no {text}")
+            reading.lacks(node, f"{reading.simulator} knows no {text}")
     name = names[-1] if names else ""
     return Arguments(name=name, clock="--clock" in texts, auto_publish="--auto-publish" in texts)

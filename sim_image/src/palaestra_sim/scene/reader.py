@@ -65,7 +65,7 @@ class Scene:
         robots: in the order of the world file.
         top: the frame around everything; None if z of the world points up.
         surroundings: what holds everywhere.
-        left_out: what the stub lacks and the user left out, each with its place.
+        left_out: what the simulator lacks and the user left out, each with its place.
         leave_out: what the user leaves out.
     """
 
@@ -86,9 +86,9 @@ def read_scene(tree: SceneTree, physics: Physics, leave_out: LeaveOut | None = N
     """Return the contents of a world, and give its nodes their places; its robots have bodies of `physics`.
 
     Raises:
-        WorldError: it has things that the stub cannot simulate; the error has all of them.
+        WorldError: it has things that cannot be simulated; the error has all of them.
     """
-    reading = Reading(tree.refused, leave_out)
+    reading = Reading(tree.refused, leave_out, physics.abilities.name)
     scene = Scene(physics=physics)
     # First, because devices read it too, wherever it is in the file.
     for node in tree.root.nodes():
@@ -116,9 +116,9 @@ def read_added(tree: SceneTree, nodes: Iterable[SceneNode], to: Scene) -> Scene:
     `to` has the contents of the world so far.
 
     Raises:
-        WorldError: they have things that the stub cannot simulate.
+        WorldError: they have things that cannot be simulated.
     """
-    reading = Reading((), to.leave_out)
+    reading = Reading((), to.leave_out, to.physics.abilities.name)
     reading.world_info = next((it for it in tree.root.nodes() if it.type_name == "WorldInfo"), None)
     scene = Scene(physics=to.physics)
     for node in nodes:

@@ -1,9 +1,9 @@
 """Reading a scene: numbers checked, and what cannot be simulated, with its place.
 
 Two things can be wrong. A *mistake* of the author, such as a number that is a string, is always refused.
-What the stub *lacks*, Webots would simulate: it is refused too, by line and column, unless the user leaves
-out nodes of that type. Either way the reading goes on: `conclude` raises one error for everything that was
-refused.
+What the simulator *lacks*, Webots would simulate: it is refused too, by line and column, unless the user
+leaves out nodes of that type. Either way the reading goes on: `conclude` raises one error for everything that
+was refused.
 """
 
 from __future__ import annotations
@@ -48,17 +48,25 @@ class Reading:
     Args:
         refused: mistakes that are known already.
         leave_out: what the user leaves out.
+        simulator: its name.
 
     Attributes:
         leave_out: what the user leaves out.
+        simulator: its name, for messages.
         left_out: the nodes that were left out, each with its place and the reason.
         world_info: the WorldInfo of the world; None if it has none.
         top: the frame around everything; None if z of the world points up.
     """
 
-    def __init__(self, refused: Iterable[WorldError] = (), leave_out: LeaveOut | None = None) -> None:
+    def __init__(
+        self,
+        refused: Iterable[WorldError] = (),
+        leave_out: LeaveOut | None = None,
+        simulator: str = "the simulator",
+    ) -> None:
         self._refused: list[WorldError] = list(refused)
         self.leave_out = leave_out or LeaveOut()
+        self.simulator = simulator
         self.left_out: list[WorldError] = []
         self.world_info: SceneNode | None = None
         self.top: Place | None = None

@@ -206,7 +206,7 @@ class _RobotReader:
         elif kind in _FRAMES:
             self._read_frame(node, Place(place, *_where(self._reading, node), self._reading.size(node)))
         elif kind not in _INERT:
-            self._lacks(node, node.unusable or f"the stub simulates no {kind} on a robot")
+            self._lacks(node, node.unusable or f"{self._reading.simulator} simulates no {kind} on a robot")
 
     def _read_frame(self, node: SceneNode, place: Place) -> None:
         self._parts.append((node, place))
@@ -295,7 +295,7 @@ class _RobotReader:
     def _read_loose_joint(self, node: SceneNode, place: Place) -> None:
         """Take a joint without motors, such as a caster, as fixed, with all that is on it."""
         if node.nodes("device") or node.nodes("device2") or node.nodes("device3"):
-            self._lacks(node, f"the stub simulates no {node.type_name} with devices")
+            self._lacks(node, f"{self._reading.simulator} simulates no {node.type_name} with devices")
         for end in node.nodes("endPoint"):
             if end.type_name == "Solid":
                 inner = Place(place, *_where(self._reading, end))
@@ -313,7 +313,7 @@ class _RobotReader:
         for device in node.nodes("device"):
             kind = _ON_JOINTS.get(device.type_name)
             if kind is None:
-                self._lacks(device, f"the stub simulates no {device.type_name}")
+                self._lacks(device, f"{self._reading.simulator} simulates no {device.type_name}")
                 continue
             found = self._read_device(kind, device, place, shaft)
             if isinstance(found, Motor) and shaft.motor is None:

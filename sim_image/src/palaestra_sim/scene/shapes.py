@@ -67,7 +67,7 @@ class Shape:
 
 
 def bounding_shapes(reading: Reading, owner: SceneNode, place: Place) -> Iterator[Shape]:
-    """Yield the shapes of a node's boundingObject that the stub can simulate; the others are refused."""
+    """Yield the shapes of a node's boundingObject that can be simulated; the others are refused."""
     grown = _Grown(frame_of_shapes(owner), (place.scale, place.scale, place.scale))
     for node in owner.nodes("boundingObject"):
         yield from _shapes(reading, node, place, grown)
@@ -135,7 +135,7 @@ def _solid(reading: Reading, node: SceneNode, place: Place, grown: _Grown) -> It
         kind = "ball"
         x = y = z = 2.0 * reading.number(node, "radius", 1.0)
     else:
-        reading.lacks(node, f"the stub simulates no {node.type_name} as a boundingObject")
+        reading.lacks(node, f"{reading.simulator} simulates no {node.type_name} as a boundingObject")
         return
     if kind != "box" and not grown.even:
         reading.lacks(node, f"a {node.type_name} that a scale distorts")

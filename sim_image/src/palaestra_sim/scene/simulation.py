@@ -80,7 +80,7 @@ class Simulation:
         """Return the simulation of a world file that needs no other file.
 
         Raises:
-            WorldError: the file is wrong, or holds something that the stub cannot simulate.
+            WorldError: the file is wrong, or holds something that cannot be simulated.
         """
         return cls.of(parse(source, name), physics, name, mode)
 
@@ -105,14 +105,14 @@ class Simulation:
             leave_out: what may be left out, if it cannot be simulated.
 
         Raises:
-            WorldError: the world holds something that the stub cannot simulate.
+            WorldError: the world holds something that cannot be simulated.
         """
         tree = SceneTree(world, name, descriptions)
         return cls(tree, read_scene(tree, physics, leave_out), mode)
 
     @property
     def left_out(self) -> tuple[WorldError, ...]:
-        """What the stub lacks and the user left out, each with its place."""
+        """What the simulator lacks and the user left out, each with its place."""
         return self.scene.left_out
 
     @property
@@ -200,7 +200,7 @@ class Simulation:
         A reset removes them again. `index` counts from 0, or from the end: -1 is after the last one.
 
         Raises:
-            WorldError: the text is wrong, or has something that the stub cannot simulate.
+            WorldError: the text is wrong, or has something that cannot be simulated.
             UnsimulatedError: the field takes no such nodes while the simulation runs.
         """
         at = field.room(index)

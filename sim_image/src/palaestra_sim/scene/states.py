@@ -81,4 +81,4 @@ def require_joint(node: SceneNode, index: int) -> JointPlace:
     for end in node.nodes("endPoint"):
         if isinstance(end.place, JointPlace):
             return end.place
-    raise UnsimulatedError(f"the stub has nothing at the end of this {node.type_name}; give it an endPoint")
+    raise UnsimulatedError(f"this {node.type_name} has nothing at its end; give it an endPoint")

@@ -32,7 +32,7 @@ class Described(Protocol):
 def summary(simulation: Described) -> Iterator[str]:
     """Yield lines about robots, stand-ins, and all that was left out.
 
-    The world is read with everything left out that the stub lacks, so that the rest can be described.
+    The world is read with everything left out that the simulator lacks, so that the rest can be described.
     """
     for robot in simulation.robots:
         yield f'robot "{robot.name}": {", ".join(_of_robot(robot))}'

@@ -25,7 +25,7 @@ class _Rendered(Sensor):
         return WorldMisfit(
             self.robot,
             f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step, and a simulator"
-            " that renders images: the stub renders none",
+            " that renders images, such as driver mujoco",
         )
 
     def _array(self) -> NDArray[Any]:

@@ -1,6 +1,6 @@
 """The log of a controller over ROS: `/rosout`, and the services with which rqt_logger_level sets its level.
 
-Every roscpp node has them. The stub logs what it refuses; the rest of roscpp's log is about itself.
+Every roscpp node has them. The simulator logs what it refuses; the rest of roscpp's log is about itself.
 """
 
 from __future__ import annotations

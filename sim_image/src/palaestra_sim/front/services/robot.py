@@ -77,4 +77,4 @@ def _always(fields: Fields) -> Handler:
 
 
 def _no_urdf(_request: Any) -> Fields:
-    raise ServiceFailed("the stub writes no URDF; use driver webots")
+    raise ServiceFailed("no URDF is written here; use driver webots")

@@ -1,7 +1,7 @@
 """Services under `supervisor/field/`: read and write typed values by handle.
 
 A write of a value that a field cannot hold answers success 1, as in the controller. A write that would have
-no effect in the stub alone fails with a sentence that says so. A read of the wrong type answers 0 or "" where
+no effect here alone fails with a sentence that says so. A read of the wrong type answers 0 or "" where
 libController has such a value. It fails where libController has a null pointer (vectors, rotations, colors),
 which crashes the real controller.
 """

@@ -54,7 +54,7 @@ def load(world_path: Path, mode: Mode, leave_out: LeaveOut | None = None) -> Mjc
 
 
 def _robot(tree: ModelTree, equipment: Equipment, description: Description, leave_out: LeaveOut) -> Robot:
-    reading = Reading(equipment.refused, leave_out)
+    reading = Reading(equipment.refused, leave_out, "MuJoCo")
     arguments = read_arguments(reading, tree.robot)
     reading.conclude()
     parts = RobotParts(

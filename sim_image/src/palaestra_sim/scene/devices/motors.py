@@ -132,7 +132,7 @@ def _setter(command: Callable[[float], None]) -> Handler:
 
 
 def _unable(motor: Motor, effort: str) -> Handler:
-    fact = f"the stub simulates no {effort}s"
+    fact = f"{effort}s are not simulated"
     if motor.spec.forces:
         fact = f"no {effort} moves a driving wheel, nor what has no physics"
 

@@ -1,4 +1,4 @@
-"""Skin: the stub loads no meshes, so a skin has no bones here; whatever needs one fails."""
+"""Skin: no meshes are loaded, so a skin has no bones here; each service that needs one fails."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _read(part: Part) -> Skin:
 def _without_bones(name: str) -> Handler:
     # Webots dereferences a null pointer for the name or the place of a bone that does not exist.
     def fail(request: Any) -> dict[str, Any]:
-        raise UnsimulatedError(f"{name} has no bone {request.index}: the stub loads no meshes of skins")
+        raise UnsimulatedError(f"{name} has no bone {request.index}: no meshes of skins are loaded")
 
     return fail
 

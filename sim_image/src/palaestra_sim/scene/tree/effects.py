@@ -1,4 +1,4 @@
-"""Refuse writes of fields that have an effect in Webots but none in the stub.
+"""Refuse writes of fields that have an effect in Webots but none here.
 
 Otherwise a client that randomizes a world would read back its writes, but train in a world that stays the
 same.
@@ -57,7 +57,7 @@ def require_effect(node: SceneNode, field: str) -> None:
     if not takes_effect:
         part = " of a boundingObject" if node.outline else ""
         raise UnsimulatedError(
-            f"the stub cannot change {node.type_name}.{field}{part} while it runs; {_ELSEWHERE}"
+            f"{node.type_name}.{field}{part} cannot be changed while the simulator runs; {_ELSEWHERE}"
         )
 
 
@@ -70,14 +70,14 @@ def require_room(node: SceneNode, field: str, added: Sequence[SceneNode]) -> Non
     where = f"{node.type_name}.{field}"
     if node.outline or len(node.twins) > 1:
         part = "part of a boundingObject" if node.outline else "used several times (USE)"
-        raise UnsimulatedError(f"the stub adds nothing to {where}, which is {part}; {_ELSEWHERE}")
+        raise UnsimulatedError(f"nothing can be added to {where}, which is {part}; {_ELSEWHERE}")
     if not any(_acts(inside) for it in added for inside in (it, *it.descendants())):
         return
     if node.type_name == "Robot" or _on_robot(node):
-        raise UnsimulatedError(f"the stub adds no {added[0].type_name} to a robot; {_ELSEWHERE}")
+        raise UnsimulatedError(f"no {added[0].type_name} can be added to a robot; {_ELSEWHERE}")
     if field != "children":
-        raise UnsimulatedError(f"the stub adds no {added[0].type_name} to {where}; {_ELSEWHERE}")
-    _require_no_client(added, "add")
+        raise UnsimulatedError(f"no {added[0].type_name} can be added to {where}; {_ELSEWHERE}")
+    _require_no_client(added, "added")
 
 
 def require_removable(node: SceneNode) -> None:
@@ -89,18 +89,18 @@ def require_removable(node: SceneNode) -> None:
     if node.parent is None or node.type_name in {"WorldInfo", "Viewpoint"}:
         raise UnsimulatedError(f"the {node.type_name} of a world cannot be removed; keep it")
     if node.outline:
-        raise UnsimulatedError(f"the stub removes no part of a boundingObject; {_ELSEWHERE}")
+        raise UnsimulatedError(f"no part of a boundingObject can be removed; {_ELSEWHERE}")
     if _on_robot(node) and any(_acts(it) for it in (node, *node.descendants())):
-        raise UnsimulatedError(f"the stub removes no {node.type_name} from a robot; {_ELSEWHERE}")
-    _require_no_client([node], "remove")
+        raise UnsimulatedError(f"no {node.type_name} can be removed from a robot; {_ELSEWHERE}")
+    _require_no_client([node], "removed")
 
 
-def _require_no_client(nodes: Iterable[SceneNode], verb: str) -> None:
+def _require_no_client(nodes: Iterable[SceneNode], done: str) -> None:
     for node in nodes:
         for inside in (node, *node.descendants()):
             if inside.type_name == "Robot" and inside.text("controller") == "ros":
                 raise UnsimulatedError(
-                    f"the stub cannot {verb} a robot with the controller ros while it runs; {_ELSEWHERE}"
+                    f"a robot with the controller ros cannot be {done} while the simulator runs; {_ELSEWHERE}"
                 )
 
 
