@@ -65,7 +65,6 @@ _EVERYWHERE = frozenset(
         "supervisor/virtual_reality_headset_get_orientation",
         "supervisor/virtual_reality_headset_get_position",
         "supervisor/world_save",
-        "vacuum_gripper/presence_sensor/enable",
     )
 )
 FAILING: Mapping[str, frozenset[str]] = {"stub": _EVERYWHERE | _STUB, "mujoco": _EVERYWHERE}

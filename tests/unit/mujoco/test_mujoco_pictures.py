@@ -345,10 +345,10 @@ def test_a_camera_that_sees_is_not_counted_among_the_silent_devices(load):
     simulation = load(
         "",
         f"{CAMERA} {FINDER}",
-        'VacuumGripper { }] controller "ros" controllerArgs [ "--name=r" "--synchronize"',
+        'Camera { name "ball" spherical TRUE }] controller "ros" controllerArgs [ "--name=r" "--synchronize"',
     )
 
-    assert silent_devices(simulation.robots) == "1 VacuumGripper"
+    assert silent_devices(simulation.robots) == "1 Camera"
 
 
 def test_a_loose_thing_is_seen_where_it_has_fallen(load):

@@ -60,10 +60,10 @@ def test_all_that_the_stub_lacks_is_listed_at_once(check):
 
 def test_devices_without_readings_are_named(check):
     """A world with a camera starts, and a client that waits for images would wait for ever."""
-    code, lines = check('Robot { controller "ros" children [ Camera { } VacuumGripper { } LED { } ] }')
+    code, lines = check('Robot { controller "ros" children [ Camera { } RangeFinder { } LED { } ] }')
 
     assert code == 0
-    assert lines[1:] == ["devices without readings, whose enable answers failure: 1 Camera, 1 VacuumGripper"]
+    assert lines[1:] == ["devices without readings, whose enable answers failure: 1 Camera, 1 RangeFinder"]
 
 
 def test_a_name_that_the_sidecar_puts_in_is_not_missed(check):

@@ -2,6 +2,8 @@
 
 import pytest
 
+from palaestra_sim.ros.node import ServiceFailed
+
 TALKER = """Robot {{ name "{0}" translation {1} 0 0 supervisor TRUE controller "ros"
   controllerArgs [ "--name={0}" "--synchronize" ] synchronization FALSE children [ {2} ] }}"""
 EMITTER = 'Emitter { name "mouth" range 2 maxRange 5 channel 1 bufferSize 10 }'
@@ -155,7 +157,7 @@ def test_a_connector_feels_a_fitting_one_that_faces_it(pair, there, presence):
 
 
 def test_a_passive_connector_has_no_sensor_and_every_one_can_be_locked(pair):
-    """Locking joins nothing here."""
+    """A lock alone joins nothing."""
     here, _ = pair('Connector { name "socket" type "passive" }', "")
     felt = here.inbox("socket/presence")
     here.call("socket/presence_sensor/enable", value=32)
@@ -196,15 +198,44 @@ def test_a_speaker_knows_the_languages_of_its_engine(pair):
     assert here.get("horn/is_speaking") is False
 
 
-def test_a_pen_takes_its_ink_and_a_gripper_grips_nothing(pair):
-    """What nobody sees is kept; what would lift things fails."""
-    here, _ = pair('Pen { name "pen" } VacuumGripper { name "cup" }', "")
+def test_a_pen_takes_its_ink(pair):
+    """What nobody sees is kept."""
+    here, _ = pair('Pen { name "pen" }', "")
 
     assert here.get("pen/write", value=False) is True
     assert here.get("pen/set_ink_color", color=0xFF0000, density=0.7) == 1
-    assert here.get("cup/turn_on", value=True) is False
+
+
+def test_a_gripper_that_nothing_can_touch_holds_nothing(pair):
+    """In Webots it needs a boundingObject to hold things."""
+    here, _ = pair('VacuumGripper { name "cup" }', "")
+    felt = here.inbox("cup/presence")
+    assert here.get("cup/presence_sensor/enable", value=32) is True
+    assert here.get("cup/turn_on", value=True) is True
+    step(here)
+
+    assert felt == [False]
+    assert here.get("cup/is_on") is True
     assert here.get("cup/turn_on", value=False) is True
     assert here.get("cup/is_on") is False
-    assert here.get("cup/presence_sensor/enable", value=32) is False
     with pytest.raises(KeyError):
         here.call("cup/enable", value=32)
+
+
+def test_a_gripper_that_would_hold_something_is_not_switched_on(pair):
+    """A success would leave a client with a thing that it does not hold."""
+    here, _ = pair('VacuumGripper { name "cup" boundingObject Box { size 0.1 0.1 0.1 } }', "")
+
+    with pytest.raises(ServiceFailed, match="cup has a boundingObject"):
+        here.call("cup/turn_on", value=True)
+    assert here.get("cup/is_on") is False
+
+
+def test_connectors_that_fit_are_not_locked(pair):
+    """Locking would join them in Webots."""
+    other = 'Connector { name "plug" model "a" rotation 0 0 1 3.14159 }'
+    here, _ = pair('Connector { name "socket" model "a" }', other, 0.005)
+
+    with pytest.raises(ServiceFailed, match="joining them is not simulated"):
+        here.call("socket/lock", value=True)
+    assert here.get("socket/is_locked") is False

@@ -17,7 +17,7 @@ has the steps.
 - `camera`, `range_finder`: the rows of what sees
 - `pictures`, `recognition`: the lens that both have, and the objects that a camera finds
 - `radar`: the row of what measures the distances of targets
-- `vacuum_gripper`: the row that nothing enables
+- `vacuum_gripper`: the row of what would hold things
 - `skin`: the row of meshes that move, of which there are none
 - `response`: lookup tables, resolution and axes, which several of them have
 - `imu`: the topic of those that send a sensor_msgs/Imu

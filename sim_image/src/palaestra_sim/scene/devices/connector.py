@@ -1,4 +1,4 @@
-"""Connector: whether another one is near enough to connect. Locking joins nothing here.
+"""Connector: whether another one is near enough to connect. Two that would be joined cannot be locked.
 
 Two connectors face each other along their x axes, which point out of them.
 Source: WbConnector.cpp of Webots.
@@ -13,7 +13,7 @@ from typing import Any, Final
 from palaestra_sim.scene.devices.kind import Kind, Part, Topic
 from palaestra_sim.scene.geometry import Pose, Vector
 from palaestra_sim.scene.places import Place
-from palaestra_sim.seam import Fields, Row
+from palaestra_sim.seam import Fields, Row, UnsimulatedError
 
 _PASSIVE: Final = -1  # the presence that a passive connector reads, which has no sensor
 _MATCHING: Final = {"symmetric": "symmetric", "active": "passive", "passive": "active"}
@@ -50,6 +50,19 @@ class Connector:
         if self.kind == "passive":
             return _PASSIVE
         return int(any(self._fits(other) for other in self.others if other is not self))
+
+    def lock(self, *, locked: bool) -> None:
+        """Lock or unlock it.
+
+        Raises:
+            UnsimulatedError: it would hold another one.
+        """
+        if locked and self.value > 0:
+            raise UnsimulatedError(
+                f"{self.name} and another Connector are in reach, and joining them is not simulated;"
+                " use driver webots"
+            )
+        self.locked = locked
 
     def _fits(self, other: Connector) -> bool:
         if other.model != self.model or other.kind != _MATCHING[self.kind]:
@@ -97,7 +110,7 @@ def _read(part: Part) -> Connector:
 
 def _services(connector: Connector) -> tuple[Row, ...]:
     def lock(request: Any) -> Fields:
-        connector.locked = request.value
+        connector.lock(locked=request.value)
         return {"success": True}
 
     return (("lock", "set_bool", lock), ("is_locked", "get_bool", lambda _: {"value": connector.locked}))

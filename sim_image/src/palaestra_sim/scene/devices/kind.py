@@ -239,11 +239,6 @@ def never(_period_ms: int, _step_ms: int) -> bool:
     return False
 
 
-def always_silent(_device: object) -> bool:
-    """Return that a device has no readings in any simulator of ours."""
-    return True
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind(Generic[DeviceT]):
     """A row of the table: one type of device.

@@ -1,35 +1,67 @@
-"""VacuumGripper: the stub lifts nothing, so everything that would turn it on answers failure."""
+"""VacuumGripper: nothing is held, so one that could hold something cannot be switched on.
+
+A gripper holds what touches its boundingObject; without one it holds nothing in Webots either.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
-from palaestra_sim.scene.devices.kind import Kind, Part, Topic, always_silent
-from palaestra_sim.seam import Row
+from palaestra_sim.scene.devices.kind import Kind, Part, Topic
+from palaestra_sim.seam import Fields, Row, UnsimulatedError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False)
 class VacuumGripper:
-    """A gripper that grips nothing."""
+    """A gripper.
+
+    Attributes:
+        on: whether it is switched on.
+        touches: whether something could touch it, so that it would hold that.
+        value: whether it holds something.
+    """
 
     name: str
     model: str
+    on: bool
+    touches: bool
+    value: bool = False
+
+    def turn(self, *, on: bool) -> None:
+        """Switch it.
+
+        Raises:
+            UnsimulatedError: it could hold something.
+        """
+        if on and self.touches:
+            raise UnsimulatedError(
+                f"{self.name} has a boundingObject, and holding what touches it is not simulated;"
+                " use driver webots"
+            )
+        self.on = on
 
 
 def _read(part: Part) -> VacuumGripper:
-    return VacuumGripper(name=part.name, model=part.text("model"))
+    on, touches = part.node.flag("isOn", False), bool(part.node.nodes("boundingObject"))
+    if on and touches:
+        part.lack("a VacuumGripper that holds what touches it")
+    return VacuumGripper(name=part.name, model=part.text("model"), on=on, touches=touches)
 
 
-def _services(_gripper: VacuumGripper) -> tuple[Row, ...]:
+def _services(gripper: VacuumGripper) -> tuple[Row, ...]:
+    def turn_on(request: Any) -> Fields:
+        gripper.turn(on=request.value)
+        return {"success": True}
+
     return (
-        ("turn_on", "set_bool", lambda request: {"success": not request.value}),
-        ("is_on", "get_bool", lambda _: {"value": False}),
+        ("turn_on", "set_bool", turn_on),
+        ("is_on", "get_bool", lambda _: {"value": gripper.on}),
     )
 
 
-def _topics(_gripper: VacuumGripper) -> tuple[Topic, ...]:
-    return (Topic(name="presence", type_name="webots_ros/BoolStamped", source=None),)
+def _topics(gripper: VacuumGripper) -> tuple[Topic, ...]:
+    return (Topic(name="presence", type_name="webots_ros/BoolStamped", source=gripper),)
 
 
 VACUUM_GRIPPER: Final = Kind(
@@ -39,6 +71,5 @@ VACUUM_GRIPPER: Final = Kind(
     read=_read,
     services=_services,
     topics=_topics,
-    silent=always_silent,
     sensor="presence_sensor",
 )
