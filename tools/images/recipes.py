@@ -46,6 +46,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             dockerfile="sim_image/Dockerfile.stub",
             packages=("sim_image",),
             files=("sim_image/standalone.sh",),
+            extras=("pictures",),
         ),
         "mujoco": Recipe(
             name="mujoco",

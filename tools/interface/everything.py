@@ -35,6 +35,7 @@ _STUB = frozenset(  # pictures and forces
         "camera/recognition_enable_segmentation",
         "camera/recognition_save_segmentation_image",
         "camera/save_image",
+        "display/attach_camera",
         "linear_motor/force_feedback_sensor/enable",
         "linear_motor/set_force",
         "range_finder/enable",
@@ -49,9 +50,6 @@ _STUB = frozenset(  # pictures and forces
 )
 _EVERYWHERE = frozenset(
     (
-        "display/attach_camera",
-        "display/image_load",
-        "display/image_save",
         "robot/get_urdf",
         "skin/get_bone_name",
         "skin/get_bone_orientation",

@@ -41,6 +41,7 @@ REQUESTS = {
     "_motor/set_velocity": {"value": 0.5},
     "/emitter/send": {"data": "hello"},
     "led/set_led": {"value": 1},
+    "display/attach_camera": {"value": "camera"},
     "display/image_paste": {"ir": "@display/image_new"},
     "display/image_delete": {"ir": "@display/image_new"},
     "sf_tracking": {"field": "@FIELD vec3f"},
@@ -119,6 +120,7 @@ ANSWERS = {
     "connector/is_locked": {"value": False},
     "vacuum_gripper/is_on": {"value": True},
     "display/get_info": {"width": 64, "height": 64},
+    "display/image_load": {"ir": 1},  # the one before was deleted
     "skin/get_bone_count": {"value": 0},
     "joystick/get_number_of_axes": {"value": 6},
     "joystick/is_connected": {"value": True},
@@ -201,7 +203,9 @@ def _opening():
 def _request(path, world_path):
     if path == "supervisor/world_load":
         return {"value": str(world_path)}
-    if path.endswith(("/save_image", "/export_image", "_save_segmentation_image")):
+    if path == "display/image_load":
+        return {"filename": str(world_path.with_name("logo.png"))}
+    if path.endswith(("/image_save", "/save_image", "/export_image", "_save_segmentation_image")):
         return {"filename": str(world_path.with_name("picture.png"))}
     request = next((it for end, it in REQUESTS.items() if path.endswith(end)), {})
     if path.startswith("supervisor/node/") and "node" not in request:

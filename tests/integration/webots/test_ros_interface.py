@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from palaestra_sim.scene.png import encode
 from tests.integration.webots.interface_plan import ANSWERS, FIELDS, QUIT_STATUS, absolute, plan
 from tests.integration.webots.interface_player import play
 from tests.integration.webots.roscpp_build import build
@@ -74,6 +75,7 @@ def observed(simulator, client, environment, folder):
     """Run a simulator and a client, and return what the client observed."""
     path = folder / "everything.wbt"
     path.write_text(world())
+    (folder / "logo.png").write_bytes(encode((1, 1), b"\0\0\xff\xff"))
     command = [sys.executable, "-c", RUN.format(simulator), path]
     with subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL) as running:
         try:

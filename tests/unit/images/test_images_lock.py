@@ -109,8 +109,12 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
 @pytest.mark.parametrize(
     ("image", "holds", "lacks"),
     [
-        ("stub", {"prometheus-client"}, {"mujoco-core", "numpy", "pydantic", "torch", "pytest"}),
-        ("mujoco", {"mujoco-core", "numpy", "pyopengl", "prometheus-client"}, {"pydantic", "torch"}),
+        ("stub", {"prometheus-client", "pillow"}, {"mujoco-core", "numpy", "pydantic", "torch", "pytest"}),
+        (
+            "mujoco",
+            {"mujoco-core", "numpy", "pillow", "pyopengl", "prometheus-client"},
+            {"pydantic", "torch"},
+        ),
         (
             "operator",
             {"pydantic", "structlog", "prometheus-client"},

@@ -269,7 +269,7 @@ def test_the_view_of_the_world_is_saved_as_a_file(load, tmp_path):
     """From its Viewpoint, wherever the robots look."""
     simulation = load(f"Viewpoint {{ position 0 0 0.5 }} {BOX}")
 
-    assert simulation.export_image(str(tmp_path / "world.png"))
+    assert simulation.export_image(str(tmp_path / "world.png"), 100)
     assert (tmp_path / "world.png").read_bytes()[:4] == b"\x89PNG"
 
 

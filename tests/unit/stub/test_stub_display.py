@@ -19,9 +19,9 @@ def painter(start, world, ros):
 
 
 def lit(picture):
-    """The rows of a picture, with # for each pixel that has been drawn."""
+    """The rows of a picture, with # for each pixel that is not black."""
     return [
-        "".join("#" if picture.at(x, y)[3] else "." for x in range(picture.width))
+        "".join("#" if any(picture.at(x, y)[:3]) else "." for x in range(picture.width))
         for y in range(picture.height)
     ]
 
@@ -57,16 +57,16 @@ def test_every_drawing_service_draws(painter):
     robot.call("screen/set_opacity", value=0.5)
     robot.call("screen/set_color", value=0)
     robot.call("screen/draw_pixel", x1=1, y1=2)
-    assert picture.at(1, 2) == (0, 64, 128, 192)
+    assert picture.at(1, 2) == (0, 64, 128, 191)
 
     robot.call("screen/set_alpha", value=1.0)
     robot.call("screen/set_opacity", value=1.0)
+    robot.call("screen/set_color", value=0xFFFFFF)
     square = {"x": [0, 2, 2, 0], "y": [3, 3, 5, 5], "size": 4}
     assert robot.get("screen/draw_line", x1=0, y1=0, x2=7, y2=0) == 1
     assert robot.get("screen/draw_rectangle", x=5, y=1, width=3, height=5) == 1
     assert robot.get("screen/fill_polygon", **square) == 1
     assert robot.get("screen/draw_polygon", **square) == 1
-    assert robot.get("screen/draw_text", text="no pixels", x=0, y=1) == 1
     assert lit(picture) == ["########", ".....###", ".#...#.#", "###..#.#", "###..#.#", "###..###"]
 
 
@@ -129,7 +129,7 @@ def test_an_image_that_cannot_be_made_has_the_handle_0(painter, service, request
     assert image == 0
     assert robot.get("screen/image_paste", ir=image, x=0, y=0, blend=0) == 1
     assert robot.get("screen/image_delete", ir=image) == 1
-    assert not any(picture.pixels)
+    assert not any("#" in row for row in lit(picture))
 
 
 @pytest.mark.parametrize(
@@ -146,16 +146,69 @@ def test_what_cannot_be_drawn_is_refused(painter, service, request_, fact):
     with pytest.raises(ServiceFailed, match=fact):
         robot.call(f"screen/{service}", **request_)
 
-    assert not any(picture.pixels)
+    assert not any("#" in row for row in lit(picture))
 
 
-def test_nothing_is_loaded_saved_or_attached(painter):
-    """There are neither files nor cameras here; the answers are those of a failure."""
-    robot, _ = painter
+def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
+    """By its alpha; otherwise it replaces it, alpha included."""
+    robot, picture = painter
+    robot.call("screen/fill_rectangle", x=0, y=0, width=8, height=6)
+    image = robot.get("screen/image_new", width=1, height=1, data=[0, 0, 0, 51], format=6)
+    robot.call("screen/image_paste", ir=image, x=0, y=0, blend=1)
+    robot.call("screen/image_paste", ir=image, x=1, y=0, blend=0)
+
+    assert [picture.at(0, 0), picture.at(1, 0)] == [(204, 204, 204, 255), (0, 0, 0, 51)]
+
+
+def test_a_copy_ends_at_the_edge_of_the_display(painter):
+    """What is beyond is not part of it."""
+    robot, picture = painter
+    robot.call("screen/draw_pixel", x1=7, y1=5)
+    image = robot.get("screen/image_copy", x=7, y=5, width=4, height=4)
+    nothing = robot.get("screen/image_copy", x=9, y=9, width=4, height=4)
+    robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
+    robot.call("screen/image_paste", ir=nothing, x=2, y=2, blend=0)
+
+    assert lit(picture) == ["#.......", *["........"] * 4, ".......#"]
+
+
+def test_an_image_is_saved_and_loaded(painter, tmp_path):
+    """The handle 0 is the display itself, which is black at first."""
+    robot, picture = painter
+    path = str(tmp_path / "screen.png")
+    robot.call("screen/draw_pixel", x1=0, y1=0)
+    assert robot.get("screen/image_save", filename=path, ir=0) == 1
+    robot.call("screen/fill_rectangle", x=0, y=0, width=8, height=6)
+
+    image = robot.get("screen/image_load", filename=path)
+    robot.call("screen/image_paste", ir=image, x=0, y=0, blend=0)
+
+    assert lit(picture) == ["#.......", *["........"] * 5]
+    assert picture.at(7, 5) == (0, 0, 0, 255)
+    assert robot.get("screen/image_save", filename=str(tmp_path / "none" / "a.png"), ir=image) == 0
+
+
+def test_a_text_is_drawn_in_the_size_of_the_font(painter):
+    """Line by line, with hard edges if they are not to be smooth; a size below 1 changes nothing."""
+    robot, picture = painter
+    assert robot.get("screen/set_font", font="Arial", size=6, antiAliasing=0) == 1
+    assert robot.get("screen/set_font", font="Arial", size=0, antiAliasing=1) == 1
+    assert robot.get("screen/draw_text", text="I\nI", x=0, y=-1) == 1
+
+    rows = lit(picture)
+    assert any("#" in row for row in rows)
+    assert {picture.at(x, y) for x in range(8) for y in range(6)} == {(0, 0, 0, 255), (255,) * 4}
+
+
+def test_only_a_camera_that_sees_is_attached(start, world, ros):
+    """A display without the picture would be a success that did nothing."""
+    start(world(robot=ROBOT.replace("children [", 'children [ Camera { name "eye" } LED { name "lamp" }')))
+    robot = ros.node("painter")
 
     assert tuple(robot.call("screen/get_info")) == (8, 6)
-    assert robot.get("screen/image_load", filename="logo.png") == 0
-    assert robot.get("screen/image_save", filename="screen.png", ir=0) == 0
-    assert robot.get("screen/attach_camera", value="camera") is False
+    assert robot.get("screen/attach_camera", value="nose") is False
+    with pytest.raises(ServiceFailed, match="lamp is no Camera"):
+        robot.call("screen/attach_camera", value="lamp")
+    with pytest.raises(ServiceFailed, match="eye sees nothing here"):
+        robot.call("screen/attach_camera", value="eye")
     assert robot.get("screen/detach_camera") is True
-    assert robot.get("screen/set_font", font="Arial", size=12, antiAliasing=1) == 1

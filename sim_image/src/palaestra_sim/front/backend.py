@@ -119,8 +119,11 @@ class Backend(Protocol):
         """Remove a node and all inside it."""
         ...
 
-    def export_image(self, path: str) -> bool:
-        """Save what the Viewpoint shows to a file; return whether that was possible."""
+    def export_image(self, path: str, quality: int) -> bool:
+        """Save what the Viewpoint shows to a file; return whether that was possible.
+
+        `quality` is that of a JPEG file, from 1 to 100.
+        """
         ...
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> Sequence[tuple[Vector, int]]:

@@ -1,4 +1,4 @@
-"""Pictures as files: PNG, of 8 bits a channel, without a library.
+"""Pictures as bytes of PNG, of 8 bits a channel, without a library.
 
 Source: https://www.w3.org/TR/png/
 """
@@ -8,45 +8,29 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 
-from palaestra_sim.seam import UnsimulatedError
-
 _SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
-_RGB: Final = 2
+_RGB, _RGBA = 2, 6
 _CHANNELS: Final = 4  # blue, green, red, alpha
 _FAST: Final = 1  # of zlib: a picture of 640 x 480 takes 10 ms
 
 
-def save(path: str, size: tuple[int, int], pixels: bytes | memoryview) -> bool:
-    """Write a picture to a file; return whether it could be written.
+def encode(size: tuple[int, int], pixels: bytes | bytearray | memoryview, *, alpha: bool = False) -> bytes:
+    """Return the bytes of a PNG file.
 
     Args:
-        path: of the file, absolute or below the working directory of the simulator.
         size: width and height.
-        pixels: blue, green, red and alpha of each, row by row from the top left; alpha is not written.
-
-    Raises:
-        UnsimulatedError: the file would not be a PNG file.
+        pixels: blue, green, red and alpha of each, row by row from the top left.
+        alpha: whether it is written too.
     """
-    if not path.lower().endswith(".png"):
-        raise UnsimulatedError(f"{path}: only PNG files are written; use a name that ends in .png")
-    try:
-        Path(path).write_bytes(encode(size, pixels))
-    except OSError:
-        return False
-    return True
-
-
-def encode(size: tuple[int, int], pixels: bytes | memoryview) -> bytes:
-    """Return the bytes of a PNG file of pixels as those of `save`."""
     width, height = size
-    colors = bytearray(3 * width * height)
-    for channel in range(3):
-        colors[channel::3] = pixels[2 - channel :: _CHANNELS]
-    header = struct.pack(">IIBBBBB", width, height, 8, _RGB, 0, 0, 0)
-    rows = b"".join(_rows(colors, 3 * width))
+    order = (2, 1, 0, 3) if alpha else (2, 1, 0)
+    colors = bytearray(len(order) * width * height)
+    for channel, place in enumerate(order):
+        colors[channel :: len(order)] = pixels[place::_CHANNELS]
+    header = struct.pack(">IIBBBBB", width, height, 8, _RGBA if alpha else _RGB, 0, 0, 0)
+    rows = b"".join(_rows(colors, len(order) * width))
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows, _FAST)), (b"IEND", b""))
     return _SIGNATURE + b"".join(_chunk(kind, data) for kind, data in chunks)
 

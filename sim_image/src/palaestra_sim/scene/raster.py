@@ -13,6 +13,8 @@ Color = tuple[int, int, int, int]  # blue, green, red, alpha: the order of Webot
 Point = tuple[int, int]
 
 _BYTES = 4
+OPAQUE = 255
+BLACK = (0, 0, 0, OPAQUE)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -34,32 +36,60 @@ class Raster:
         blue, green, red, alpha = self.pixels[start : start + _BYTES]
         return blue, green, red, alpha
 
-    def draw(self, points: Iterable[Point], color: Color, opacity: float = 1.0) -> None:
-        """Give those pixels a color, mixed with what is there by the opacity."""
+    def draw(self, points: Iterable[Point], color: Color, opacity: int = OPAQUE) -> None:
+        """Give those pixels a color, mixed with what is there by the opacity, from 0 to 255."""
         for x, y in points:
             if 0 <= x < self.width and 0 <= y < self.height:
                 start = _BYTES * (y * self.width + x)
-                mixed = (
-                    round(old + opacity * (new - old)) for old, new in zip(self.at(x, y), color, strict=True)
-                )
-                self.pixels[start : start + _BYTES] = bytes(mixed)
+                self.pixels[start : start + _BYTES] = bytes(_mixed(self.at(x, y), color, opacity))
+
+    def exchange(self, old: Color, new: Color) -> None:
+        """Give each pixel of one color another one."""
+        for start in range(0, len(self.pixels), _BYTES):
+            if tuple(self.pixels[start : start + _BYTES]) == old:
+                self.pixels[start : start + _BYTES] = bytes(new)
 
     def copy(self, x: int, y: int, width: int, height: int) -> Raster:
-        """Return a part of the picture; what is outside of it is transparent."""
-        part = Raster(width=width, height=height)
-        for row in range(height):
-            for column in range(width):
-                if 0 <= x + column < self.width and 0 <= y + row < self.height:
-                    part.draw([(column, row)], self.at(x + column, y + row))
-        return part
+        """Return the part of the picture that is in a rectangle; it may be smaller, or have no pixel."""
+        left, top = max(0, x), max(0, y)
+        right, bottom = min(self.width, x + width), min(self.height, y + height)
+        rows = (
+            self.pixels[_BYTES * (row * self.width + left) : _BYTES * (row * self.width + right)]
+            for row in range(top, bottom)
+            if left < right
+        )
+        size = (right - left, bottom - top) if left < right and top < bottom else (0, 0)
+        return Raster(width=size[0], height=size[1], pixels=bytearray().join(rows))
 
-    def paste(self, other: Raster, x: int, y: int) -> None:
-        """Put another picture on this one; pixels without alpha are left out."""
+    def paste(self, other: Raster, x: int, y: int, *, blend: bool = False) -> None:
+        """Put another picture on this one, mixed with what is there by its alpha if they `blend`."""
         for row in range(other.height):
             for column in range(other.width):
                 color = other.at(column, row)
-                if color[3]:
-                    self.draw([(x + column, y + row)], color)
+                inside = 0 <= x + column < self.width and 0 <= y + row < self.height
+                if blend and inside:
+                    old = self.at(x + column, y + row)
+                    blue, green, red, _ = _mixed(old, color, color[3])
+                    color = blue, green, red, min(OPAQUE, old[3] + color[3])
+                self.draw([(x + column, y + row)], color)
+
+
+def on_background(picture: Raster, background: bytes | bytearray | memoryview) -> Raster:
+    """Return an opaque picture: `picture` on a background of its size, mixed by its alpha."""
+    behind = Raster(width=picture.width, height=picture.height, pixels=bytearray(background))
+    for y in range(picture.height):
+        for x in range(picture.width):
+            color = picture.at(x, y)
+            blue, green, red, _ = _mixed(behind.at(x, y), color, color[3])
+            behind.draw([(x, y)], (blue, green, red, OPAQUE))
+    return behind
+
+
+def _mixed(old: Color, new: Color, opacity: int) -> Color:
+    """Return a color over another one, in whole numbers like Webots."""
+    rest = OPAQUE - opacity
+    blue, green, red, alpha = ((rest * a + opacity * b) // OPAQUE for a, b in zip(old, new, strict=True))
+    return blue, green, red, alpha
 
 
 def line(x1: int, y1: int, x2: int, y2: int) -> Iterator[Point]:

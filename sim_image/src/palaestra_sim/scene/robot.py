@@ -92,6 +92,11 @@ class Robot:
         """Return a camera at a place; None if this simulator draws nothing; see `Carrier`."""
         return self._physics.eye(place, lens)
 
+    def device(self, name: str) -> object | None:
+        """Return one of its devices; see `Carrier`."""
+        _, device = self.parts.devices.rows.get(name, (None, None))
+        return device
+
     def motion(self, place: Place) -> Motion:
         """Return how a place on the robot moves in the world; see `Carrier`."""
         return motion_of(place, self.body)

@@ -247,13 +247,13 @@ class Simulation:
         self._assemble()
         self._arrange()
 
-    def export_image(self, path: str) -> bool:
-        """Save what the Viewpoint shows as a PNG file; return whether that was possible.
+    def export_image(self, path: str, quality: int) -> bool:
+        """Save what the Viewpoint shows as a PNG or JPEG file; return whether that was possible.
 
         Raises:
             UnsimulatedError: the file would be none, or this machine cannot draw.
         """
-        return save_view(self.tree.root, self.scene.physics, path)
+        return save_view(self.tree.root, self.scene.physics, path, quality)
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:
         """Return where a node touches others: points in meters, each with the number of the touching node."""

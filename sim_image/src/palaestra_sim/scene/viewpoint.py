@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from palaestra_sim.scene import png
+from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.axes import looking
 from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -15,8 +15,8 @@ from palaestra_sim.scene.reading import Reading
 SIZE: Final = (800, 600)  # Webots has that of its window
 
 
-def save_view(root: SceneNode, physics: Physics, path: str) -> bool:
-    """Save the view of a world as a PNG file; return whether that was possible.
+def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> bool:
+    """Save the view of a world as a PNG or JPEG file; return whether that was possible.
 
     Raises:
         UnsimulatedError: the file would be none, or this machine cannot draw.
@@ -30,4 +30,4 @@ def save_view(root: SceneNode, physics: Physics, path: str) -> bool:
     lens = Lens(size=SIZE, field_of_view_rad=fov_rad, near_m=near_m, far_m=far_m)
     place = looking(viewpoint, Place(None, (x, y, z), (ax, ay, az, angle_rad)))
     eye = physics.eye(place, lens)
-    return eye is not None and png.save(path, SIZE, eye.colors())
+    return eye is not None and picture_files.save(path, SIZE, eye.colors(), quality=quality)

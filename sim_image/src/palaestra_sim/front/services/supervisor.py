@@ -93,7 +93,7 @@ class SupervisorServices:
         return {"success": known}
 
     def _export(self, request: Any) -> Fields:
-        return {"success": int(self._simulation.export_image(request.filename))}
+        return {"success": int(self._simulation.export_image(request.filename, request.quality))}
 
     def _start_movie(self, _request: Any) -> Fields:
         self._movie_asked = True

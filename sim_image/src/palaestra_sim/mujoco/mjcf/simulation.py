@@ -136,9 +136,9 @@ class MjcfSimulation:
         del node
         raise UnsimulatedError(_FIXED)
 
-    def export_image(self, path: str) -> bool:
+    def export_image(self, path: str, quality: int) -> bool:
         """Return False: there are no pictures of models yet."""
-        del path
+        del path, quality
         return False
 
     def contact_points(self, node: SceneNode, *, descendants: bool) -> list[tuple[Vector, int]]:

@@ -1,4 +1,8 @@
-"""Display: a picture that a program draws. A text leaves no pixels; no picture is loaded or saved."""
+"""Display: a picture that a program draws, also on top of what a camera sees.
+
+A text has the letters of Pillow's own font, whatever font a client asks for. No camera sees a display.
+Source: WbDisplay.cpp of Webots.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from palaestra_sim.scene import raster
-from palaestra_sim.scene.devices.kind import Kind, Part
-from palaestra_sim.scene.raster import Color, Point, Raster
+from palaestra_sim.scene import picture_files, raster
+from palaestra_sim.scene.devices.camera import Camera
+from palaestra_sim.scene.devices.kind import Carrier, Kind, Part
+from palaestra_sim.scene.letters import Font, letters
+from palaestra_sim.scene.raster import BLACK, OPAQUE, Color, Point, Raster, on_background
 from palaestra_sim.seam import Fields, Handler, Row, UnsimulatedError
 
 _LARGEST: Final = 4096  # pixels in a row or column; a display of Webots is a texture
@@ -21,7 +27,8 @@ _FORMATS: Final = {
     6: (0, 1, 2, 3),
     7: (1, 2, 3, 0),
 }
-_OPAQUE: Final = 255
+_TRANSPARENT: Final = (0, 0, 0, 0)
+_WHITE: Final = (OPAQUE, OPAQUE, OPAQUE, OPAQUE)
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -29,18 +36,58 @@ class Display:
     """A display.
 
     Attributes:
-        picture: what it shows.
+        picture: what was drawn.
         color: blue, green, red and alpha of what is drawn next.
-        opacity: of what is drawn next, from 0 to 1.
+        opacity: of what is drawn next, from 0 to 255.
+        font: of texts.
         images: pictures that clients keep, by their handles.
+        camera: whose picture is the background; None: there is none.
     """
 
     name: str
     model: str
     picture: Raster
-    color: Color = (_OPAQUE, _OPAQUE, _OPAQUE, _OPAQUE)
-    opacity: float = 1.0
+    color: Color = _WHITE
+    opacity: int = OPAQUE
+    font: Font = field(default_factory=Font)
     images: dict[int, Raster] = field(default_factory=dict)
+    camera: Camera | None = None
+    _robot: Carrier | None = field(default=None, repr=False)
+
+    @property
+    def shown(self) -> Raster:
+        """What it shows: what was drawn, on top of what the camera sees now."""
+        camera = self.camera
+        return self.picture if camera is None else on_background(self.picture, camera.value)
+
+    def mount(self, robot: Carrier) -> None:
+        """Take the robot that carries it."""
+        self._robot = robot
+
+    def attach(self, name: str) -> bool:
+        """Show what a camera of the robot sees behind what is drawn; return whether there is that device.
+
+        Where nothing was drawn, the display becomes transparent. A second camera changes nothing.
+
+        Raises:
+            UnsimulatedError: the camera sees nothing, or has another size.
+        """
+        camera = None if self._robot is None else self._robot.device(name)
+        if camera is None or self.camera is not None:
+            return camera is not None
+        if not isinstance(camera, Camera):
+            raise UnsimulatedError(f"{name} is no Camera; attach one")
+        if camera.eye is None:
+            raise UnsimulatedError(f"{name} sees nothing here; use driver mujoco or webots")
+        size = self.picture.width, self.picture.height
+        if camera.lens.size != size:
+            raise UnsimulatedError(
+                f"{name} has {camera.lens.size} pixels, {self.name} {size}; give both one size"
+            )
+        camera.eye.open()
+        self.camera = camera
+        self.picture.exchange(BLACK, _TRANSPARENT)
+        return True
 
     def keep(self, image: Raster) -> Fields:
         """Keep a picture, and return its handle."""
@@ -64,16 +111,21 @@ def _read(part: Part) -> Display:
     if not 0 < width <= _LARGEST or not 0 < height <= _LARGEST:
         part.refuse(f"a display of {width} by {height} pixels", f"use 1 to {_LARGEST}")
         width = height = 1
-    return Display(name=part.name, model=part.text("model"), picture=Raster(width=width, height=height))
+    picture = Raster(width=width, height=height, pixels=bytearray(bytes(BLACK) * (width * height)))
+    return Display(name=part.name, model=part.text("model"), picture=picture)
 
 
 def _services(display: Display) -> tuple[Row, ...]:
     picture = display.picture
+
+    def detach_camera(_request: Any) -> Fields:
+        display.camera = None
+        return {"value": True}
+
     return (
         ("get_info", "display_get_info", lambda _: {"width": picture.width, "height": picture.height}),
-        ("set_font", "display_set_font", lambda _: {"success": 1}),
-        ("attach_camera", "set_string", lambda _: {"success": False}),
-        ("detach_camera", "get_bool", lambda _: {"value": True}),
+        ("attach_camera", "set_string", lambda it: {"success": display.attach(it.value)}),
+        ("detach_camera", "get_bool", detach_camera),
         *_ink(display),
         *_drawing(display),
         *_images(display),
@@ -87,14 +139,21 @@ def _ink(display: Display) -> tuple[Row, ...]:
         return {"success": True}
 
     def set_alpha(request: Any) -> Fields:
-        display.color = *display.color[:3], round(_OPAQUE * _share(request.value))
+        display.color = *display.color[:3], int(OPAQUE * _share(request.value))
         return {"success": True}
 
     def set_opacity(request: Any) -> Fields:
-        display.opacity = _share(request.value)
+        display.opacity = int(OPAQUE * _share(request.value))
         return {"success": True}
 
+    def set_font(request: Any) -> Fields:
+        """Take the size of a font; Webots prints an error about one that is not positive."""
+        if request.size > 0:
+            display.font = Font(min(request.size, _LARGEST), bool(request.antiAliasing))
+        return {"success": 1}
+
     return (
+        ("set_font", "display_set_font", set_font),
         ("set_color", "set_int", set_color),
         ("set_alpha", "set_float", set_alpha),
         ("set_opacity", "set_float", set_opacity),
@@ -112,11 +171,18 @@ def _drawing(display: Display) -> tuple[Row, ...]:
         "draw_rectangle": ("rectangle", lambda it: raster.rectangle(it.x, it.y, it.width, it.height)),
         "draw_oval": ("oval", lambda it: raster.oval(it.cx, it.cy, it.a, it.b)),
         "draw_polygon": ("polygon", lambda it: raster.outline(_corners(it))),
-        "draw_text": ("text", lambda _: ()),
         "fill_rectangle": ("rectangle", lambda it: raster.filled_rectangle(it.x, it.y, it.width, it.height)),
         "fill_oval": ("oval", lambda it: raster.filled_oval(it.cx, it.cy, it.a, it.b)),
         "fill_polygon": ("polygon", lambda it: raster.filled_polygon(_corners(it))),
     }
+
+    def draw_text(request: Any) -> Fields:
+        _require_small(request)
+        picture = display.picture
+        size = picture.width, picture.height
+        for point, share in letters(request.text, (request.x, request.y), display.font, size):
+            picture.draw([point], display.color, display.opacity * share // OPAQUE)
+        return {"success": 1}
 
     def drawer(points: Callable[[Any], Iterable[Point]]) -> Handler:
         def draw(request: Any) -> Fields:
@@ -126,7 +192,10 @@ def _drawing(display: Display) -> tuple[Row, ...]:
 
         return draw
 
-    return tuple((name, f"display_draw_{type_}", drawer(points)) for name, (type_, points) in shapes.items())
+    return (
+        *((name, f"display_draw_{type_}", drawer(points)) for name, (type_, points) in shapes.items()),
+        ("draw_text", "display_draw_text", draw_text),
+    )
 
 
 def _corners(request: Any) -> list[Point]:
@@ -146,13 +215,13 @@ def _images(display: Display) -> tuple[Row, ...]:
         _require_small(request)
         if request.width < 1 or request.height < 1:
             return {"ir": 0}
-        return display.keep(display.picture.copy(request.x, request.y, request.width, request.height))
+        return display.keep(display.shown.copy(request.x, request.y, request.width, request.height))
 
     def image_paste(request: Any) -> Fields:
         _require_small(request)
         image = display.image(request.ir)
         if image is not None:
-            display.picture.paste(image, request.x, request.y)
+            display.picture.paste(image, request.x, request.y, blend=bool(request.blend))
         return {"success": 1}
 
     def image_delete(request: Any) -> Fields:
@@ -165,13 +234,23 @@ def _images(display: Display) -> tuple[Row, ...]:
         image = _image_of(request)
         return {"ir": 0} if image is None else display.keep(image)
 
+    def image_load(request: Any) -> Fields:
+        image = picture_files.load(request.filename)
+        return {"ir": 0} if image is None else display.keep(image)
+
+    def image_save(request: Any) -> Fields:
+        """Save an image, or with the handle 0 what is shown."""
+        image = display.image(request.ir) or display.shown
+        size = image.width, image.height
+        return {"success": int(picture_files.save(request.filename, size, image.pixels, alpha=True))}
+
     return (
         ("image_new", "display_image_new", image_new),
         ("image_copy", "display_image_copy", image_copy),
         ("image_paste", "display_image_paste", image_paste),
         ("image_delete", "display_image_delete", image_delete),
-        ("image_load", "display_image_load", lambda _: {"ir": 0}),
-        ("image_save", "display_image_save", lambda _: {"success": 0}),
+        ("image_load", "display_image_load", image_load),
+        ("image_save", "display_image_save", image_save),
     )
 
 
@@ -188,7 +267,7 @@ def _image_of(request: Any) -> Raster | None:
     data = bytes(request.data)[: size * count].ljust(size * count, b"\0")
     pixels = bytearray(4 * count)
     for channel, place in enumerate(places):
-        pixels[channel::4] = bytes([_OPAQUE]) * count if place is None else data[place::size]
+        pixels[channel::4] = bytes([OPAQUE]) * count if place is None else data[place::size]
     return Raster(width=width, height=height, pixels=pixels)
 
 
@@ -198,4 +277,5 @@ DISPLAY: Final = Kind(
     fields="width SFInt32 64; height SFInt32 64",
     read=_read,
     services=_services,
+    attach=Display.mount,
 )

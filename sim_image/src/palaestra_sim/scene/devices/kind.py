@@ -167,6 +167,10 @@ class Carrier(Protocol):
         """Return a camera at a place; None if this simulator draws nothing."""
         ...
 
+    def device(self, name: str) -> object | None:
+        """Return one of its devices; None if it has none of that name."""
+        ...
+
     def motion(self, place: Place) -> Motion:
         """Return how a place on the robot moves in the world."""
         ...

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from palaestra_sim.scene import png
+from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.devices.kind import Part, Source, Topic
 from palaestra_sim.scene.eyes import MOST_PIXELS, Lens
 from palaestra_sim.seam import Fields, Handler
@@ -45,7 +45,9 @@ def saver(lens: Lens, silent: Callable[[], bool], pixels: Callable[[], bytes | m
     """Return a handler that saves a picture; while the device is silent it answers failure."""
 
     def save_image(request: Any) -> Fields:
-        saved = not silent() and png.save(request.filename, lens.size, pixels())
+        saved = not silent() and picture_files.save(
+            request.filename, lens.size, pixels(), quality=request.quality
+        )
         return {"success": int(saved)}
 
     return save_image

@@ -1,0 +1,89 @@
+"""Pictures as files: PNG is written without a library, the rest takes Pillow, loaded when it is needed.
+
+Paths are absolute, or below the working directory of the simulator.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final
+
+from palaestra_sim.scene import png
+from palaestra_sim.scene.raster import Raster
+from palaestra_sim.seam import UnsimulatedError
+
+_JPEG: Final = (".jpeg", ".jpg")
+_MOST_PIXELS: Final = 4096 * 4096
+Pixels = bytes | bytearray | memoryview
+
+
+def save(
+    path: str, size: tuple[int, int], pixels: Pixels, *, quality: int = 100, alpha: bool = False
+) -> bool:
+    """Write a picture to a PNG or JPEG file; return whether it could be written.
+
+    Args:
+        path: of the file.
+        size: width and height.
+        pixels: blue, green, red and alpha of each, row by row from the top left.
+        quality: of a JPEG file, from 1 to 100.
+        alpha: whether a PNG file has it.
+
+    Raises:
+        UnsimulatedError: the file would be none of both, or Pillow is missing.
+    """
+    if not all(size):
+        return False
+    ending = Path(path).suffix.lower()
+    if ending == ".png":
+        data = png.encode(size, pixels, alpha=alpha)
+    elif ending in _JPEG:
+        data = _jpeg(size, pixels, quality)
+    else:
+        raise UnsimulatedError(f"{path}: no PNG or JPEG file; use a name that ends in .png or .jpg")
+    try:
+        Path(path).write_bytes(data)
+    except OSError:
+        return False
+    return True
+
+
+def load(path: str) -> Raster | None:
+    """Return the picture of a PNG or JPEG file; None if it cannot be read.
+
+    Raises:
+        UnsimulatedError: Pillow is missing.
+    """
+    images = pillow("Image")
+    try:
+        with images.open(path, formats=("PNG", "JPEG")) as image:
+            width, height = image.size
+            if width * height > _MOST_PIXELS:
+                return None
+            pixels = bytearray(image.convert("RGBA").tobytes("raw", "BGRA"))
+    except (OSError, SyntaxError, ValueError, images.DecompressionBombError):
+        return None
+    return Raster(width=width, height=height, pixels=pixels)
+
+
+def pillow(module: str) -> Any:
+    """Return a module of Pillow.
+
+    Raises:
+        UnsimulatedError: it is not installed.
+    """
+    try:
+        return import_module(f"PIL.{module}")
+    except ImportError as error:
+        raise UnsimulatedError(
+            f"texts, JPEG files and loaded pictures need Pillow: {error}; install palaestra-sim[pictures]"
+        ) from error
+
+
+def _jpeg(size: tuple[int, int], pixels: Pixels, quality: int) -> bytes:
+    image = pillow("Image").frombuffer("RGB", size, bytes(pixels), "raw", "BGRX", 0, 1)
+    written = BytesIO()
+    image.save(written, "JPEG", quality=max(1, min(100, quality)))
+    return written.getvalue()
