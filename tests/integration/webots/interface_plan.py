@@ -201,15 +201,26 @@ def _opening():
 
 
 def _request(path, world_path):
-    if path == "supervisor/world_load":
-        return {"value": str(world_path)}
-    if path == "display/image_load":
-        return {"filename": str(world_path.with_name("logo.png"))}
-    if path.endswith(("/image_save", "/save_image", "/export_image", "_save_segmentation_image")):
-        return {"filename": str(world_path.with_name("picture.png"))}
+    found = _of_files(path, world_path)
+    if found is not None:
+        return found
     request = next((it for end, it in REQUESTS.items() if path.endswith(end)), {})
     if path.startswith("supervisor/node/") and "node" not in request:
         return {"node": "@BOX", **request}
     if path.startswith("supervisor/field/") and "field" not in request:
         return {"field": "@FIELD float", **request}
     return request
+
+
+def _of_files(path, world_path):
+    """Return the request of a service that reads or writes a file; None for the others."""
+    if path == "supervisor/world_load":
+        return {"value": str(world_path)}
+    if path == "display/image_load":
+        return {"filename": str(world_path.with_name("logo.png"))}
+    if path == "supervisor/movie_start_recording":
+        movie = {"filename": str(world_path.with_name("movie.mp4")), "quality": 90, "acceleration": 1}
+        return {**movie, "width": 64, "height": 48}
+    if path.endswith(("/image_save", "/save_image", "/export_image", "_save_segmentation_image")):
+        return {"filename": str(world_path.with_name("picture.png"))}
+    return None

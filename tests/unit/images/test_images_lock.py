@@ -112,7 +112,7 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
         ("stub", {"prometheus-client", "pillow"}, {"mujoco-core", "numpy", "pydantic", "torch", "pytest"}),
         (
             "mujoco",
-            {"mujoco-core", "numpy", "pillow", "pyopengl", "prometheus-client"},
+            {"av", "mujoco-core", "numpy", "pillow", "pyopengl", "prometheus-client"},
             {"pydantic", "torch"},
         ),
         (

@@ -12,6 +12,7 @@ from typing import Protocol
 from palaestra_sim.errors import WorldError
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.fields import Field
@@ -52,8 +53,10 @@ class Backend(Protocol):
         time_ms: simulated so far, back to 0 at a reset.
         mode: in PAUSE nothing moves.
         quit_status: the exit status that `quit` asked for; None before.
+        movies: of what the Viewpoint shows.
     """
 
+    movies: Movies
     tree: SceneTree
     time_ms: int
     mode: Mode

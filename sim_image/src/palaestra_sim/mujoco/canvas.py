@@ -7,6 +7,7 @@ world has put on it is freed when another one draws, and at the end of the proce
 from __future__ import annotations
 
 import atexit
+import logging
 import os
 from functools import cache
 from importlib import import_module
@@ -84,6 +85,8 @@ def _open_context() -> Any:
         raise UnsimulatedError(f"MUJOCO_GL={name} draws no pictures; use {' or '.join(_BACKENDS)}")
     # Mesa would otherwise draw with threads of its own, which wait for each other in small pictures.
     os.environ.setdefault("LP_NUM_THREADS", "0")
+    # It reports an accelerator that is not needed.
+    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)
     try:
         return import_module(f"mujoco.{name}").GLContext(1, 1)
     except (

@@ -12,6 +12,7 @@ from typing import Final
 
 from palaestra_sim.mujoco.body import MujocoBody
 from palaestra_sim.mujoco.eye import MujocoEye
+from palaestra_sim.mujoco.film import MujocoFilm
 from palaestra_sim.mujoco.library import mujoco
 from palaestra_sim.mujoco.model import Built, Contents, build
 from palaestra_sim.mujoco.pictures import Pictures
@@ -22,6 +23,7 @@ from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
+from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.places import Place
@@ -136,6 +138,10 @@ class MujocoPhysics:
     def eye(self, place: Place, lens: Lens) -> MujocoEye | None:
         """Return a camera; None if its picture would not be flat."""
         return MujocoEye(self._pictures, place, lens) if self._pictures is not None and lens.flat else None
+
+    def film(self, movie: Movie) -> MujocoFilm:
+        """Return a film to record a movie on."""
+        return MujocoFilm(movie)
 
     def contacts(self) -> Iterator[ContactPoint]:
         """Yield where robots touch obstacles and each other now."""

@@ -1,7 +1,7 @@
 """What a radar can see: Solids with a `radarCrossSection`, and what hides them. Pure geometry.
 
 A Solid is as large as the boxes around its shapes, along the axes of the radar; without shapes it is a point.
-What is outside of the field of view does not count. Floors hide nothing, and neither does the robot itself.
+A part outside of the field of view does not count. Floors hide nothing, and neither does the robot itself.
 Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the field of view by their corners.
 """
 

@@ -18,6 +18,7 @@ from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
+from palaestra_sim.scene.movies import Film, Movie
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
@@ -134,6 +135,15 @@ class Physics(Protocol):
 
     def eye(self, place: Place, lens: Lens) -> Eye | None:
         """Return a camera; None if this physics draws nothing."""
+        ...
+
+    def film(self, movie: Movie) -> Film | None:
+        """Return a film to record a movie on; None if this physics draws nothing.
+
+        Raises:
+            OSError: its file cannot be written.
+            UnsimulatedError: what encodes it is not installed.
+        """
         ...
 
     def contacts(self) -> Iterable[ContactPoint]:

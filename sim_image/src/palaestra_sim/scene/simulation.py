@@ -24,6 +24,7 @@ from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.echoes import echoes_of
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.node_motion import NodeMotion
 from palaestra_sim.scene.nodes.growing import Descriptions
 from palaestra_sim.scene.nodes.scene_node import SceneNode
@@ -37,7 +38,7 @@ from palaestra_sim.scene.states import States, require_joint
 from palaestra_sim.scene.tree.effects import require_removable, require_room
 from palaestra_sim.scene.tree.fields import Field
 from palaestra_sim.scene.tree.scene_tree import SceneTree
-from palaestra_sim.scene.viewpoint import save_view
+from palaestra_sim.scene.viewpoint import save_view, view
 from palaestra_sim.world import World, parse
 
 
@@ -51,12 +52,16 @@ class Simulation:
         mode: for the program that paces the steps; `step` itself works in all three.
         quit_status: the exit status that `quit` asked for; None before.
         motion: of robots and loose things, for a supervisor.
+        movies: of what the Viewpoint shows.
     """
 
     def __init__(self, tree: SceneTree, scene: Scene, mode: Mode) -> None:
         self.tree = tree
         self.scene = scene
         self._view = View(tree.root)
+        self.movies = Movies(
+            lambda size: view(tree.root, scene.physics, size), scene.physics.film, scene.basic_step_ms
+        )
         scene.physics.show(self._view)
         self.robots = tuple(Robot(parts, scene.random_seed, scene.physics) for parts in scene.robots)
         self.time_ms = 0
@@ -345,6 +350,7 @@ class Simulation:
         if self._reset_asked:
             self._restore()
         self.time_ms += self.scene.basic_step_ms
+        self.movies.stepped()
 
     def _restore(self) -> None:
         self._reset_asked = False

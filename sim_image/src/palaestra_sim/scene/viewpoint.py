@@ -6,7 +6,7 @@ from typing import Final
 
 from palaestra_sim.scene import picture_files
 from palaestra_sim.scene.axes import looking
-from palaestra_sim.scene.eyes import Lens
+from palaestra_sim.scene.eyes import Eye, Lens
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.physics import Physics
 from palaestra_sim.scene.places import Place
@@ -21,13 +21,18 @@ def save_view(root: SceneNode, physics: Physics, path: str, quality: int) -> boo
     Raises:
         UnsimulatedError: the file would be none, or this machine cannot draw.
     """
+    eye = view(root, physics, SIZE)
+    return eye is not None and picture_files.save(path, SIZE, eye.colors(), quality=quality)
+
+
+def view(root: SceneNode, physics: Physics, size: tuple[int, int]) -> Eye | None:
+    """Return a camera where the Viewpoint is now; None if the simulator draws nothing."""
     reading = Reading()
     viewpoint = next((it for it in root.nodes() if it.type_name == "Viewpoint"), root)
     fov_rad = reading.number(viewpoint, "fieldOfView", 0.7854)  # of the longer side, as in Webots
     near_m, far_m = reading.number(viewpoint, "near", 0.05), reading.number(viewpoint, "far", 0.0)
     x, y, z = reading.vector(viewpoint, "position", (-10.0, 0.0, 0.0))
     ax, ay, az, angle_rad = reading.vector(viewpoint, "orientation", (0.0, 0.0, 1.0, 0.0))
-    lens = Lens(size=SIZE, field_of_view_rad=fov_rad, near_m=near_m, far_m=far_m)
+    lens = Lens(size=size, field_of_view_rad=fov_rad, near_m=near_m, far_m=far_m)
     place = looking(viewpoint, Place(None, (x, y, z), (ax, ay, az, angle_rad)))
-    eye = physics.eye(place, lens)
-    return eye is not None and picture_files.save(path, SIZE, eye.colors(), quality=quality)
+    return physics.eye(place, lens)

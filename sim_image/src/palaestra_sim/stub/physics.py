@@ -14,6 +14,7 @@ from palaestra_sim.scene.drawn import View
 from palaestra_sim.scene.eyes import Lens
 from palaestra_sim.scene.links import Link
 from palaestra_sim.scene.loose import Loose
+from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.physics import Abilities, Cast, ContactPoint, Figure, Push
 from palaestra_sim.scene.places import Place
 from palaestra_sim.scene.shapes import Shape
@@ -112,6 +113,10 @@ class StubPhysics:
     def eye(self, place: Place, lens: Lens) -> None:
         """Return None: there are no pictures."""
         del place, lens
+
+    def film(self, movie: Movie) -> None:
+        """Return None: there are no pictures."""
+        del movie
 
     def contacts(self) -> Iterable[ContactPoint]:
         """Return where robots touch obstacles and each other now."""

@@ -1,6 +1,6 @@
 """Services under `supervisor/`: the simulation as a whole, and the first handle of everything.
 
-Movies and animations fail, as in Webots with `--no-rendering`. A picture is saved if the simulator draws.
+Pictures and movies are saved if the simulator draws. Animations fail.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from palaestra_sim.front.handles import Handles
 from palaestra_sim.front.host import Host
 from palaestra_sim.ros.node import ServiceFailed
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.movies import Movie
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.seam import Service
 
@@ -28,7 +29,6 @@ class SupervisorServices:
         self._tree = handles.tree
         self._handles = handles
         self._robot = robot
-        self._movie_asked = False
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
@@ -48,9 +48,9 @@ class SupervisorServices:
                 ("animation_start_recording", "set_string", _refuse),
                 ("animation_stop_recording", "get_bool", _refuse_get),
                 ("movie_start_recording", "supervisor_movie_start_recording", self._start_movie),
-                ("movie_stop_recording", "get_bool", _accept_get),
+                ("movie_stop_recording", "get_bool", self._stop_movie),
                 ("movie_failed", "node_get_status", self._movie_failed),
-                ("movie_is_ready", "node_get_status", _movie_is_ready),
+                ("movie_is_ready", "node_get_status", self._movie_is_ready),
                 ("set_label", "supervisor_set_label", _accept),
                 (f"{_HEADSET}_is_used", "get_bool", _refuse_get),
                 (f"{_HEADSET}_get_position", f"supervisor_{_HEADSET}_get_position", _no_headset),
@@ -95,12 +95,24 @@ class SupervisorServices:
     def _export(self, request: Any) -> Fields:
         return {"success": int(self._simulation.export_image(request.filename, request.quality))}
 
-    def _start_movie(self, _request: Any) -> Fields:
-        self._movie_asked = True
-        return {"success": 0}
+    def _start_movie(self, request: Any) -> Fields:
+        movie = Movie(
+            path=request.filename,
+            size=(request.width, request.height),
+            quality=request.quality,
+            acceleration=request.acceleration,
+        )
+        return {"success": int(self._simulation.movies.start(movie))}
+
+    def _stop_movie(self, _request: Any) -> Fields:
+        self._simulation.movies.stop()
+        return {"value": True}
 
     def _movie_failed(self, _request: Any) -> Fields:
-        return {"status": int(self._movie_asked)}
+        return {"status": int(self._simulation.movies.failed)}
+
+    def _movie_is_ready(self, _request: Any) -> Fields:
+        return {"status": int(self._simulation.movies.ready)}
 
     def _get_root(self, _request: Any) -> Fields:
         return {"value": self._handles.of(self._tree.root)}
@@ -137,16 +149,8 @@ def _refuse_get(_request: Any) -> Fields:
     return {"value": False}
 
 
-def _accept_get(_request: Any) -> Fields:
-    return {"value": True}
-
-
 def _no_headset(_request: Any) -> Fields:
     raise ServiceFailed("no virtual-reality headset is used; virtual_reality_headset_is_used answers so")
-
-
-def _movie_is_ready(_request: Any) -> Fields:
-    return {"status": 1}
 
 
 def _nothing_selected(_request: Any) -> Fields:

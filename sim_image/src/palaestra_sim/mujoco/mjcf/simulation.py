@@ -17,6 +17,7 @@ from palaestra_sim.mujoco.mjcf.states import BodyStates
 from palaestra_sim.mujoco.mjcf.tree import ModelTree
 from palaestra_sim.scene.geometry import Vector
 from palaestra_sim.scene.mode import Mode
+from palaestra_sim.scene.movies import Movies
 from palaestra_sim.scene.nodes.scene_node import SceneNode
 from palaestra_sim.scene.robot import Robot
 from palaestra_sim.scene.tree.fields import Field
@@ -55,6 +56,7 @@ class MjcfSimulation:
         self.left_out: tuple[WorldError, ...] = tuple(equipment.left_out)
         self.basic_step_ms = basic_step_ms
         self.motion = BodyMotion(model, tree.bodies)
+        self.movies = Movies(lambda _size: None, lambda _movie: None, basic_step_ms)
         self._model = model
         self._nodes = tree
         self._equipment = equipment

@@ -36,7 +36,7 @@ class Display:
     """A display.
 
     Attributes:
-        picture: what was drawn.
+        picture: the pixels that were drawn.
         color: blue, green, red and alpha of what is drawn next.
         opacity: of what is drawn next, from 0 to 255.
         font: of texts.

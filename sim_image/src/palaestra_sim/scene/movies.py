@@ -1,0 +1,186 @@
+"""Movies of what the Viewpoint shows, in the time of the simulation.
+
+A frame is drawn after each basic step that is due: 25 times in a second of the movie, as far as whole steps
+allow, and at most once a step. A movie that fails leaves no file, and the reason is logged.
+Source: WbVideoRecorder.cpp of Webots.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Final, Protocol
+
+from palaestra_sim.scene.eyes import MOST_PIXELS, Eye
+from palaestra_sim.seam import UnsimulatedError
+
+log = logging.getLogger(__name__)
+_FRAME_MS: Final = 40
+_BEST: Final = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Movie:
+    """A movie that a client asks for.
+
+    Attributes:
+        path: of its file, absolute or below the working directory of the simulator.
+        size: width and height in pixels.
+        quality: from 1 to 100.
+        acceleration: seconds of the simulation in a second of the movie.
+        frames_s: frames in a second of the movie; set when the recording starts.
+    """
+
+    path: str
+    size: tuple[int, int]
+    quality: int
+    acceleration: int
+    frames_s: Fraction = Fraction(1000, _FRAME_MS)
+
+
+class Film(Protocol):
+    """The file of a movie. Until it is finished, nothing is at its path; it is abandoned by dropping it."""
+
+    def add(self, pixels: bytes | memoryview) -> None:
+        """Add a frame: blue, green, red and alpha of each pixel.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        ...
+
+    def finish(self) -> None:
+        """Put the file where it belongs.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        ...
+
+
+class Movies:
+    """The movies of one world, one at a time.
+
+    Args:
+        view: returns a camera with a picture of that size; None if nothing is drawn.
+        film: returns a film for a movie; None if nothing is drawn.
+        basic_step_ms: of the simulation.
+
+    Attributes:
+        failed: whether the last movie failed.
+    """
+
+    def __init__(
+        self,
+        view: Callable[[tuple[int, int]], Eye | None],
+        film: Callable[[Movie], Film | None],
+        basic_step_ms: int,
+    ) -> None:
+        self.failed = False
+        self._view = view
+        self._new_film = film
+        self._basic_step_ms = basic_step_ms
+        self._film: Film | None = None
+        self._eye: Eye | None = None
+        self._every_ms = 0
+        self._elapsed_ms = 0
+
+    @property
+    def ready(self) -> bool:
+        """Whether a recording could start."""
+        return self._film is None
+
+    def start(self, movie: Movie) -> bool:
+        """Begin to record; return whether that is possible.
+
+        Raises:
+            UnsimulatedError: the movie cannot be made, or this machine cannot draw.
+        """
+        if self._film is not None:
+            raise UnsimulatedError("a movie is being recorded; stop it first")
+        self.failed = True
+        self._eye = self._view(movie.size)
+        if self._eye is None:
+            return False
+        _require_possible(movie)
+        self._every_ms = frame_step_ms(movie.acceleration, self._basic_step_ms)
+        frames_s = Fraction(1000 * movie.acceleration, self._every_ms)
+        self._eye.open()
+        try:
+            self._film = self._new_film(
+                Movie(
+                    path=movie.path,
+                    size=movie.size,
+                    quality=movie.quality,
+                    acceleration=movie.acceleration,
+                    frames_s=frames_s,
+                )
+            )
+        except OSError as error:
+            log.warning("movie %s: %s", movie.path, error.strerror or error)
+        self._elapsed_ms = 0
+        self.failed = self._film is None
+        return not self.failed
+
+    def stepped(self) -> None:
+        """Record the state after a basic step, if it is due."""
+        film, eye = self._film, self._eye
+        if film is None or eye is None:
+            return
+        self._elapsed_ms += self._basic_step_ms
+        if self._elapsed_ms % self._every_ms == 0:
+            self._try(lambda: film.add(eye.colors()))
+
+    def stop(self) -> None:
+        """End the recording; without one, do nothing."""
+        film = self._film
+        if film is None:
+            return
+        if self._elapsed_ms < self._every_ms:
+            log.warning("movie: nothing was recorded, because the simulation did not run; make steps")
+            self.failed = True
+        else:
+            self._try(film.finish)
+        self._film = self._eye = None
+
+    def _try(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+        except OSError as error:
+            log.warning("movie: %s", error.strerror or error)
+            self.failed = True
+            self._film = self._eye = None
+
+
+def frame_step_ms(acceleration: int, basic_step_ms: int) -> int:
+    """Return the time of the simulation from one frame to the next, in whole basic steps."""
+    steps = Fraction(acceleration * _FRAME_MS, basic_step_ms)
+    shorter, longer = math.floor(steps) * basic_step_ms, math.ceil(steps) * basic_step_ms
+    if shorter == 0 or abs(shorter - _FRAME_MS) > abs(longer - _FRAME_MS):
+        return longer
+    return shorter
+
+
+def _require_possible(movie: Movie) -> None:
+    """Check what a client asks for.
+
+    Raises:
+        UnsimulatedError: that cannot be recorded.
+    """
+    if not movie.path.lower().endswith(".mp4"):
+        raise UnsimulatedError(
+            f"movie {movie.path!r}: only MP4 files are written; use a name that ends in .mp4"
+        )
+    if any(not 0 < length <= MOST_PIXELS or length % 2 for length in movie.size):
+        width, height = movie.size
+        raise UnsimulatedError(
+            f"a movie of {width} by {height} pixels; use even numbers from 2 to {MOST_PIXELS}"
+        )
+    if not 1 <= movie.quality <= _BEST or movie.acceleration < 1:
+        raise UnsimulatedError(
+            f"a movie of quality {movie.quality} and acceleration {movie.acceleration};"
+            f" use a quality from 1 to {_BEST} and an acceleration of at least 1"
+        )
