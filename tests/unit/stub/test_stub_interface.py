@@ -120,13 +120,22 @@ def test_what_the_stub_cannot_do_fails_with_a_remedy(robot):
 def test_pictures_and_movies_fail_without_rendering(robot):
     """As in Webots started with --no-rendering."""
     assert robot.get("supervisor/export_image", filename="/tmp/a.png", quality=50) == 0
-    assert robot.get("supervisor/animation_start_recording", value="/tmp/a.html") is False
     assert robot.get("supervisor/movie_is_ready") == 1
     assert robot.get("supervisor/movie_failed") == 0
 
     assert robot.get("supervisor/movie_start_recording", filename="/tmp/a.mp4") == 0
     assert robot.get("supervisor/movie_failed") == 1
     assert robot.get("supervisor/movie_stop_recording") is True, "it always is, in the controller"
+
+
+@pytest.mark.parametrize(
+    ("service", "fact"),
+    [("world_save", "worlds are not saved"), ("animation_start_recording", "no animations are recorded")],
+)
+def test_a_file_that_no_simulator_writes_fails_with_a_remedy(robot, service, fact):
+    """A client that reads the file would find none."""
+    with pytest.raises(Exception, match=f"{fact} here"):
+        robot.call(f"supervisor/{service}", value="/tmp/a.wbt")
 
 
 def test_the_harmless_rest_answers_as_webots_does(robot):
@@ -136,7 +145,6 @@ def test_the_harmless_rest_answers_as_webots_does(robot):
     assert robot.get("robot/wwi_send_text", value="hello") is True
     assert robot.get("supervisor/get_selected") == 0
     assert robot.get("supervisor/set_label", id=1, label="hello") == 1
-    assert robot.get("supervisor/world_save", value="") is False
 
 
 def test_remote_control_mode_is_refused(robot):

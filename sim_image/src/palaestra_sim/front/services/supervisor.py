@@ -42,10 +42,10 @@ class SupervisorServices:
                 ("simulation_get_mode", "get_int", self._get_mode),
                 ("simulation_set_mode", "set_int", self._set_mode),
                 ("world_load", "set_string", self._load),
-                ("world_save", "set_string", _refuse),
+                ("world_save", "set_string", _no_saving),
                 ("world_reload", "get_bool", self._reload),
                 ("export_image", "save_image", self._export),
-                ("animation_start_recording", "set_string", _refuse),
+                ("animation_start_recording", "set_string", _no_animation),
                 ("animation_stop_recording", "get_bool", _refuse_get),
                 ("movie_start_recording", "supervisor_movie_start_recording", self._start_movie),
                 ("movie_stop_recording", "get_bool", self._stop_movie),
@@ -141,8 +141,12 @@ def _accept(_request: Any) -> Fields:
     return {"success": 1}
 
 
-def _refuse(_request: Any) -> Fields:
-    return {"success": 0}
+def _no_saving(_request: Any) -> Fields:
+    raise ServiceFailed("worlds are not saved here; use driver webots")
+
+
+def _no_animation(_request: Any) -> Fields:
+    raise ServiceFailed("no animations are recorded here; record a movie, or use driver webots")
 
 
 def _refuse_get(_request: Any) -> Fields:
