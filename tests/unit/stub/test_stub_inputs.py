@@ -106,3 +106,13 @@ def test_a_robot_without_a_battery_reads_minus_1(robot):
     (values,) = stepped(robot, "battery_sensor/value")
 
     assert values == [-1.0]
+
+
+def test_a_client_sends_what_a_robot_window_would(robot):
+    """The controller receives each text once, in order; 100 wait at most."""
+    for text in ("first", "second"):
+        assert robot.get("palaestra/window/send_text", value=text) is True
+
+    assert [robot.get("robot/wwi_receive_text") for _ in range(3)] == ["first", "second", ""]
+    assert all(robot.get("palaestra/window/send_text", value="x") for _ in range(100))
+    assert robot.get("palaestra/window/send_text", value="x") is False

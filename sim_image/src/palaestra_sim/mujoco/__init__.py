@@ -13,6 +13,7 @@
 - `eye`, `pictures`: what cameras see
 - `visible`: from visible shapes to a model of their own
 - `canvas`, `pixels`: OpenGL
+- `film`: the file of a movie
 - `mjcf`: worlds in MuJoCo's own format, beside all of these
 
 Worlds, devices and the interface are those of all simulators: `scene` and `front`.

@@ -8,7 +8,7 @@ Source: WbObjectDetection.cpp of Webots, which cuts boxes at the edge of the fie
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -85,7 +85,7 @@ class Echoes:
         return nearest if nearest < length else math.inf
 
 
-def echoes_of(nodes: Iterable[SceneNode]) -> Echoes:
+def echoes_of(nodes: Collection[SceneNode]) -> Echoes:
     """Return what radars can see of these nodes, as they are now."""
     shapes: dict[SceneNode, tuple[Shape, ...]] = {}
     targets = []

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
 from palaestra_sim.front.backend import Backend
 from palaestra_sim.front.host import Host
@@ -13,6 +14,8 @@ from palaestra_sim.seam import Handler, Row, Service
 
 Fields = dict[str, Any]
 
+_MOST_TEXTS: Final = 100  # that wait for the controller
+
 
 class RobotServices:
     """The services of one robot about itself, but for `time_step` and `get_device_list`."""
@@ -21,13 +24,13 @@ class RobotServices:
         self._host = host
         self._simulation = simulation
         self._robot = robot
+        self._from_window: deque[str] = deque()
 
     def table(self) -> tuple[Service, ...]:
         """Return the services, with their paths below the robot's name."""
-        return tuple(
-            Service(f"robot/{name}", f"webots_ros/{type_name}", handler)
-            for name, type_name, handler in (*self._constants(), *self._actions())
-        )
+        own = Service("palaestra/window/send_text", "webots_ros/set_string", self._send_as_window)
+        rows = (*self._constants(), *self._actions())
+        return (*(Service(f"robot/{name}", f"webots_ros/{type_}", it) for name, type_, it in rows), own)
 
     def _constants(self) -> Iterator[Row]:
         node = self._robot.parts.node
@@ -41,7 +44,6 @@ class RobotServices:
             ("get_world_path", "get_string", str(world_path)),
             ("get_basic_time_step", "get_float", float(self._simulation.basic_step_ms)),
             ("get_number_of_devices", "get_int", len(self._robot.parts.devices.names)),
-            ("wwi_receive_text", "get_string", ""),
         ):
             yield name, type_name, _always({"value": value})
 
@@ -57,12 +59,23 @@ class RobotServices:
             ("set_data", "set_string", self._set_custom_data),
             ("set_mode", "robot_set_mode", lambda request: {"success": int(request.mode == 0)}),
             ("wwi_send_text", "set_string", _always({"success": True})),
+            ("wwi_receive_text", "get_string", self._receive_from_window),
         )
 
     def device_list(self) -> Service:
         """Return the service that is advertised last, so that a client that finds it finds all."""
         names = list(self._robot.parts.devices.names)
         return Service("robot/get_device_list", "webots_ros/robot_get_device_list", lambda _: {"list": names})
+
+    def _receive_from_window(self, _request: Any) -> Fields:
+        return {"value": self._from_window.popleft() if self._from_window else ""}
+
+    def _send_as_window(self, request: Any) -> Fields:
+        """Take a text as if the robot's window had sent it: nobody opens one here."""
+        if len(self._from_window) == _MOST_TEXTS:
+            return {"success": False}
+        self._from_window.append(request.value)
+        return {"success": True}
 
     def _get_custom_data(self, _request: Any) -> Fields:
         return {"value": self._robot.custom_data}
