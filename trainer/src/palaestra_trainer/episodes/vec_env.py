@@ -11,25 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, cast
 
-import gymnasium
 import numpy as np
-from gymnasium import spaces
-from stable_baselines3.common.env_util import is_wrapped
-from stable_baselines3.common.vec_env import VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
+from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
-from palaestra_trainer.simulators.member import Environment
 from palaestra_trainer.waiting.interruption import Check, go_on
 from palaestra_trainer.waiting.turns import take_turns
 
 
-class SimulatorsVecEnv(VecEnv):
+class SimulatorsVecEnv(MembersVecEnv):
     """The collecting simulators of a run, for Stable-Baselines3.
 
     Args:
@@ -39,14 +34,11 @@ class SimulatorsVecEnv(VecEnv):
     """
 
     def __init__(self, keepers: Sequence[Keeper], run_seed: int, *, check: Check = go_on) -> None:
-        self._keepers = list(keepers)
+        super().__init__(keepers)
         self._check = check
         self._collectors = [Collector(keeper, run_seed, index, check) for index, keeper in enumerate(keepers)]
         self._watcher = keepers[0].watcher
-        env = keepers[0].member.env
-        super().__init__(len(keepers), env.observation_space, env.action_space)
         self._seeds = [None] * self.num_envs
-        self._actions = np.empty(0)
 
     def pause(self) -> None:
         """Pause all members until `run`."""
@@ -91,10 +83,6 @@ class SimulatorsVecEnv(VecEnv):
         self._keep_reset_infos()
         return self._stack(observations)
 
-    def step_async(self, actions: np.ndarray) -> None:
-        """Keep `actions`, one for each member, for `step_wait`."""
-        self._actions = actions
-
     def step_wait(self) -> VecEnvStepReturn:
         """Step all members at once; return observations, rewards, dones and infos.
 
@@ -127,36 +115,6 @@ class SimulatorsVecEnv(VecEnv):
             if not keeper.busy:
                 keeper.member.env.close()
 
-    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the chosen environments, also one behind wrappers."""
-        return [env.get_wrapper_attr(attr_name) for env in self._targets(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the chosen environments."""
-        for env in self._targets(indices):
-            setattr(env, attr_name, value)
-
-    def env_method(
-        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
-    ) -> list[Any]:
-        """Return what a method of the chosen environments returns."""
-        return [
-            env.get_wrapper_attr(method_name)(*method_args, **method_kwargs) for env in self._targets(indices)
-        ]
-
-    def env_is_wrapped(
-        self, wrapper_class: type[gymnasium.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
-    ) -> list[bool]:
-        """Return for each chosen environment whether it is wrapped in `wrapper_class`."""
-        return [is_wrapped(env, wrapper_class) for env in self._targets(indices)]
-
-    def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return an image of each environment, None if it draws none."""
-        return [cast("np.ndarray | None", env.render()) for env in self._targets(None)]
-
-    def _targets(self, indices: VecEnvIndices) -> list[Environment]:
-        return [self._collectors[index].env for index in self._get_indices(indices)]
-
     def _await_somebody(self) -> None:
         """Return when a member can step or has become ready; a vector of only invalid rows is useless."""
         if all(keeper.busy or keeper.lost for keeper in self._keepers):
@@ -165,11 +123,3 @@ class SimulatorsVecEnv(VecEnv):
 
     def _keep_reset_infos(self) -> None:
         self.reset_infos = [collector.reset_info for collector in self._collectors]
-
-    def _stack(self, observations: list[Any]) -> VecEnvObs:
-        if isinstance(self.observation_space, spaces.Dict):
-            return {
-                key: np.array([observation[key] for observation in observations])
-                for key in self.observation_space.spaces
-            }
-        return np.array(observations)
