@@ -1,4 +1,7 @@
-"""The simulators in PALAESTRA_CONFIG, one for each environment that asks."""
+"""The simulators that environments find by themselves, one for each environment that asks.
+
+These are a facade of the program, those in PALAESTRA_CONFIG, or stubs of their own.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.connect import Arena, connect
+from palaestra_trainer.simulators.offered import offered_simulator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,13 +40,18 @@ class Configured:
 def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Configured:
     """Return a started simulator for an environment that was created without one.
 
-    It is one of PALAESTRA_CONFIG. If that is not set, as in a notebook, it is a new one with this world and
-    driver, which ends when it is released, or with this process.
+    It is that of a `Webots` facade of this process; else one of PALAESTRA_CONFIG. If that is not set, as in a
+    notebook, it is a new one with this world and driver, which ends when it is released, or with this
+    process.
 
     Raises:
         ConfigurationError: each simulator with this role has an environment, or MuJoCo is not installed.
         SimulatorFault: the simulator does not start.
     """
+    found = offered_simulator()
+    if found is not None:
+        name = found.webots.robot_name
+        return Configured(name=name, robot=found.robot, scene=found.scene, release=found.release)
     return configured_simulator(role) if os.environ.get(CONFIG_VARIABLE) else own_simulator(world, driver)
 
 

@@ -22,6 +22,7 @@ from palaestra_trainer.simulators.member import Member
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.simulators.standby import Standby
 from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots.offers import withdraw
 
 
 def connect(configuration: Configuration | None = None) -> list[Simulator]:
@@ -36,7 +37,7 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
     """
     chosen = configuration or load()
     ensure_node(f"trainer_r{chosen.replica}")
-    return [_simulator(chosen, entry, Sidecar(entry.control, entry.name)) for entry in chosen.simulators]
+    return [simulator_at(Sidecar(entry.control, entry.name), chosen, entry) for entry in chosen.simulators]
 
 
 def connect_members(configuration: Configuration) -> list[Member]:
@@ -47,7 +48,7 @@ def connect_members(configuration: Configuration) -> list[Member]:
     """
     simulators = connect(configuration)
     return [
-        Standby(simulator, _simulator(configuration, entry, simulator.sidecar.standby()), limit_of(entry))
+        Standby(simulator, simulator_at(simulator.sidecar.standby(), configuration, entry), limit_of(entry))
         if entry.standby
         else simulator
         for entry, simulator in zip(configuration.simulators, simulators, strict=True)
@@ -61,7 +62,7 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
         ConfigurationError: the run directory lacks a world, or a simulator cannot be started here.
     """
     return [
-        _simulator(configuration, entry, _process(configuration, entry, run))
+        simulator_at(_process(configuration, entry, run), configuration, entry)
         for entry in configuration.simulators
     ]
 
@@ -79,6 +80,7 @@ class Arena:
 
     def __init__(self, world: str = "arena", driver: str = "stub") -> None:
         self.webots = Webots("robotino", world, driver=driver)
+        withdraw(self.webots)
         self.robot = Robotino(self.webots)
         self.scene = RobotinoScene(self.webots, self.robot)
         try:
@@ -115,6 +117,12 @@ def _process(configuration: Configuration, entry: SimulatorConfiguration, run: P
     return ProcessLauncher(world.absolute(), entry.driver, entry.options, names)
 
 
-def _simulator(configuration: Configuration, entry: SimulatorConfiguration, sidecar: Sidecar) -> Simulator:
+def simulator_at(sidecar: Sidecar, configuration: Configuration, entry: SimulatorConfiguration) -> Simulator:
+    """Return the simulator behind a sidecar, with the environment of a configuration, not started.
+
+    Raises:
+        ConfigurationError: the environment is unknown, or it does not take what it is given.
+        SimulatorDead, SimulatorHung: the sidecar does not answer.
+    """
     make = partial(make_environment, configuration.environment)
     return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle)

@@ -31,9 +31,10 @@ def make(
         scene: arranges episodes.
         simulator: returns robot and scene if none are given; called once for each environment of
             `make_vec`. `palaestra_trainer.testing.fake_arena` needs no simulator.
-        role: without `robot` and `simulator`, the environment takes the first simulator of PALAESTRA_CONFIG
-            with this role that no environment of any process uses. Without PALAESTRA_CONFIG it starts a
-            stub, which ends with `close()` or with this process.
+        role: without `robot` and `simulator`, the environment takes the newest `Webots` facade of this
+            process. If there is none, it takes the first simulator of PALAESTRA_CONFIG with this role that
+            no environment of any process uses. Without PALAESTRA_CONFIG it starts a stub, which ends with
+            `close()` or with this process.
         options: see `Options`; names of movements and parts are text.
 
     Raises:
@@ -98,11 +99,16 @@ def _place(
         return _Place(*simulator())
     from palaestra_trainer.simulators.configured import simulator_for  # noqa: PLC0415 - it needs ROS
 
-    taken = simulator_for(_role(role), *own)
+    taken = simulator_for(role_of(role), *own)
     return _Place(taken.robot, taken.scene, taken.release)
 
 
-def _role(name: str) -> Role:
+def role_of(name: str) -> Role:
+    """Return the role of that name.
+
+    Raises:
+        ConfigurationError: there is none.
+    """
     if name not in set(Role):
         raise ConfigurationError(f'role: "{name}" does not exist; choose {" or ".join(Role)}')
     return Role(name)

@@ -17,6 +17,7 @@ from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
 from palaestra_trainer.simulators.recycling import Wear
 from palaestra_trainer.webots import Mode, Webots
+from palaestra_trainer.webots.offers import withdraw
 
 _POLL_S = 0.1
 
@@ -59,6 +60,7 @@ class Simulator:
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
         )
+        withdraw(self.webots)
         self.robot = Robotino(self.webots, driven.ros_name, robots=[robot.ros_name for robot in state.robots])
         self.scene = RobotinoScene(self.webots, self.robot)
         self.env = make_environment(self.robot, self.scene)

@@ -17,6 +17,7 @@ from palaestra_trainer.errors import SimulatorDead, SimulatorFault, SimulatorHun
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.observer import Mode, Observer
+from palaestra_trainer.webots.offers import offer, withdraw
 from palaestra_trainer.webots.supervisor import Supervisor
 
 Result = TypeVar("Result")
@@ -72,6 +73,8 @@ class Webots:
     By default it is a new simulator. If the ROS names of the world are in use on the master, `_2`, `_3`, ...
     is appended to them. To use a simulator that already runs, pass `launcher=Attached()`.
 
+    The next environment that is made without a simulator uses this one.
+
     Args:
         supervisor_node_name: the ROS name of the supervisor in the world.
         world_path: the world to load; or the name of a world that ships, e.g. "arena".
@@ -112,6 +115,7 @@ class Webots:
         self._at_start: dict[str, Callable[[], None]] = {}
         self._entered = 0
         self._stopped = False
+        offer(self)
 
     @property
     def robot_name(self) -> str:
@@ -242,6 +246,7 @@ class Webots:
         Raises:
             subprocess.TimeoutExpired: that process does not end; errors of the simulator are suppressed.
         """
+        withdraw(self)
         self._disconnect()
         if self._own is not None:
             self._own.close()
