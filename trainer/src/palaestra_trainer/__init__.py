@@ -2,19 +2,87 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from palaestra_trainer.run.policies import Policy
+    from palaestra_trainer.tolerant.env import TolerantEnv
+    from palaestra_trainer.tolerant.players import Players
+    from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
+    from palaestra_trainer.tolerant.vector import TolerantVectorEnv
 
 
 def load_policy(run_or_zip: str | Path) -> Policy:
     """Return the policy of a run directory, or of a model zip inside one; see `policies.load_policy`."""
-    from palaestra_trainer.run import policies  # noqa: PLC0415 - PyTorch takes seconds to import
+    from palaestra_trainer.run import policies
 
     return policies.load_policy(run_or_zip)
+
+
+def make_env(environment: str | None = None, *, role: str = "Collect", **options: Any) -> TolerantEnv:
+    """Return a gymnasium.Env in a simulator of its own, for a training loop of any library.
+
+    A fault of the simulator ends an episode as truncated, with the last observation before it, reward 0 and
+    `info["sim_fault"]`. The next `reset` waits until the simulator is mended, within its restart budget.
+
+    The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
+    none, it is a free one of PALAESTRA_CONFIG. Without that variable, as in a notebook, a stub is started.
+
+    Args:
+        environment: its id; by default the environment of PALAESTRA_CONFIG.
+        role: the role of the simulator in PALAESTRA_CONFIG, `Collect` or `Evaluate`.
+        options: of the environment.
+
+    Raises:
+        ConfigurationError: the environment is missing or wrong, or no simulator with the role is free.
+        FaultBudgetSpent: the simulator does not start.
+    """
+    from palaestra_trainer.tolerant.env import TolerantEnv
+
+    return TolerantEnv(_players(environment, 1, role, options))
+
+
+def make_vec_env(
+    environment: str | None = None, num_envs: int | None = None, *, role: str = "Collect", **options: Any
+) -> TolerantVectorEnv:
+    """Return a gymnasium VectorEnv whose simulators step at the same time; see `make_env`.
+
+    Episodes are reset in their last step (`AutoresetMode.SAME_STEP`). After a fault, that step waits until
+    the simulator is mended, and the other simulators wait with it.
+
+    Args:
+        environment: see `make_env`.
+        num_envs: how many simulators; by default all of the role in PALAESTRA_CONFIG, else one.
+        role: see `make_env`.
+        options: see `make_env`.
+
+    Raises:
+        As `make_env`.
+    """
+    from palaestra_trainer.tolerant.vector import TolerantVectorEnv
+
+    return TolerantVectorEnv(_players(environment, num_envs, role, options))
+
+
+def make_sb3_vec_env(
+    environment: str | None = None, num_envs: int | None = None, *, role: str = "Collect", **options: Any
+) -> TolerantVecEnv:
+    """Return a Stable-Baselines3 VecEnv whose simulators step at the same time; see `make_vec_env`.
+
+    Args:
+        environment: see `make_env`.
+        num_envs: see `make_vec_env`.
+        role: see `make_env`.
+        options: see `make_env`.
+
+    Raises:
+        As `make_env`.
+    """
+    from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
+
+    return TolerantVecEnv(_players(environment, num_envs, role, options))
 
 
 def report(*, step: int, success_rate: float | None = None) -> None:
@@ -31,6 +99,20 @@ def report(*, step: int, success_rate: float | None = None) -> None:
         ValueError: the step is negative, or the rate not within 0 to 1.
         ConfigurationError: the configuration cannot be read, or its statusAddress is in use.
     """
-    from palaestra_trainer.run import reporting  # noqa: PLC0415 - its imports take seconds
+    from palaestra_trainer.run import reporting
 
     reporting.report(step, success_rate)
+
+
+def _players(environment: str | None, number: int | None, role: str, options: dict[str, Any]) -> Players:
+    from palaestra_trainer.configuration import Environment
+    from palaestra_trainer.errors import ConfigurationError
+    from palaestra_trainer.simulators.entry_point import role_of
+    from palaestra_trainer.tolerant.making import make_players
+
+    if environment is None and options:
+        raise ConfigurationError(
+            f"environment: options were given without it ({', '.join(options)}); name the environment too"
+        )
+    wanted = None if environment is None else Environment(id=environment, options=options)
+    return make_players(wanted, number, role_of(role))

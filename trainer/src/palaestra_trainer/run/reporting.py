@@ -6,13 +6,18 @@ cannot detect progress between preempted attempts, and ends the replica as `NoPr
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import threading
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
-from palaestra_protocol.pod.status import Termination
-from palaestra_trainer.configuration import CONFIG_VARIABLE, load
+from palaestra_protocol.pod.status import Cause, Termination
+from palaestra_protocol.pod.terms import Role
+from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.run.termination import write_last_word
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
@@ -21,15 +26,44 @@ from palaestra_trainer.telemetry.status_server import status_server
 _lock = threading.Lock()
 
 
-class _Reported(Progress):
-    """The progress of a user's own program; how it spends its time is unknown."""
+class Reported(Progress):
+    """The progress of a user's own program; how it spends its time is unknown.
+
+    Its step is the one that the program reports. Before its first report, it is the number of steps of its
+    tolerant environments in this attempt.
+    """
+
+    _reports = _evaluates = False
 
     @property
     def phase(self) -> str:
-        return "training"
+        """Training, or evaluating if an evaluating environment has stepped last."""
+        return "evaluating" if self._evaluates else "training"
+
+    def spending(self, cause: Cause) -> AbstractContextManager[None]:
+        """Ignore it: any thread of the program may wait for simulators."""
+        del cause
+        return nullcontext()
 
     def counted(self, kept: int | None = None) -> Counters:
+        """Return the counters as they are now, without the time spent."""
         return replace(super().counted(kept), goodput={})
+
+    def reports(self, step: int, success_rate: float | None) -> None:
+        """Set the step, and the success rate if there is one, as the program reports them."""
+        self._reports, self.step = True, step
+        self.stepped(1)
+        if success_rate is not None:
+            self.success_rate = success_rate
+
+    def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
+        """Count a step of environments by the infos of their rows; evaluating ones add no steps."""
+        valid = sum("sim_fault" not in info for info in infos)
+        if valid:
+            self.stepped(valid)
+        self._evaluates = role is Role.EVALUATE
+        if not self._evaluates:
+            self.collected(self.step if self._reports else self.step + valid, infos)
 
 
 def report(step: int, success_rate: float | None) -> None:
@@ -42,19 +76,27 @@ def report(step: int, success_rate: float | None) -> None:
         return
     with _lock:
         progress = _served()
-        progress.step = step
-        progress.stepped(1)
-        if success_rate is not None:
-            progress.success_rate = success_rate
+        progress.reports(step, success_rate)
     if step >= progress.target:
         done = "Completed: all steps are done"
         write_last_word(Termination(step=step, reason=done, success_rate=progress.success_rate))
 
 
+def reported(configuration: Configuration) -> Reported:
+    """Return the progress that environments of this process count in.
+
+    Worker processes of a program count for themselves, and /status does not show it.
+    """
+    if multiprocessing.parent_process() is None:
+        with _lock:
+            return _served()
+    return Reported(configuration.steps, [])
+
+
 @cache
-def _served() -> _Reported:
+def _served() -> Reported:
     """Return the progress of this process; the first call starts the status server."""
     configuration = load()
-    progress = _Reported(configuration.steps, [])
+    progress = Reported(configuration.steps, [])
     status_server(configuration.status_address, progress, constants(configuration)).start()
     return progress

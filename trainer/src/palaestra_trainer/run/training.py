@@ -38,8 +38,9 @@ from palaestra_trainer.run.termination import End, end_of, write_last_word
 from palaestra_trainer.run.watchdog import Watchdog, stalled
 from palaestra_trainer.run_directory import RunDirectory, replace_file
 from palaestra_trainer.simulators.fleet import Fleet, rest
-from palaestra_trainer.simulators.member import Member, Reporting, Spared
+from palaestra_trainer.simulators.member import Member
 from palaestra_trainer.telemetry.display import Display, Lines
+from palaestra_trainer.telemetry.following import follow
 from palaestra_trainer.telemetry.logs import last_lines
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
@@ -181,11 +182,7 @@ class Attempt:
         stack.enter_context(self._around.display)
         self._begin(found)
         members = self._around.make_members(configuration)
-        for member in members:
-            if isinstance(member, Spared):
-                progress.has_standby(member.name, member.spare)
-            if isinstance(member, Reporting):
-                progress.reports_left_out(member.name, member.left_out)
+        follow(progress, members)
         fleet = Fleet(configuration, members, progress)
         progress.figures.meters = fleet.meters()
         stack.callback(fleet.stop)

@@ -197,6 +197,11 @@ class Progress:
             self.counters.given_up += 1
             self._standings.gave_up(simulator)
 
+    def add(self, simulator: str, role: Role) -> None:
+        """Add a simulator, unless it is there."""
+        with self._lock:
+            self._standings.add(simulator, role)
+
     def has_standby(self, simulator: str, ask: AskStandby) -> None:
         """Set the function that returns the state of the simulator's spare; any thread may call it."""
         self._standings.has_standby(simulator, ask)

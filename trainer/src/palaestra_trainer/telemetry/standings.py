@@ -51,6 +51,10 @@ class Standings:
         self._all = {name: _Standing(role=role) for name, role in simulators}
         self.faults: deque[FaultRecord] = deque(maxlen=MOST_FAULTS)
 
+    def add(self, simulator: str, role: Role) -> None:
+        """Add a simulator, unless it is there."""
+        self._all.setdefault(simulator, _Standing(role=role))
+
     def broke(self, fault: FaultRecord) -> None:
         """Record a fault and mark its simulator as down."""
         self.faults.append(fault)

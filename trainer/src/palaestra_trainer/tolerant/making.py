@@ -1,0 +1,141 @@
+"""The players of tolerant environments: in a facade of the program, in a job, or in stubs of their own."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+from typing import Any
+from uuid import uuid4
+
+import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
+from palaestra_protocol.pod.terms import Role
+from palaestra_trainer.configuration import (
+    CONFIG_VARIABLE,
+    Configuration,
+    Environment,
+    SimulatorConfiguration,
+    load,
+)
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.launching.process import ProcessLauncher
+from palaestra_trainer.run.reporting import Reported, reported
+from palaestra_trainer.simulators.allocation import allocate
+from palaestra_trainer.simulators.connect import connect_members, simulator_at
+from palaestra_trainer.simulators.fleet import Fleet
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.simulators.member import Member, NullWatcher, Watcher
+from palaestra_trainer.simulators.offered import Offered, OfferedMember, offered_simulator
+from palaestra_trainer.telemetry.following import follow
+from palaestra_trainer.tolerant.player import Row
+from palaestra_trainer.tolerant.players import Players
+
+
+def make_players(wanted: Environment | None, number: int | None, role: Role) -> Players:
+    """Return the players of one environment, whose simulators are up.
+
+    The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
+    none, or more than one is wanted, simulators of PALAESTRA_CONFIG are used. If that is not set, stubs are.
+
+    Args:
+        wanted: the environment; None: that of PALAESTRA_CONFIG.
+        number: how many simulators; None: that of the facade, or all of the role, or one stub.
+        role: the role of the simulators in PALAESTRA_CONFIG.
+
+    Raises:
+        ConfigurationError: the environment is missing or wrong, or too few simulators with the role are free.
+        FaultBudgetSpent: a simulator did not start.
+        MasterLost: no ROS master answers.
+    """
+    if number is not None and number < 1:
+        raise ConfigurationError(f"num_envs: {number} is no number of environments; give 1 or more")
+    configuration = load() if os.environ.get(CONFIG_VARIABLE) else None
+    environment = wanted or (configuration.environment if configuration else None)
+    if environment is None:
+        raise ConfigurationError(
+            f"environment: none was given, and {CONFIG_VARIABLE} is not set; give the id of an environment"
+        )
+    place = offered_simulator() if number in {None, 1} else None
+    if place is not None:
+        return _in_facade(place, environment)
+    if configuration is not None:
+        return _in_job(configuration.model_copy(update={"environment": environment}), number, role)
+    return _in_stubs(environment, number or 1)
+
+
+def _in_facade(place: Offered, environment: Environment) -> Players:
+    try:
+        keeper = Keeper(OfferedMember(place, environment))
+    except BaseException:
+        place.release()
+        raise
+    # The program may pause the simulator after any step, so none may end amid a restart.
+    return Players([keeper], place.release, mend_at_once=True)
+
+
+def _in_job(configuration: Configuration, number: int | None, role: Role) -> Players:
+    with ExitStack() as stack:
+        entries = _allocated(stack, configuration, number, role)
+        chosen = configuration.model_copy(update={"simulators": entries})
+        members = connect_members(chosen)
+        progress = reported(configuration)
+        for entry in entries:
+            progress.add(entry.name, role)
+        follow(progress, members)
+        keepers = _started(stack, chosen, members, progress)
+        progress.figures.meters = {**progress.figures.meters, **{it.name: it.meter for it in keepers}}
+        return Players(
+            keepers,
+            stack.pop_all().close,
+            configuration.stall_deadline_seconds,
+            played=partial(_count, progress, role),
+        )
+
+
+def _in_stubs(environment: Environment, number: int) -> Players:
+    entries = tuple(
+        SimulatorConfiguration(
+            name=f"collect-{index}", group="collect", index=index, role=Role.COLLECT, world="arena"
+        )
+        for index in range(number)
+    )
+    configuration = Configuration(job="own", environment=environment, steps=1, simulators=entries)
+    with ExitStack() as stack:
+        members = []
+        for entry in entries:
+            # A stub leaves six such digits out of the seed of its faults, so that they repeat.
+            launcher = ProcessLauncher(entry.world, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
+            stack.callback(launcher.close)
+            members.append(simulator_at(launcher, configuration, entry))
+        return Players(_started(stack, configuration, members, NullWatcher()), stack.pop_all().close)
+
+
+def _allocated(
+    stack: ExitStack, configuration: Configuration, number: int | None, role: Role
+) -> tuple[SimulatorConfiguration, ...]:
+    """Return the simulators that are reserved until `stack` closes; none may be given up."""
+    every = max(1, len(configuration.with_role(role)))
+    entries = []
+    for _ in range(number or every):
+        allocated = allocate(configuration, role)
+        stack.callback(allocated.lock.release)
+        entries.append(allocated.simulator.model_copy(update={"min_simulators": None}))
+    return tuple(entries)
+
+
+def _started(
+    stack: ExitStack, configuration: Configuration, members: Sequence[Member], watcher: Watcher
+) -> list[Keeper]:
+    """Return the keepers of members that are up until `stack` closes."""
+    fleet = Fleet(configuration, members, watcher)
+    stack.callback(fleet.stop)
+    fleet.start()
+    return fleet.collecting or fleet.evaluating
+
+
+def _count(progress: Reported, role: Role, rows: Sequence[Row]) -> None:
+    infos: list[dict[str, Any]] = [
+        row.info if row.episode is None else {**row.info, "episode": row.episode} for row in rows
+    ]
+    progress.played(role, infos)
