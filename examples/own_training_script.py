@@ -1,10 +1,11 @@
 """A training loop of your own: `trainer: {command: [python, own_training_script.py]}`.
 
-It runs where the built-in loop would: the simulators of the TrainingJob are there, and every
-environment that is made takes one that has its role. A fault is not mended here.
-It saves its model as often as the job says, and reports its steps, so that the operator sees it
-come forward. SIGTERM ends it after the step that is under way, with the model saved and an exit
-code that asks to be started again; started again, it goes on from there.
+It runs where the built-in loop would, in the simulators of the TrainingJob. A simulator that breaks is
+mended, and its episode counts as truncated.
+The script saves its model as often as the job says, and reports its steps, so that the operator sees its
+progress.
+SIGTERM ends it after the current step, with the model saved and an exit code that asks to be started again;
+started again, it resumes from that model.
 """
 
 import os
@@ -13,29 +14,19 @@ import sys
 import threading
 from pathlib import Path
 
-import gymnasium
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv
 
-from palaestra_trainer import report
+from palaestra_trainer import make_env, make_sb3_vec_env, report
 from palaestra_trainer.configuration import load
-from palaestra_trainer.environments.making import make_environment
-from palaestra_trainer.simulators.configured import simulator_for
 
 job = load()  # what PALAESTRA_CONFIG names: the TrainingJob, resolved for this replica
 run = Path(os.environ["PALAESTRA_RUN"])  # what is written here outlives the pod
 saved = run / "model.zip"
 interrupted = threading.Event()
 signal.signal(signal.SIGTERM, lambda *_: interrupted.set())
-
-
-def make(role: str = "Collect") -> gymnasium.Env:
-    """Make an environment in a simulator with this role that no other environment has."""
-    taken = simulator_for(role)
-    return Monitor(make_environment(job.environment, taken.robot, taken.scene))
 
 
 def save(model: PPO) -> None:
@@ -60,7 +51,7 @@ class Progress(BaseCallback):
         return not interrupted.is_set()
 
 
-envs = DummyVecEnv([make] * len(job.with_role("Collect")))
+envs = make_sb3_vec_env()  # in all simulators that collect
 if saved.exists():
     model = PPO.load(saved, envs, device=job.device)
 else:
@@ -70,9 +61,12 @@ missing = max(0, job.steps - model.num_timesteps)
 model.learn(missing, Progress(), reset_num_timesteps=False)
 save(model)
 report(step=model.num_timesteps)
+envs.close()
 
 if interrupted.is_set():
     sys.exit(75)  # interrupted, start me again
 if job.with_role("Evaluate"):
-    mean_return, _ = evaluate_policy(model, make("Evaluate"), n_eval_episodes=job.evaluation.episodes)
+    env = Monitor(make_env(role="Evaluate"))
+    mean_return, _ = evaluate_policy(model, env, n_eval_episodes=job.evaluation.episodes)
+    env.close()
     print(f"mean return {mean_return:.2f} over {job.evaluation.episodes} episodes")

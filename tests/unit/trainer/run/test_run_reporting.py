@@ -12,13 +12,18 @@ from urllib.request import urlopen
 import pytest
 import yaml
 
-from palaestra_protocol.pod.status import Termination, TrainerStatus
+from palaestra_protocol.pod.status import Cause, Termination, TrainerStatus
+from palaestra_protocol.pod.terms import Role
 from palaestra_trainer import report
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.run.reporting import Reported
 
 LONG_S = 60
 PROGRAM = """
 import sys
 from palaestra_trainer import report
+from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.run.reporting import Reported
 for line in sys.stdin:
     report(**eval(line))
     print("reported", flush=True)
@@ -123,3 +128,44 @@ def test_a_report_outside_of_a_job_does_nothing(monkeypatch):
     monkeypatch.delenv("PALAESTRA_CONFIG", raising=False)
 
     report(step=1)
+
+
+def test_steps_of_tolerant_environments_count_until_the_program_reports():
+    """Only the program knows what it has learned before this attempt."""
+    progress = Reported(100, [])
+
+    progress.played(Role.COLLECT, [{}, {"episode": {"r": 1.0, "l": 5}}, {"sim_fault": {}}])
+    before = progress.status()
+    progress.reports(50, None)
+    progress.played(Role.COLLECT, [{}])
+
+    assert (before.step, before.episodes, before.mean_return) == (2, 1, 1.0)
+    assert progress.status().step == 50
+
+
+def test_steps_of_an_evaluating_environment_are_none_of_training():
+    """The operator must not take an evaluation for training that stands still, either."""
+    progress = Reported(100, [])
+    progress.played(Role.COLLECT, [{}])
+
+    progress.played(Role.EVALUATE, [{}])
+
+    assert (progress.status().step, progress.phase) == (1, "evaluating")
+    progress.played(Role.COLLECT, [{}])
+    assert (progress.status().step, progress.phase) == (2, "training")
+
+
+def test_faults_and_restarts_of_a_program_s_simulators_are_in_its_status():
+    """As those of the built-in loop."""
+    progress = Reported(100, [])
+    progress.add("collect-0", Role.COLLECT)
+    progress.add("collect-0", Role.COLLECT)
+    progress.started("collect-0")
+
+    progress.fault("collect-0", SimulatorDead("collect-0", "gone"), 3)
+    with progress.spending(Cause.RECOVERING):
+        progress.restarted("collect-0", recycled=False)
+
+    status = progress.status()
+    assert (status.faults["dead"], status.steps_lost, status.goodput) == (1, 3, {})
+    assert [(it.name, it.state, it.restarts) for it in status.simulators] == [("collect-0", "ready", 1)]

@@ -5,9 +5,15 @@ The program starts, pauses and ends it: `with webots:` and `webots.run` decide w
 
 from __future__ import annotations
 
+from typing import Any
+
+import gymnasium
+
 from palaestra_trainer.configuration import Environment as Wanted
 from palaestra_trainer.environments.making import make_environment
+from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.simulators.member import Environment, Step
 from palaestra_trainer.webots import Webots
 from palaestra_trainer.webots.offers import give_back, offered, take
 
@@ -54,8 +60,11 @@ class OfferedMember:
 
     def __init__(self, place: Offered, wanted: Wanted) -> None:
         self.name = place.webots.robot_name
-        self.env = make_environment(wanted, place.robot, place.scene)
+        self._one_life = _OneLife(make_environment(wanted, place.robot, place.scene), self.name)
+        self.env: Environment = self._one_life
+        self._webots = place.webots
         self._place = place
+        place.webots.at_start(f"environment of {self.name}", self._one_life.end)
 
     def due(self, episodes: int = 1) -> None:
         """It is not recycled: `webots.run(..., restart=True)` does that."""
@@ -69,13 +78,14 @@ class OfferedMember:
         self._place.release()
 
     def restart(self) -> None:
-        """Restart it; it runs as before, or is paused.
+        """Restart it, unless the program has done that; it runs as before, or is paused.
 
         Raises:
             SimulatorDead, SimulatorHung, WrongData: it does not start in time.
             ConfigurationError: the facade is only attached to it.
         """
-        self._place.webots()
+        if not (self._one_life.ended and self._webots.available()):
+            self._webots()
 
     def abandon(self) -> None:
         """Do nothing: the start's own deadline ends it."""
@@ -85,3 +95,35 @@ class OfferedMember:
 
     def unpause(self) -> None:
         """Leave it to the program."""
+
+
+class _OneLife(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment whose episodes do not go on in a simulator that the program has restarted.
+
+    Attributes:
+        ended: whether the simulator was started since the last reset.
+    """
+
+    def __init__(self, env: Environment, name: str) -> None:
+        super().__init__(env)
+        self._name = name
+        self.ended = False
+
+    def end(self) -> None:
+        """Record a start of the simulator."""
+        self.ended = True
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Return the result of the environment's reset."""
+        self.ended = False
+        return self.env.reset(seed=seed, options=options)
+
+    def step(self, action: Any) -> Step:
+        """Return the result of the environment's step.
+
+        Raises:
+            SimulatorDead: the simulator of this episode has ended; or as the environment raises it.
+        """
+        if self.ended:
+            raise SimulatorDead(self._name, "was restarted amid an episode")
+        return self.env.step(action)

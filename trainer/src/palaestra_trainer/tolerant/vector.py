@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, SupportsIndex
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -11,7 +12,7 @@ from gymnasium.vector.utils import batch_space, concatenate, create_empty_array,
 
 from palaestra_trainer.tolerant.players import Players
 
-Seeds = int | Sequence[int | None] | None
+Seeds = SupportsIndex | Sequence[int | None] | None
 Stepped = tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
 
 
@@ -83,8 +84,8 @@ class TolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
     def _seeds(self, seed: Seeds) -> Sequence[int | None]:
         if seed is None:
             return [None] * self.num_envs
-        if not isinstance(seed, Sequence):
-            return [seed + index for index in range(self.num_envs)]
+        if isinstance(seed, SupportsIndex):
+            return [operator.index(seed) + index for index in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise ValueError(f"seed: {len(seed)} seeds for {self.num_envs} environments; give one for each")
         return seed
