@@ -15,11 +15,13 @@ import structlog
 import yaml
 
 from palaestra_trainer.configuration import load
+from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.telemetry.logs import configure_logs
 
 PROGRAM = Path(__file__).with_name("fakes.py")
+ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate"}
 
 
 @pytest.fixture(scope="session")
@@ -104,3 +106,38 @@ def start(tmp_path):
     for process in started:
         process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def simulators(master, tmp_path, monkeypatch):
+    """Sidecars of a job with two collecting simulators and one that evaluates; PALAESTRA_CONFIG names it."""
+    del master
+    launchers = {
+        name: ProcessLauncher(
+            "arena",
+            names=(
+                "--job=vectors",
+                f"--uid={tmp_path}",
+                f"--group={name[:-2]}",
+                f"--index={name[-1]}",
+                f"--work={tmp_path / name}",
+            ),
+        )
+        for name in ROLES
+    }
+    job = {
+        "job": "vectors",
+        "environment": {"id": "MoveToTargetEnv-v0"},
+        "steps": 100,
+        "statusAddress": "127.0.0.1:0",
+        "simulators": [
+            {"name": n, "group": n[:-2], "index": int(n[-1]), "role": role, "control": launchers[n].address}
+            for n, role in ROLES.items()
+        ],
+    }
+    (tmp_path / "training.yaml").write_text(yaml.safe_dump(job))
+    monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "training.yaml"))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    yield launchers
+    for launcher in launchers.values():
+        launcher.close()

@@ -8,48 +8,11 @@ from functools import partial
 import gymnasium
 import numpy as np
 import pytest
-import yaml
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
-from palaestra_trainer.launching.process import ProcessLauncher
 
 TASK = "palaestra_trainer.environments:MoveToTargetEnv-v0"
-ROLES = {"collect-0": "Collect", "collect-1": "Collect", "evaluate-0": "Evaluate"}
-
-
-@pytest.fixture
-def simulators(master, tmp_path, monkeypatch):
-    """Sidecars of a job with two collecting simulators and one that evaluates; PALAESTRA_CONFIG names it."""
-    del master
-    launchers = {
-        name: ProcessLauncher(
-            "arena",
-            names=(
-                "--job=vectors",
-                f"--uid={tmp_path}",
-                f"--group={name[:-2]}",
-                f"--index={name[-1]}",
-                f"--work={tmp_path / name}",
-            ),
-        )
-        for name in ROLES
-    }
-    job = {
-        "job": "vectors",
-        "environment": {"id": "MoveToTargetEnv-v0"},
-        "steps": 100,
-        "simulators": [
-            {"name": n, "group": n[:-2], "index": int(n[-1]), "role": role, "control": launchers[n].address}
-            for n, role in ROLES.items()
-        ],
-    }
-    (tmp_path / "training.yaml").write_text(yaml.safe_dump(job))
-    monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "training.yaml"))
-    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
-    yield launchers
-    for launcher in launchers.values():
-        launcher.close()
 
 
 def running(simulators):

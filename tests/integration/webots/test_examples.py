@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples"
 
 
-def carried_out(*program):
+def carried_out(*program, **variables):
     """Return what comes of a Python program, without pod, runner and ROS master."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     return subprocess.run(
@@ -21,7 +21,7 @@ def carried_out(*program):
         text=True,
         timeout=100,
         check=True,
-        env={**environment, "MPLBACKEND": "agg"},
+        env={**environment, "MPLBACKEND": "agg", **variables},
     )
 
 
@@ -43,6 +43,14 @@ def test_the_blocks_of_the_page_about_facades_are_one_script():
     assert "# robotino is paused; step inside `with webots:`" in page
     assert "\nrobotino is paused; step inside `with webots:`\n" in result.stdout
     assert result.stderr == ""
+
+
+def test_the_listings_of_the_paper_run_in_their_order():
+    """The simulator crashes after each 80 steps; the paper restarted it by hand."""
+    result = carried_out(EXAMPLES / "paper.py", PALAESTRA_STUB_FAULTS="crash:step=80")
+
+    assert result.stdout.count("simulator fault") >= 2
+    assert "done: 200 steps, mean return" in result.stdout
 
 
 def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom():

@@ -4,7 +4,9 @@ import gymnasium
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import palaestra_trainer.environments  # noqa: F401 - registers the environment
+import palaestra_trainer.environments
+from palaestra_trainer.errors import Paused, SimulatorDead
+from palaestra_trainer.webots import Webots
 
 NAME = "MoveToTargetEnv-v0"
 WRAPPED = "ignore:.*different from the unwrapped version"
@@ -44,6 +46,58 @@ def test_an_environment_that_sees_starts_mujoco_by_its_name_alone():
 
     assert image.shape == (48, 64, 3)
     assert image.std() > 0
+
+
+@pytest.fixture
+def webots(nothing_configured):
+    """A facade as a notebook creates it, closed with the test."""
+    del nothing_configured
+    made = Webots("robotino", "arena")
+    yield made
+    made.stop()
+    made.close()
+
+
+def test_an_environment_uses_the_facade_that_was_made_before_it(webots):
+    """As in the paper: the facade starts its simulator when the environment is reset; then it is paused."""
+    env = gymnasium.make(NAME)
+
+    first, _ = webots.run(lambda: env.reset(seed=1))
+    with webots:
+        env.step(0)
+    with pytest.raises(Paused):
+        env.step(0)
+    env.close()
+    with gymnasium.make(NAME) as again, webots:  # it runs already
+        assert again.reset(seed=1)[0].tolist() == first.tolist()
+
+
+def test_a_facade_s_simulator_that_breaks_is_mended_where_it_broke(webots):
+    """So that it can be paused after the step, as `run` does."""
+    env = palaestra_trainer.make_env(NAME)
+    webots.run(lambda: env.reset(seed=1))
+    webots.supervisor.quit()
+
+    *_, truncated, info = webots.run(lambda: env.step(0))
+
+    assert truncated
+    assert "was restarted amid an episode" in info["sim_fault"]["fact"]
+    webots.run(lambda: env.reset(seed=1))
+    assert not webots.run(lambda: env.step(0))[3]
+    env.close()
+
+
+def test_an_episode_does_not_go_on_in_a_simulator_that_the_program_restarted(webots):
+    """Its robot would stand elsewhere, with plausible numbers."""
+    env = palaestra_trainer.make_env(NAME)
+    webots.run(lambda: env.reset(seed=1))
+    webots()
+
+    *_, truncated, info = webots.run(lambda: env.step(0))
+
+    assert truncated
+    assert info["sim_fault"]["kind"] == SimulatorDead.kind
+    env.close()
 
 
 @pytest.mark.filterwarnings(WRAPPED)
