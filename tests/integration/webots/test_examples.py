@@ -45,6 +45,15 @@ def test_the_blocks_of_the_page_about_facades_are_one_script():
     assert result.stderr == ""
 
 
+def test_the_blocks_of_the_page_about_environments_are_one_script():
+    """Those of a training loop of one's own."""
+    page = (ROOT / "docs/environments.md").read_text()
+
+    result = carried_out("-c", "\n".join(blocks(page, "python with-a-simulator")))
+
+    assert result.stderr == ""
+
+
 def test_the_listings_of_the_paper_run_in_their_order():
     """The simulator crashes after each 80 steps; the paper restarted it by hand."""
     result = carried_out(EXAMPLES / "paper.py", PALAESTRA_STUB_FAULTS="crash:step=80")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import socket
 import subprocess
@@ -16,7 +17,7 @@ from palaestra_protocol.pod.status import Cause, Termination, TrainerStatus
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer import report
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.run.reporting import Reported
+from palaestra_trainer.run.reporting import Reported, reported
 
 LONG_S = 60
 PROGRAM = """
@@ -153,6 +154,15 @@ def test_steps_of_an_evaluating_environment_are_none_of_training():
     assert (progress.status().step, progress.phase) == (1, "evaluating")
     progress.played(Role.COLLECT, [{}])
     assert (progress.status().step, progress.phase) == (2, "training")
+
+
+def test_a_worker_process_has_a_progress_that_is_not_served(make_configuration, monkeypatch):
+    """The address belongs to the program; many workers would all want it."""
+    monkeypatch.setattr(multiprocessing, "parent_process", multiprocessing.current_process)
+    configuration = make_configuration()
+
+    assert reported(configuration) is not reported(configuration)
+    assert reported(configuration).target == configuration.steps
 
 
 def test_faults_and_restarts_of_a_program_s_simulators_are_in_its_status():
