@@ -37,9 +37,10 @@ def test_an_environment_made_by_its_name_alone_starts_a_simulator_that_ends_with
 
 
 @pytest.mark.usefixtures("nothing_configured")
-def test_an_environment_that_sees_starts_mujoco_by_its_name_alone():
+@pytest.mark.parametrize("make", [gymnasium.make, palaestra_trainer.make_env], ids=["plain", "tolerant"])
+def test_an_environment_that_sees_starts_mujoco_by_its_name_alone(make):
     """The stub renders no images."""
-    env = gymnasium.make("SeeTarget-v0")
+    env = make("SeeTarget-v0")
 
     image, _ = env.reset(seed=1)
     env.close()

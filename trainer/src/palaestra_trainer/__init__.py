@@ -28,7 +28,8 @@ def make_env(environment: str | None = None, *, role: str = "Collect", **options
     `info["sim_fault"]`. The next `reset` waits until the simulator is mended, within its restart budget.
 
     The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
-    none, it is a free one of PALAESTRA_CONFIG. Without that variable, as in a notebook, a stub is started.
+    none, it is a free one of PALAESTRA_CONFIG. Without that variable, as in a notebook, one is started: a
+    stub, or MuJoCo for `SeeTarget-v0`.
 
     Args:
         environment: its id; by default the environment of PALAESTRA_CONFIG.

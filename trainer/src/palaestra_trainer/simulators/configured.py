@@ -62,13 +62,22 @@ def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
         ConfigurationError: the driver is mujoco, which is not installed.
         SimulatorFault: it does not start.
     """
+    require_driver(driver)
+    arena = Arena(world, driver)
+    return Configured(name=arena.webots.robot_name, robot=arena.robot, scene=arena.scene, release=arena.close)
+
+
+def require_driver(driver: str) -> None:
+    """Return if simulators of this driver can be started here.
+
+    Raises:
+        ConfigurationError: the driver is mujoco, which is not installed.
+    """
     if driver == "mujoco" and importlib.util.find_spec("mujoco") is None:
         raise ConfigurationError(
             "simulator: none was given, and the Python package mujoco, which starts one, is not installed; "
             "install palaestra-sim[mujoco]"
         )
-    arena = Arena(world, driver)
-    return Configured(name=arena.webots.robot_name, robot=arena.robot, scene=arena.scene, release=arena.close)
 
 
 def configured_simulator(role: Role) -> Configured:

@@ -12,9 +12,13 @@ from palaestra_trainer.environments.see_target import SeeTargetEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
-# World and driver of the simulator that an environment starts for itself.
 _ARENA = ("arena", "stub")
 _SEEING = ("seeing", "mujoco")
+
+
+def own_world(environment: str) -> tuple[str, str]:
+    """Return world and driver of the simulator that an environment with this id starts for itself."""
+    return _SEEING if environment.rpartition(":")[2] == "SeeTarget-v0" else _ARENA
 
 
 def make(

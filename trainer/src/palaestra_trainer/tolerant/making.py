@@ -1,4 +1,4 @@
-"""The players of tolerant environments: in a facade of the program, in a job, or in stubs of their own."""
+"""The players of tolerant environments: in a facade, in a job, or in simulators of their own."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.run.reporting import Reported, reported
 from palaestra_trainer.simulators.allocation import allocate
+from palaestra_trainer.simulators.configured import require_driver
 from palaestra_trainer.simulators.connect import connect_members, simulator_at
+from palaestra_trainer.simulators.entry_point import own_world
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Member, NullWatcher, Watcher
@@ -36,15 +38,17 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
     """Return the players of one environment, whose simulators are up.
 
     The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
-    none, or more than one is wanted, simulators of PALAESTRA_CONFIG are used. If that is not set, stubs are.
+    none, or more than one is wanted, simulators of PALAESTRA_CONFIG are used. If that is not set, new ones
+    are started: stubs, or MuJoCo for `SeeTarget-v0`.
 
     Args:
         wanted: the environment; None: that of PALAESTRA_CONFIG.
-        number: how many simulators; None: that of the facade, or all of the role, or one stub.
+        number: how many simulators; None: that of the facade, or all of the role, or one.
         role: the role of the simulators in PALAESTRA_CONFIG.
 
     Raises:
-        ConfigurationError: the environment is missing or wrong, or too few simulators with the role are free.
+        ConfigurationError: the environment is missing or wrong, too few simulators with the role are free, or
+            MuJoCo is not installed.
         FaultBudgetSpent: a simulator did not start.
         MasterLost: no ROS master answers.
     """
@@ -61,7 +65,7 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
         return _in_facade(place, environment)
     if configuration is not None:
         return _in_job(configuration.model_copy(update={"environment": environment}), number, role)
-    return _in_stubs(environment, number or 1)
+    return _in_own(environment, number or 1)
 
 
 def _in_facade(place: Offered, environment: Environment) -> Players:
@@ -93,10 +97,17 @@ def _in_job(configuration: Configuration, number: int | None, role: Role) -> Pla
         )
 
 
-def _in_stubs(environment: Environment, number: int) -> Players:
+def _in_own(environment: Environment, number: int) -> Players:
+    world, driver = own_world(environment.id)
+    require_driver(driver)
     entries = tuple(
         SimulatorConfiguration(
-            name=f"collect-{index}", group="collect", index=index, role=Role.COLLECT, world="arena"
+            name=f"collect-{index}",
+            group="collect",
+            index=index,
+            role=Role.COLLECT,
+            driver=driver,
+            world=world,
         )
         for index in range(number)
     )
@@ -105,7 +116,7 @@ def _in_stubs(environment: Environment, number: int) -> Players:
         members = []
         for entry in entries:
             # A stub leaves six such digits out of the seed of its faults, so that they repeat.
-            launcher = ProcessLauncher(entry.world, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
+            launcher = ProcessLauncher(world, driver, suffix=f"_{entry.index}_{uuid4().hex[:6]}")
             stack.callback(launcher.close)
             members.append(simulator_at(launcher, configuration, entry))
         return Players(_started(stack, configuration, members, NullWatcher()), stack.pop_all().close)
