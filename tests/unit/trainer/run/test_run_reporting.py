@@ -144,14 +144,16 @@ def test_steps_of_tolerant_environments_count_until_the_program_reports():
     assert progress.status().step == 50
 
 
-def test_steps_of_an_evaluating_environment_are_none_of_training():
+def test_steps_of_an_evaluating_environment_are_none_of_training(clock):
     """The operator must not take an evaluation for training that stands still, either."""
-    progress = Reported(100, [])
+    progress = Reported(100, [], clock)
     progress.played(Role.COLLECT, [{}])
 
     progress.played(Role.EVALUATE, [{}])
 
     assert (progress.status().step, progress.phase) == (1, "evaluating")
+    clock.now += 61.0
+    assert progress.phase == "training"  # one that hangs is found as any other
     progress.played(Role.COLLECT, [{}])
     assert (progress.status().step, progress.phase) == (2, "training")
 

@@ -24,6 +24,7 @@ from palaestra_trainer.telemetry.progress import Counters, Progress
 from palaestra_trainer.telemetry.status_server import status_server
 
 _lock = threading.Lock()
+_EVALUATING_S = 60.0  # no step of an environment takes longer
 
 
 class Reported(Progress):
@@ -37,8 +38,11 @@ class Reported(Progress):
 
     @property
     def phase(self) -> str:
-        """Training, or evaluating if an evaluating environment has stepped last."""
-        return "evaluating" if self._evaluates else "training"
+        """Training, or evaluating if the last step was of an evaluating environment and is not long ago.
+
+        The operator takes no evaluation for training that stands still.
+        """
+        return "evaluating" if self._evaluates and self.idle_s() < _EVALUATING_S else "training"
 
     def spending(self, cause: Cause) -> AbstractContextManager[None]:
         """Ignore it: any thread of the program may wait for simulators."""

@@ -75,7 +75,7 @@ def _in_facade(place: Offered, environment: Environment) -> Players:
         place.release()
         raise
     # The program may pause the simulator after any step, so none may end amid a restart.
-    return Players([keeper], place.release, mend_at_once=True)
+    return Players([keeper], keeper.stop, mend_at_once=True)
 
 
 def _in_job(configuration: Configuration, number: int | None, role: Role) -> Players:
