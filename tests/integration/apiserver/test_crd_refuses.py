@@ -127,7 +127,7 @@ WRONG = [
     ("spec.trainer.steps", 0, "spec.trainer.steps"),
     ("spec.trainer.environment.id", "MoveToTarget", "spec.trainer.environment.id"),
     ("spec.trainer.environment.reward", "Medium", "spec.trainer.environment.reward: Unsupported value"),
-    ("spec.trainer.algorithm.name", "DDPG", "spec.trainer.algorithm.name: Unsupported value"),
+    ("spec.trainer.algorithm.name", "DDQN", "spec.trainer.algorithm.name"),
     ("spec.trainer.evaluation", {"stopAtSuccessRate": 0}, "stopAtSuccessRate"),
     (
         "spec.trainer.evaluation",

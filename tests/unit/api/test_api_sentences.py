@@ -15,9 +15,12 @@ SENTENCES = [
      'spec.simulators[0].driver: "gazebo" is not a driver; use stub, mujoco, webots or command'),
     ({"simulators.0.world": {"builtin": "maze"}},
      'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena or seeing'),
-    ({"trainer.algorithm.name": "TD3"},
-     ('spec.trainer.algorithm.name: "TD3" is not an algorithm; '
-     "use DQN, PPO, A2C, SAC or REINFORCE")),
+    ({"trainer.algorithm.name": "TD4"},
+     ('spec.trainer.algorithm.name: "TD4" is not an algorithm; '
+     "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, REINFORCE or module:Class")),
+    ({"trainer.algorithm.policy": "my policy"},
+     ('spec.trainer.algorithm.policy: "my policy" is not a policy; '
+     "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class")),
     ({"trainer.algorithm.cnn": "large"},
      'spec.trainer.algorithm.cnn: "large" is not a cnn; use small'),
     ({"trainer.environment.reward": "dense"},

@@ -89,16 +89,18 @@ class Algorithm(_Section):
     """The learning algorithm.
 
     Attributes:
-        name: a name in the table of algorithms.
+        name: a name in the table of algorithms, or `module:Class`.
         hyperparameters: values that differ from that table's defaults.
         normalize: which values are normalized; None: none.
         cnn: the convolutional network for images; None: Stable-Baselines3's NatureCNN.
+        policy: a policy of the algorithm, or `module:Class`; None: the one for the observation.
     """
 
     name: str = "DQN"
     hyperparameters: dict[str, Any] = Field(default_factory=dict)
     normalize: Normalize | None = None
     cnn: Cnn | None = None
+    policy: str | None = None
 
 
 class Evaluation(_Section):

@@ -10,13 +10,12 @@ from palaestra.api.scheduling import Scheduling
 from palaestra.api.simulators import Driver, SimulatorGroup, World
 from palaestra.api.status import Status
 from palaestra.api.storage import Storage
-from palaestra.api.trainer import AlgorithmName, Reward, Trainer
+from palaestra.api.trainer import Reward, Trainer
 from palaestra_protocol.pod.terms import Role
 
 __all__ = [
     "API_VERSION",
     "KIND",
-    "AlgorithmName",
     "Driver",
     "Metadata",
     "Reward",

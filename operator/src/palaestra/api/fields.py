@@ -36,6 +36,23 @@ QUANTITY = "^[0-9]+([.][0-9]+)?(m|k|M|G|T|P|Ki|Mi|Gi|Ti|Pi)?$"
 MEMORY = "^[1-9][0-9]*(M|G|T|Mi|Gi|Ti)$"
 FOLDER = "^[A-Za-z0-9][-A-Za-z0-9._]*$"
 WORLD_FILE = "^/.+[.](wbt|xml)$"
+ALGORITHMS = (
+    "DQN",
+    "PPO",
+    "A2C",
+    "SAC",
+    "TD3",
+    "DDPG",
+    "QRDQN",
+    "TQC",
+    "TRPO",
+    "CrossQ",
+    "RecurrentPPO",
+    "REINFORCE",
+)
+CLASS = "[A-Za-z_][A-Za-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*"
+ALGORITHM = f"^({'|'.join(ALGORITHMS)}|{CLASS})$"
+POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
 # The message for a value that does not match: <value> is not <first text>; <second text>
@@ -52,6 +69,8 @@ PATTERNS: dict[str, tuple[str, str]] = {
     LABEL_VALUE: ("the value of a label", "use letters, digits, '-', '_' and '.'"),
     FOLDER: ("the name of a folder", "use letters, digits, '-', '_' and '.', no '/'"),
     WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt or .xml file"),
+    ALGORITHM: ("an algorithm", f"use {', '.join(ALGORITHMS)} or module:Class"),
+    POLICY: ("a policy", "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class"),
     ENVIRONMENT_ID: (
         "the id of an environment",
         "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from palaestra.api.container import Environment, Resources
-from palaestra.api.fields import ENVIRONMENT_ID, Count, FreeObject, Image, Words
+from palaestra.api.fields import ALGORITHM, ENVIRONMENT_ID, POLICY, Count, FreeObject, Image, Words
 from palaestra.api.model import ApiModel, Rule
 
 OWN_TASKS = frozenset({"MoveToTargetEnv-v0", "SeeTarget-v0"})
@@ -17,16 +17,6 @@ class Reward(StrEnum):
 
     DENSE = "Dense"
     SPARSE = "Sparse"
-
-
-class AlgorithmName(StrEnum):
-    """The algorithms that the trainer implements."""
-
-    DQN = "DQN"
-    PPO = "PPO"
-    A2C = "A2C"
-    SAC = "SAC"
-    REINFORCE = "REINFORCE"
 
 
 class Cnn(StrEnum):
@@ -102,9 +92,10 @@ class Normalize(ApiModel):
 class Algorithm(ApiModel):
     """The learning algorithm."""
 
-    name: AlgorithmName = Field(default=AlgorithmName.DQN, strict=False)
-    """DQN, PPO, A2C and SAC are from Stable-Baselines3; REINFORCE is Palaestra's. DQN needs discrete
-    actions; SAC needs continuous actions."""
+    name: Annotated[str, Field(min_length=1, max_length=256, pattern=ALGORITHM)] = "DQN"
+    """DQN, PPO, A2C, SAC, TD3 and DDPG are from Stable-Baselines3, QRDQN, TQC, TRPO, CrossQ and RecurrentPPO
+    from sb3-contrib; REINFORCE is Palaestra's. `module:Class` is a class that is compatible with
+    Stable-Baselines3. docs/algorithms.md has the observations and actions that each takes."""
 
     hyperparameters: FreeObject = Field(default={})
     """Keyword arguments of the algorithm's class, spelled as in Python (`learning_rate`, not
@@ -116,6 +107,10 @@ class Algorithm(ApiModel):
     cnn: Cnn | None = Field(default=None, strict=False)
     """Convolutional network for observations that are images. `small`: 16 and 32 channels and 128 units,
     which trains about twice as fast; absent: Stable-Baselines3's NatureCNN."""
+
+    policy: Annotated[str, Field(min_length=1, max_length=256, pattern=POLICY)] | None = None
+    """Policy of the algorithm, such as MlpPolicy, or `module:Class`; absent: the one that fits the
+    observation."""
 
 
 class Evaluation(ApiModel):
@@ -171,6 +166,16 @@ def _actions(trainer: "Trainer") -> str | None:
 _ACTIONS = ("environment", "id", "options", "actions", "algorithm", "name")
 
 
+def _needs(algorithm: str, actions: str, others: str) -> Rule:
+    """Return the rule that an algorithm takes one kind of actions of a task of Palaestra's."""
+    return Rule(
+        field="algorithm.name",
+        holds=lambda trainer: trainer.algorithm.name != algorithm or _actions(trainer) != others,
+        reads=_ACTIONS,
+        message=f"{algorithm} needs {actions} actions; set environment.options.actions: {actions}",
+    )
+
+
 class Trainer(ApiModel):
     """The task, the algorithm and the length of training."""
 
@@ -206,20 +211,6 @@ class Trainer(ApiModel):
     `amd.com/gpu`) and the image's PyTorch finds it, the built-in loop trains on it; otherwise on the CPU."""
 
     rules = (
-        Rule(
-            field="algorithm.name",
-            holds=lambda trainer: (
-                trainer.algorithm.name is not AlgorithmName.SAC or _actions(trainer) != "discrete"
-            ),
-            reads=_ACTIONS,
-            message="SAC needs continuous actions; set environment.options.actions: continuous",
-        ),
-        Rule(
-            field="algorithm.name",
-            holds=lambda trainer: (
-                trainer.algorithm.name is not AlgorithmName.DQN or _actions(trainer) != "continuous"
-            ),
-            reads=_ACTIONS,
-            message="DQN needs discrete actions; set environment.options.actions: discrete",
-        ),
+        *(_needs(name, "continuous", "discrete") for name in ("SAC", "TD3", "DDPG", "TQC", "CrossQ")),
+        *(_needs(name, "discrete", "continuous") for name in ("DQN", "QRDQN")),
     )

@@ -13,8 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3.common.buffers import ReplayBuffer, RolloutBuffer
-from stable_baselines3.common.type_aliases import RolloutBufferSamples
+from stable_baselines3.common.buffers import (
+    DictReplayBuffer,
+    DictRolloutBuffer,
+    ReplayBuffer,
+    RolloutBuffer,
+)
+
+from palaestra_trainer.algorithms.observations import by_name, part
 
 
 def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
@@ -79,8 +85,8 @@ class ValidReplayBuffer(ReplayBuffer):
 
     def add(
         self,
-        obs: np.ndarray,
-        next_obs: np.ndarray,
+        obs: Any,
+        next_obs: Any,
         action: np.ndarray,
         reward: np.ndarray,
         done: np.ndarray,
@@ -94,13 +100,13 @@ class ValidReplayBuffer(ReplayBuffer):
                 self._newest = [None if newest == self.pos else newest for newest in self._newest]
                 self._newest[row] = self.pos
                 self.changed.add(self.pos // self.chunk_rows)
-                super().add(obs[one], next_obs[one], action[one], reward[one], done[one], [info])
+                super().add(part(obs, one), part(next_obs, one), action[one], reward[one], done[one], [info])
             else:
                 self._truncate(self._newest[row])
 
     def rows(self, start: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
         """Return the rows from `start` to `stop` by column, as they are in memory: views, (rows, 1, ...)."""
-        return {name: getattr(self, name)[start:stop] for name in COLUMNS}
+        return {name: column[start:stop] for name, column in self._columns().items()}
 
     def fill(self, start: int, rows: Mapping[str, np.ndarray]) -> None:
         """Write rows that `rows` returned back to their place; the write positions do not change.
@@ -108,8 +114,8 @@ class ValidReplayBuffer(ReplayBuffer):
         Raises:
             ValueError: they have another shape.
         """
-        for name in COLUMNS:
-            getattr(self, name)[start : start + len(rows[name])] = rows[name]
+        for name, column in self._columns().items():
+            column[start : start + len(rows[name])] = rows[name]
 
     def keep(self, kept: np.ndarray) -> None:
         """Drop every row in use but the `kept` ones, which move to the start, oldest first."""
@@ -120,11 +126,22 @@ class ValidReplayBuffer(ReplayBuffer):
         self._newest = [None] * len(self._newest)
         self.changed = set(range(-(-self.size() // self.chunk_rows)))
 
+    def _columns(self) -> dict[str, np.ndarray]:
+        """Return the whole columns by name, in the order of `COLUMNS`; a Dict has a column for each key."""
+        columns: dict[str, np.ndarray] = {}
+        for name in COLUMNS:
+            columns |= by_name(getattr(self, name), name)
+        return columns
+
     def _truncate(self, position: int | None) -> None:
         if position is not None and not self.dones[position]:
             self.dones[position] = 1.0
             self.timeouts[position] = 1.0
             self.changed.add(position // self.chunk_rows)
+
+
+class ValidDictReplayBuffer(ValidReplayBuffer, DictReplayBuffer):
+    """The same for observations that are a Dict."""
 
 
 class ValidRolloutBuffer(RolloutBuffer):
@@ -151,7 +168,7 @@ class ValidRolloutBuffer(RolloutBuffer):
         self.rewards[~self.valid] = self.values[~self.valid]
         super().compute_returns_and_advantage(last_values, dones)
 
-    def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
+    def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
         """Yield minibatches of valid rows in random order; the last one may be smaller."""
         if not self.generator_ready:
             next(super().get(1))  # flattens the rows of all members into one column
@@ -159,3 +176,7 @@ class ValidRolloutBuffer(RolloutBuffer):
         size = batch_size or max(len(rows), 1)
         for start in range(0, len(rows), size):
             yield self._get_samples(rows[start : start + size])
+
+
+class ValidDictRolloutBuffer(ValidRolloutBuffer, DictRolloutBuffer):
+    """The same for observations that are a Dict."""

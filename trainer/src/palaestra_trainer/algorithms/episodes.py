@@ -7,18 +7,20 @@ from typing import Any
 
 import numpy as np
 
+from palaestra_trainer.algorithms.observations import Observations, part, stacked
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
     """The steps of some whole episodes, one after the other.
 
     Attributes:
-        observations: the observation before each step, shape (steps, *observation).
+        observations: the observation before each step, shape (steps, *observation); of a Dict, by key.
         actions: the action of each step, before it is clipped to its bounds; shape (steps, *action).
         returns: discounted reward from each step to its episode's end, shape (steps,), float32.
     """
 
-    observations: np.ndarray
+    observations: Observations
     actions: np.ndarray
     returns: np.ndarray
 
@@ -65,7 +67,7 @@ class EpisodeRecorder:
                 self._current[index] = _Episode()
             if self._away[index] or len(whole) == self._wanted:
                 continue
-            episode.observations.append(observations[index])
+            episode.observations.append(part(observations, index))
             episode.actions.append(actions[index])
             episode.rewards.append(float(rewards[index]))
             if dones[index]:
@@ -77,7 +79,7 @@ class EpisodeRecorder:
         episodes = [episode for whole in self._whole for episode in whole]
         steps = [returns_to_go(episode.rewards, gamma) for episode in episodes]
         return Batch(
-            observations=np.array([seen for episode in episodes for seen in episode.observations]),
+            observations=stacked([seen for episode in episodes for seen in episode.observations]),
             actions=np.array([done for episode in episodes for done in episode.actions]),
             returns=np.concatenate(steps) if steps else np.zeros(0, dtype=np.float32),
         )

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 
-from palaestra_trainer.algorithms.table import ALGORITHMS, resolve, with_defaults
+from palaestra_trainer.algorithms.entries import entry_of
+from palaestra_trainer.algorithms.table import resolve, with_defaults
 from palaestra_trainer.configuration import Algorithm, Configuration
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory, replace_file
@@ -41,7 +42,7 @@ def begun_with(configuration: Configuration, directory: RunDirectory) -> Algorit
         ConfigurationError: the file in the run directory cannot be read.
     """
     algorithm = configuration.algorithm
-    before = {**ALGORITHMS[algorithm.name].arena, "policy": "MlpPolicy"}
+    before = {**entry_of(algorithm.name).arena, "policy": "MlpPolicy"}
     return _kept(configuration, directory) or with_defaults(algorithm, before)
 
 

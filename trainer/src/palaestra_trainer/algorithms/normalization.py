@@ -1,16 +1,17 @@
 """Normalize observations and rewards: Stable-Baselines3's VecNormalize, with statistics of valid rows only.
 
 Observations are shifted and scaled by their running mean and deviation, rewards scaled by the deviation of
-the discounted return. Rows that a fault spoiled enter neither a statistic nor a loss. The statistics are
-part of a policy, which cannot be used without them, so they are kept in the file of the model. The reasons
-are in docs/decisions/0010-normalize.md.
+the discounted return. In a Dict, each Box of numbers has statistics of its own. Images and discrete values
+are not normalized. Rows that a fault spoiled enter neither a statistic nor a loss. The statistics are part of a
+policy, which cannot be used without them, so they are kept in the file of the model. The reasons are
+in docs/decisions/0010-normalize.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -19,6 +20,8 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from palaestra_trainer.algorithms.buffers import valid_rows
+from palaestra_trainer.algorithms.fitting import scalable
+from palaestra_trainer.algorithms.observations import Observations, by_name, part
 from palaestra_trainer.configuration import Normalize
 
 
@@ -70,12 +73,13 @@ class ValidNormalize(VecNormalize):
     """
 
     venv: VecEnv
-    obs_rms: RunningMeanStd  # type: ignore[assignment]  # observations are one Box: make_model refuses others
 
     def __init__(self, venv: VecEnv, wanted: Normalize, gamma: float) -> None:
+        keys = scalable(venv.observation_space) if wanted.observations else None
         super().__init__(
             venv,
             norm_obs=wanted.observations,
+            norm_obs_keys=keys if isinstance(keys, list) else None,
             norm_reward=wanted.rewards,
             clip_obs=wanted.clip_observations,
             clip_reward=wanted.clip_rewards,
@@ -92,36 +96,36 @@ class ValidNormalize(VecNormalize):
         for name, running in self._running().items():
             scales[name].put_back(running)
 
-    def reset(self) -> np.ndarray:
+    def reset(self) -> Any:
         """Return the first observations of new episodes, normalized."""
-        observations = np.asarray(self.venv.reset())
+        observations = cast("Observations", self.venv.reset())
         self.old_obs = observations
         self.returns = np.zeros(self.num_envs)
-        self._see(observations[valid_rows(self.unwrapped.reset_infos)])
-        return self._normalized(observations)
+        self._see(part(observations, valid_rows(self.unwrapped.reset_infos)))
+        return self.normalize_obs(observations)
 
     def step_wait(self) -> VecEnvStepReturn:
         """Return a step's rows, normalized by statistics that already include its valid rows."""
         rows, rewards, dones, infos = self.venv.step_wait()
-        observations, valid = np.asarray(rows), valid_rows(infos)
+        observations, valid = cast("Observations", rows), valid_rows(infos)
         self.old_obs, self.old_reward = observations, rewards
         # If no episode could begin, the observation is still the last one of the previous episode.
         blind = dones & ~valid_rows(self.unwrapped.reset_infos)
-        self._see(observations[valid & ~blind])
+        self._see(part(observations, valid & ~blind))
         self._earn(rewards, valid)
         self.returns = np.where(dones, 0.0, self.returns)
         for info in infos:
             if "terminal_observation" in info:
-                info["terminal_observation"] = self._normalized(info["terminal_observation"])
-        return self._normalized(observations), self.normalize_reward(rewards), dones, infos
+                info["terminal_observation"] = self.normalize_obs(info["terminal_observation"])
+        return self.normalize_obs(observations), self.normalize_reward(rewards), dones, infos
 
-    def go_on(self, observations: np.ndarray, returns: np.ndarray) -> np.ndarray:
+    def go_on(self, observations: Observations, returns: np.ndarray) -> Any:
         """Restore the position at which `observations` were the last ones; return them normalized.
 
         `returns` are the discounted rewards of the episodes until then, one per member.
         """
         self.old_obs, self.returns = observations, returns
-        return self._normalized(observations)
+        return self.normalize_obs(observations)
 
     def to_json(self) -> dict[str, Any]:
         """Return the statistics that a policy and further training need, as JSON data."""
@@ -145,24 +149,26 @@ class ValidNormalize(VecNormalize):
         self.scales = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in there}
 
     def _running(self) -> dict[str, RunningMeanStd]:
-        observations = {"observations": self.obs_rms} if self.norm_obs else {}
+        """Return the statistics by name: rewards, and observations or each key of them."""
+        observations = self._seen() if self.norm_obs else {}
         return observations | ({"rewards": self.ret_rms} if self.norm_reward else {})
 
-    def _clips(self) -> dict[str, float]:
-        clips = {"observations": self.clip_obs, "rewards": self.clip_reward}
-        return {name: clips[name] for name in self._running()}
+    def _seen(self) -> dict[str, RunningMeanStd]:
+        return cast("dict[str, RunningMeanStd]", by_name(self.obs_rms, "observations"))
 
-    def _see(self, observations: np.ndarray) -> None:
-        if self.norm_obs and len(observations):
-            self.obs_rms.update(observations)
+    def _clips(self) -> dict[str, float]:
+        return {name: self.clip_reward if name == "rewards" else self.clip_obs for name in self._running()}
+
+    def _see(self, observations: Observations) -> None:
+        seen = by_name(observations, "observations")
+        for name, running in self._seen().items() if self.norm_obs else ():
+            if len(seen[name]):
+                running.update(seen[name])
 
     def _earn(self, rewards: np.ndarray, valid: np.ndarray) -> None:
         self.returns = self.returns * self.gamma + rewards
         if self.norm_reward and valid.any():
             self.ret_rms.update(self.returns[valid])
-
-    def _normalized(self, observations: np.ndarray) -> np.ndarray:
-        return np.asarray(self.normalize_obs(observations))
 
 
 class Normalized:

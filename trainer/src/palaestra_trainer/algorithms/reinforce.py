@@ -16,7 +16,12 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.policies import ActorCriticCnnPolicy, ActorCriticPolicy, BasePolicy
+from stable_baselines3.common.policies import (
+    ActorCriticCnnPolicy,
+    ActorCriticPolicy,
+    BasePolicy,
+    MultiInputActorCriticPolicy,
+)
 from stable_baselines3.common.type_aliases import GymEnv, MaybeCallback, Schedule
 from stable_baselines3.common.utils import obs_as_tensor, safe_mean
 
@@ -36,7 +41,7 @@ class REINFORCE(BaseAlgorithm):
     ended: its return is the sum until then.
 
     Args:
-        policy: "MlpPolicy", "CnnPolicy" or a class; an actor-critic one, whose value
+        policy: "MlpPolicy", "CnnPolicy", "MultiInputPolicy" or a class; an actor-critic one, whose value
             network is trained only if it is the baseline.
         env: environment or VecEnv to learn in.
         learning_rate: of Adam, or a function of the remaining progress (1 to 0).
@@ -60,6 +65,7 @@ class REINFORCE(BaseAlgorithm):
     policy_aliases: ClassVar[dict[str, type[BasePolicy]]] = {
         "MlpPolicy": ActorCriticPolicy,
         "CnnPolicy": ActorCriticCnnPolicy,
+        "MultiInputPolicy": MultiInputActorCriticPolicy,
     }
 
     def __init__(  # noqa: PLR0913, PLR0917 - one argument a hyperparameter, as in Stable-Baselines3
@@ -93,7 +99,12 @@ class REINFORCE(BaseAlgorithm):
             device=device,
             support_multi_env=True,
             seed=seed,
-            supported_action_spaces=(spaces.Box, spaces.Discrete),
+            supported_action_spaces=(
+                spaces.Box,
+                spaces.Discrete,
+                spaces.MultiDiscrete,
+                spaces.MultiBinary,
+            ),
         )
         if baseline not in ("value", "none"):
             raise ValueError(f'baseline: {baseline!r} is unknown; use "value" or "none"')
@@ -205,7 +216,7 @@ class REINFORCE(BaseAlgorithm):
         self.logger.dump(step=self.num_timesteps)
 
     def _loss(self, batch: Batch) -> torch.Tensor:
-        observations = torch.as_tensor(batch.observations, device=self.device)
+        observations = obs_as_tensor(batch.observations, self.device)
         actions = torch.as_tensor(batch.actions, device=self.device)
         returns = torch.as_tensor(batch.returns, device=self.device)
         values, log_prob, entropy = self.policy.evaluate_actions(observations, actions)

@@ -1,26 +1,50 @@
-"""Stable-Baselines3's algorithms, which count and learn from valid rows only.
+"""Algorithms that are compatible with Stable-Baselines3, made to count and learn from valid rows only.
 
 Two mixins do this by overriding methods that Stable-Baselines3 calls between a
-step and its storage; no code is copied. A saved model does not contain the names
-of the buffers, so plain Stable-Baselines3 can load it.
+step and its storage; no code is copied. `with_valid_rows` adds one of them to a
+class. A saved model contains neither that class nor the names of the buffers, so
+the original class can load it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, cast
 
 import numpy as np
-import stable_baselines3 as sb3
+from gymnasium import spaces
+from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer, RecurrentRolloutBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.buffers import DictRolloutBuffer, RolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.type_aliases import RolloutReturn, TrainFreq, TrainFrequencyUnit
 from stable_baselines3.common.utils import explained_variance
 
-from palaestra_trainer.algorithms.buffers import ValidReplayBuffer, ValidRolloutBuffer, valid_rows
+from palaestra_trainer.algorithms.buffers import (
+    ValidDictReplayBuffer,
+    ValidDictRolloutBuffer,
+    ValidReplayBuffer,
+    ValidRolloutBuffer,
+    valid_rows,
+)
+from palaestra_trainer.algorithms.recurrent import (
+    ValidRecurrentDictRolloutBuffer,
+    ValidRecurrentRolloutBuffer,
+)
+from palaestra_trainer.algorithms.reinforce import REINFORCE
+from palaestra_trainer.errors import ConfigurationError
 
+# Rollout buffers and what takes their place; a buffer of another class may need rows that these do not take.
+_MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
+    RolloutBuffer: ValidRolloutBuffer,
+    DictRolloutBuffer: ValidDictRolloutBuffer,
+    RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
+    RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
+}
 _BUFFERS = ("replay_buffer_class", "rollout_buffer_class")
 
 
@@ -37,11 +61,18 @@ class ValidRowsCounted(BaseAlgorithm):
 
 
 class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
-    """An off-policy algorithm that stores valid rows, and ends at its number of steps."""
+    """An off-policy algorithm that stores valid rows, and ends at its number of steps.
+
+    Raises:
+        TypeError: it creates its own kind of replay buffer, in which invalid rows would be stored.
+    """
 
     def _setup_model(self) -> None:
-        self.replay_buffer_class = ValidReplayBuffer
+        as_dict = isinstance(self.observation_space, spaces.Dict)
+        self.replay_buffer_class = ValidDictReplayBuffer if as_dict else ValidReplayBuffer
         super()._setup_model()
+        if not isinstance(self.replay_buffer, ValidReplayBuffer):
+            raise _creates_its_own(self, self.replay_buffer)
 
     def collect_rollouts(
         self, env: Any, callback: BaseCallback, train_freq: TrainFreq, *args: Any, **kwargs: Any
@@ -66,17 +97,25 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
     """
 
     def _masked(self) -> ValidRolloutBuffer:
-        if not isinstance(self.rollout_buffer, ValidRolloutBuffer):
-            raise TypeError(
-                f"{type(self).__name__}: creates a {type(self.rollout_buffer).__name__}, which learns from "
-                "rows that a fault spoiled; use an algorithm that takes rollout_buffer_class"
-            )
-        return self.rollout_buffer
+        return cast("ValidRolloutBuffer", self.rollout_buffer)  # set in _setup_model
 
     def _setup_model(self) -> None:
-        self.rollout_buffer_class = ValidRolloutBuffer
         super()._setup_model()
-        self._masked()  # raises at once, not at the first fault
+        theirs = self.rollout_buffer
+        masked = _MASKED.get(type(theirs))
+        if masked is None:
+            raise _creates_its_own(self, theirs)
+        sequences = {name: getattr(theirs, name) for name in ("hidden_state_shape",) if hasattr(theirs, name)}
+        self.rollout_buffer = masked(
+            theirs.buffer_size,
+            self.observation_space,
+            self.action_space,
+            device=self.device,
+            gae_lambda=theirs.gae_lambda,
+            gamma=theirs.gamma,
+            n_envs=theirs.n_envs,
+            **sequences,
+        )
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: np.ndarray | None = None) -> None:
         super()._update_info_buffer(infos, dones)
@@ -96,17 +135,29 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
         self.logger.record("train/explained_variance", explained)
 
 
-class DQN(OffPolicyRows, sb3.DQN):
-    """Deep Q-learning, for discrete actions."""
+@cache
+def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
+    """Return a subclass of `cls`, with its name, that counts and learns from valid rows only.
+
+    Raises:
+        ConfigurationError: `cls` is neither an on-policy nor an off-policy algorithm of Stable-Baselines3.
+    """
+    if issubclass(cls, REINFORCE):
+        return cls
+    if issubclass(cls, OffPolicyAlgorithm):
+        rows: type[BaseAlgorithm] = OffPolicyRows
+    elif issubclass(cls, OnPolicyAlgorithm):
+        rows = OnPolicyRows
+    else:
+        raise ConfigurationError(
+            f"algorithm.name: {cls.__name__} is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so "
+            "rows that a fault spoiled would reach its losses; use a class that is one of them"
+        )
+    return type(cls.__name__, (rows, cls), {"__doc__": cls.__doc__, "__module__": cls.__module__})
 
 
-class SAC(OffPolicyRows, sb3.SAC):
-    """Soft actor-critic, for continuous actions."""
-
-
-class PPO(OnPolicyRows, sb3.PPO):
-    """Proximal policy optimization, for discrete and continuous actions."""
-
-
-class A2C(OnPolicyRows, sb3.A2C):
-    """Advantage actor-critic, for discrete and continuous actions."""
+def _creates_its_own(model: BaseAlgorithm, buffer: Any) -> TypeError:
+    return TypeError(
+        f"{type(model).__name__} creates its own {type(buffer).__name__}, which learns from rows that "
+        "a fault spoiled; use an algorithm with a buffer of Stable-Baselines3"
+    )

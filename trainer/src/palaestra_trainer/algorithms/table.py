@@ -1,119 +1,26 @@
-"""The algorithms by name, their defaults, and what they refuse.
+"""Checking what a job says of its algorithm, and making the model.
 
-The defaults are those of the class, so Stable-Baselines3's. Only the arena's
-environments have some of their own, which were found by trying. Whatever a
-TrainingJob sets takes their place, one by one. Hyperparameters are keyword
-arguments of the class and are checked against its signature, names and values,
-so a mistake is found before a simulator is started.
+Hyperparameters are keyword arguments of the class and are checked against its signature, names and values,
+so a mistake is found before a simulator is started. Whatever a TrainingJob sets takes the place of a default,
+one by one.
 """
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
-from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.algorithms import values
+from palaestra_trainer.algorithms import noise, values
 from palaestra_trainer.algorithms.device import usable
-from palaestra_trainer.algorithms.images import policy_for, with_channels_first, with_network
+from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
+from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
+from palaestra_trainer.algorithms.images import with_channels_first, with_network
 from palaestra_trainer.algorithms.normalization import ValidNormalize
-from palaestra_trainer.algorithms.reinforce import REINFORCE
-from palaestra_trainer.algorithms.rows import A2C, DQN, PPO, SAC
 from palaestra_trainer.configuration import Algorithm, Device, nearest
 from palaestra_trainer.errors import ConfigurationError
-
-# Arguments of the classes that the training loop itself gives, or that valid-row buffers
-# cannot honour: they store rows of several members in one line.
-OURS = frozenset(
-    {
-        "self", "policy", "env", "seed", "device", "verbose", "tensorboard_log", "_init_setup_model",
-        "replay_buffer_class", "replay_buffer_kwargs", "optimize_memory_usage",
-        "rollout_buffer_class", "rollout_buffer_kwargs", "action_noise",
-    }
-)  # fmt: skip
-
-
-ARENA_ENVIRONMENTS = frozenset({"MoveToTargetEnv-v0"})
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
-    """One algorithm.
-
-    Attributes:
-        cls: its class.
-        arena: hyperparameters that suit the arena's environments better than the defaults of the class.
-    """
-
-    cls: type[BaseAlgorithm]
-    arena: Mapping[str, Any]
-
-    @property
-    def defaults(self) -> dict[str, Any]:
-        """The defaults of the class, which are Stable-Baselines3's."""
-        parameters = inspect.signature(self.cls.__init__).parameters
-        return {name: parameter.default for name, parameter in parameters.items() if name not in OURS}
-
-
-def _entry(cls: type[BaseAlgorithm], **arena: Any) -> Entry:
-    return Entry(cls=cls, arena=MappingProxyType(arena))
-
-
-ALGORITHMS: Mapping[str, Entry] = MappingProxyType(
-    {
-        # Soft target updates at every step and as many gradient steps as environment steps:
-        # hard updates ended 10 points lower on the same 50,000 steps.
-        "DQN": _entry(
-            DQN,
-            learning_rate="lin_5e-4",
-            buffer_size=100_000,
-            learning_starts=1_000,
-            batch_size=128,
-            tau=0.005,
-            gamma=0.93,
-            train_freq=4,
-            gradient_steps=4,
-            target_update_interval=1,
-            exploration_fraction=0.1,
-            exploration_final_eps=0.05,
-            policy_kwargs={"net_arch": [256, 256]},
-        ),
-        "SAC": _entry(
-            SAC,
-            learning_rate=5e-4,
-            buffer_size=100_000,
-            learning_starts=1_000,
-            batch_size=128,
-            gamma=0.97,
-            train_freq=4,
-            gradient_steps=4,
-            policy_kwargs={"net_arch": [256, 256]},
-        ),
-        "PPO": _entry(
-            PPO,
-            learning_rate=5e-4,
-            n_steps=512,
-            batch_size=128,
-            gamma=0.97,
-            ent_coef=0.005,
-            policy_kwargs={"net_arch": [128, 128]},
-        ),
-        "A2C": _entry(A2C, gamma=0.97, ent_coef=0.005, policy_kwargs={"net_arch": [128, 128]}),
-        "REINFORCE": _entry(
-            REINFORCE,
-            learning_rate=2e-3,
-            gamma=0.97,
-            ent_coef=0.005,
-            policy_kwargs={"net_arch": [128, 128]},
-        ),
-    }
-)
 
 
 def check(algorithm: Algorithm) -> Entry:
@@ -122,20 +29,19 @@ def check(algorithm: Algorithm) -> Entry:
     Raises:
         ConfigurationError: one line for each unknown name, with the nearest known one, and each wrong value.
     """
-    entry = ALGORITHMS.get(algorithm.name)
-    if entry is None:
-        raise ConfigurationError(
-            f"algorithm.name: {algorithm.name} is not an algorithm; "
-            f"{nearest(algorithm.name, dict(ALGORITHMS))}"
-        )
-    known = list(entry.defaults)
+    entry = entry_of(algorithm.name)
+    policy = values.policy_class(entry.original, named_policy(algorithm, entry))
+    known = entry.known
     given = algorithm.hyperparameters
     lines = [
         f"{values.FIELD}.{name}: {algorithm.name} has no such hyperparameter; {nearest(name, known)}"
         for name in given
         if name not in known
     ]
-    lines += values.mistakes(entry.cls, {name: value for name, value in given.items() if name in known})
+    lines += values.mistakes(
+        entry.original, policy, {name: value for name, value in given.items() if name in known}
+    )
+    lines += noise.mistakes(given, values.FIELD) if entry.takes_noise else []
     if given.get("n_steps", 1) != 1 and "train_freq" in known:
         lines.append(
             "algorithm.hyperparameters.n_steps: rows of several simulators lie in one buffer, "
@@ -154,12 +60,12 @@ def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
         environment: the id of its environment, as the job says it.
     """
     arena = environment.rpartition(":")[2] in ARENA_ENVIRONMENTS
-    return with_defaults(algorithm, ALGORITHMS[algorithm.name].arena if arena else {})
+    return with_defaults(algorithm, entry_of(algorithm.name).arena if arena else {})
 
 
 def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
     """Return the algorithm with all its hyperparameters; those of `better` precede the class's defaults."""
-    known = ALGORITHMS[algorithm.name].defaults
+    known = entry_of(algorithm.name).defaults
     return algorithm.model_copy(update={"hyperparameters": {**known, **better, **algorithm.hyperparameters}})
 
 
@@ -167,21 +73,22 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     """Return a new model of the algorithm for `env` on a device, its networks drawn from `seed`.
 
     Where the algorithm is to normalize, the model's own environment does, see `normalization`.
-    Images get CnnPolicy, all else MlpPolicy, unless the hyperparameter `policy` says otherwise: a run has it
-    that began when every observation got MlpPolicy.
+    The hyperparameter `policy` is that of a run that began when every observation got MlpPolicy.
 
     Raises:
         ConfigurationError: it doesn't fit the environment, or a hyperparameter has a wrong value.
     """
-    entry = ALGORITHMS[algorithm.name]
-    if not isinstance(env.observation_space, spaces.Box):
-        raise ConfigurationError(
-            f"environment.id: its observation is a {type(env.observation_space).__name__}; "
-            "give it one Box, e.g. by gymnasium's FlattenObservation"
-        )
+    entry = entry_of(algorithm.name)
     given = with_defaults(algorithm, {}).hyperparameters
-    policy = given.pop("policy", None) or policy_for(env.observation_space, algorithm)
-    chosen = values.arguments(entry.cls, given)
+    policy = given.pop("policy", None) or policy_of_spaces(
+        algorithm, entry, env.observation_space, env.action_space
+    )
+    added = noise.action_noise(given, env) if entry.takes_noise else None
+    chosen = values.arguments(
+        entry.original, {name: value for name, value in given.items() if name not in noise.NAMES}
+    )
+    if entry.takes_noise:
+        chosen["action_noise"] = added
     chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)
     if "target_update_interval" in chosen:
         # A vector step is num_envs steps: the target can't be updated more often than that.

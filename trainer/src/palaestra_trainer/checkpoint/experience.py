@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palaestra_trainer.algorithms.buffers import COLUMNS, ValidReplayBuffer
+from palaestra_trainer.algorithms.buffers import ValidReplayBuffer
 from palaestra_trainer.checkpoint.manifest import EXPERIENCE, Checkpoint, digest_of
 from palaestra_trainer.run_directory import sync
 
@@ -61,7 +61,7 @@ def read(buffer: ValidReplayBuffer, found: Checkpoint) -> None:
             kept[start : start + buffer.chunk_rows] = False
             continue
         with (found.path / name).open("rb") as file:
-            buffer.fill(start, {column: np.load(file, allow_pickle=False) for column in COLUMNS})
+            buffer.fill(start, {column: np.load(file, allow_pickle=False) for column in buffer.rows(0, 0)})
     buffer.changed.clear()
     if found.lost:
         buffer.keep(kept)

@@ -11,29 +11,26 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from palaestra_trainer.algorithms import noise as action_noise
+from palaestra_trainer.algorithms.beside import beside
 from palaestra_trainer.algorithms.buffers import Positions, ValidReplayBuffer
 from palaestra_trainer.algorithms.images import as_returned, as_seen
 from palaestra_trainer.algorithms.normalization import Moments, normalizer_of
+from palaestra_trainer.algorithms.observations import Observations, by_name, from_names
+from palaestra_trainer.checkpoint import recollection
 from palaestra_trainer.checkpoint.generators import Generators
 from palaestra_trainer.episodes.episode_state import EpisodeState
 
 STATE = "state.json"
 ARRAYS = "state.npz"
-# What the algorithms count and set while they train; each is kept if the model has it.
-_NUMBERS = (
-    "num_timesteps",
-    "_n_updates",
-    "_n_calls",
-    "_episode_num",
-    "_current_progress_remaining",
-    "exploration_rate",
-)
+# The counts of every algorithm; `algorithms.beside` has those of some.
+_NUMBERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 _NOISE = ("exploration_mat", "exploration_matrices")
 
 
@@ -52,14 +49,16 @@ class State:
         members: how far each collecting simulator is.
         rollout: what else is counted amid an episode, as JSON data; the conductor's own.
         noise: matrices of state-dependent exploration, which are drawn before a boundary; none without it.
-        targets: what a rollout changes of the networks, copied; never written, since it is part of the model.
+        networks: what a rollout changes of the networks, copied; not written, since the model has it.
+        memories: states of recurrent networks, each of shape (layers, members, units).
+        action_noise: where the noise on each member's actions is, if that lasts longer than a step.
         scales: statistics of observations and rewards, if they are normalized; never written, as above.
         running_returns: for each member the discounted reward of its episode so far, where that is needed.
     """
 
     numbers: dict[str, float]
     generators: Generators
-    observation: np.ndarray
+    observation: Observations
     episode_starts: np.ndarray
     episodes: Sequence[dict[str, Any]]
     successes: Sequence[Any]
@@ -67,7 +66,9 @@ class State:
     members: Sequence[EpisodeState]
     rollout: Mapping[str, Any]
     noise: Mapping[str, torch.Tensor]
-    targets: Sequence[torch.Tensor] = ()
+    networks: Sequence[torch.Tensor] = ()
+    memories: Sequence[torch.Tensor] = ()
+    action_noise: np.ndarray | None = None
     scales: Mapping[str, Moments] | None = None
     running_returns: np.ndarray | None = None
 
@@ -77,9 +78,9 @@ class State:
         buffer, normalizer = replay_buffer(model), normalizer_of(model)
         seen = normalizer.old_obs if normalizer else model._last_obs
         return cls(
-            numbers={name: getattr(model, name) for name in _NUMBERS if hasattr(model, name)},
+            numbers={name: getattr(model, name) for name in (*_NUMBERS, *beside(model).numbers)},
             generators=Generators.now(model.action_space, model.device),
-            observation=as_returned(model, seen),
+            observation=as_returned(model, cast("Observations", seen)),
             episode_starts=np.asarray(model._last_episode_starts),
             episodes=tuple(model.ep_info_buffer or ()),
             successes=tuple(model.ep_success_buffer or ()),
@@ -87,7 +88,9 @@ class State:
             members=members,
             rollout=rollout,
             noise={name: getattr(_noise_of(model), name) for name in _NOISE if model.use_sde},
-            targets=[parameter.detach().clone() for parameter in _targets(model)],
+            networks=[parameter.detach().clone() for parameter in recollection.networks(model)],
+            memories=recollection.memories(model),
+            action_noise=action_noise.positions(getattr(model, "action_noise", None)),
             scales=normalizer.scales if normalizer else None,
             running_returns=normalizer.returns if normalizer else None,
         )
@@ -107,8 +110,12 @@ class State:
         for name, matrix in self.noise.items():
             setattr(_noise_of(model), name, matrix.to(model.device))
         with torch.no_grad():
-            for parameter, copy in zip(_targets(model), self.targets, strict=False):
+            for parameter, copy in zip(recollection.networks(model), self.networks, strict=False):
                 parameter.copy_(copy)
+        if self.memories:
+            recollection.remember(model, self.memories)
+        if self.action_noise is not None:
+            action_noise.put_back(model.action_noise, self.action_noise)
 
     def _show_observation(self, model: BaseAlgorithm) -> None:
         """Let the last observation be the model's, as it sees it and as it is."""
@@ -122,7 +129,10 @@ class State:
 
     def write(self, folder: Path) -> None:
         """Write it into a folder, but for what is part of the model."""
-        arrays = {"observation": self.observation, "episode_starts": self.episode_starts}
+        arrays = by_name(self.observation, "observation") | {"episode_starts": self.episode_starts}
+        if self.action_noise is not None:
+            arrays["action_noise"] = self.action_noise
+        arrays |= {f"memory-{index}": state.cpu().numpy() for index, state in enumerate(self.memories)}
         if self.running_returns is not None:
             arrays["running_returns"] = self.running_returns
         for index, member in enumerate(self.members):
@@ -156,7 +166,7 @@ class State:
         return cls(
             numbers=content["numbers"],
             generators=Generators.from_json(content["generators"]),
-            observation=arrays["observation"],
+            observation=from_names(arrays, "observation"),
             episode_starts=arrays["episode_starts"],
             episodes=content["episodes"],
             successes=content["successes"],
@@ -168,6 +178,10 @@ class State:
             rollout=content["rollout"],
             noise={name: torch.from_numpy(arrays[name]) for name in _NOISE if name in arrays},
             running_returns=arrays.get("running_returns"),
+            memories=[
+                torch.from_numpy(arrays[name]) for name in sorted(arrays) if name.startswith("memory-")
+            ],
+            action_noise=arrays.get("action_noise"),
         )
 
 
@@ -180,12 +194,6 @@ def replay_buffer(model: BaseAlgorithm) -> ValidReplayBuffer | None:
 def _noise_of(model: BaseAlgorithm) -> Any:
     """Return the distribution that holds the noise of state-dependent exploration."""
     return getattr(model, "actor", model.policy).action_dist
-
-
-def _targets(model: BaseAlgorithm) -> list[torch.Tensor]:
-    """Return the tensors that DQN changes amid a rollout; no other algorithm changes any."""
-    target = getattr(model, "q_net_target", None)
-    return [] if target is None else list(target.state_dict(keep_vars=True).values())
 
 
 def _plain(value: Any) -> Any:

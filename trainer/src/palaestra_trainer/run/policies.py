@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import json
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from palaestra_trainer.algorithms import ALGORITHMS
+from palaestra_trainer.algorithms import entry_of
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
 from palaestra_trainer.configuration import load
 from palaestra_trainer.environments.making import keywords
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory
+
+
+class Scale(NamedTuple):
+    """The numbers by which a part of an observation is normalized."""
+
+    mean: np.ndarray
+    variance: np.ndarray
+    clip: float
+    epsilon: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,17 +37,18 @@ class Policy:
         model: the Stable-Baselines3 model, which learned from normalized observations.
         environment_id: name of the environment that it learned in.
         environment_options: keyword arguments of that environment, without robot and scene.
-        scale: mean, variance, clip and epsilon of the observations; None: they are not normalized.
+        scales: mean, variance, clip and epsilon by the key of the observation, by "" if it has none; what is
+            not in it is not normalized.
     """
 
     model: BaseAlgorithm
     environment_id: str
     environment_options: dict[str, Any]
-    scale: tuple[np.ndarray, np.ndarray, float, float] | None
+    scales: Mapping[str, Scale]
 
     def predict(
         self,
-        observation: np.ndarray,
+        observation: Any,
         state: Any = None,
         episode_start: Any = None,
         deterministic: bool = True,  # noqa: FBT001, FBT002 - as in Stable-Baselines3
@@ -45,11 +56,16 @@ class Policy:
         """Return an action for an observation as the environment returned it, and the policy's next state."""
         return self.model.predict(self._seen(observation), state, episode_start, deterministic)
 
-    def _seen(self, observation: np.ndarray) -> np.ndarray:
-        if self.scale is None:
-            return observation
-        mean, variance, clip, epsilon = self.scale
-        scaled = (observation - mean) / np.sqrt(variance + epsilon)
+    def _seen(self, observation: Any) -> Any:
+        if isinstance(observation, Mapping):
+            return {key: self._scaled(key, part) for key, part in observation.items()}
+        return self._scaled("", observation)
+
+    def _scaled(self, key: str, part: Any) -> Any:
+        if key not in self.scales:
+            return part
+        mean, variance, clip, epsilon = self.scales[key]
+        scaled = (part - mean) / np.sqrt(variance + epsilon)
         return np.asarray(np.clip(scaled, -clip, clip), np.float32)
 
 
@@ -68,17 +84,20 @@ def load_policy(run_or_zip: str | Path) -> Policy:
     configuration = load(RunDirectory(model.parent).configuration)
     environment = configuration.environment
     return Policy(
-        model=ALGORITHMS[configuration.algorithm.name].cls.load(model, device="cpu"),
+        model=entry_of(configuration.algorithm.name).original.load(model, device="cpu"),
         environment_id=environment.id,
         environment_options=keywords(environment),
-        scale=_scale(model),
+        scales=_scales(model),
     )
 
 
-def _scale(model: Path) -> tuple[np.ndarray, np.ndarray, float, float] | None:
+def _scales(model: Path) -> dict[str, Scale]:
     with zipfile.ZipFile(model) as archive:
         known = json.loads(archive.read(NORMALIZE)) if NORMALIZE in archive.namelist() else {}
-    if "observations" not in known:
-        return None
-    seen = known["observations"]
-    return np.array(seen["mean"]), np.array(seen["variance"]), float(seen["clip"]), float(known["epsilon"])
+    return {
+        name.removeprefix("observations").removeprefix("/"): Scale(
+            np.array(seen["mean"]), np.array(seen["variance"]), float(seen["clip"]), float(known["epsilon"])
+        )
+        for name, seen in known.items()
+        if name.startswith("observations")
+    }

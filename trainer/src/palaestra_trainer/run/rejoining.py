@@ -7,10 +7,12 @@ actions. The last observation is compared; a mismatch is logged and training con
 from __future__ import annotations
 
 import dataclasses
+from typing import cast
 
 import numpy as np
 import structlog
 
+from palaestra_trainer.algorithms.observations import Observations, equal_rows
 from palaestra_trainer.checkpoint import State
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
@@ -24,14 +26,15 @@ def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
     A simulator that was broken at the save, breaks now, or is new in the run begins its next episode.
     """
     before = [*saved.members, *[EpisodeState(0, None)] * env.num_envs][: env.num_envs]
-    observation = np.asarray(env.resume(before))
+    observation = cast("Observations", env.resume(before))
     after = env.snapshot()
     begun = np.array(
         [was.actions is None or now.episode != was.episode for was, now in zip(before, after, strict=True)]
     )
-    if not begun.any() and np.array_equal(observation, saved.observation):
+    same = equal_rows(observation, saved.observation)
+    if not begun.any() and same.all() and len(same) == len(saved.members):
         return saved
-    _tell(begun, observation, saved)
+    _tell(begun, same)
     return dataclasses.replace(
         saved,
         observation=observation,
@@ -43,10 +46,9 @@ def rejoin(env: SimulatorsVecEnv, saved: State) -> State:
     )
 
 
-def _tell(begun: np.ndarray, observation: np.ndarray, saved: State) -> None:
+def _tell(begun: np.ndarray, same: np.ndarray) -> None:
     """Warn of simulators that replayed their episode and reached another observation."""
-    rows = zip(begun, observation, saved.observation, strict=False)
-    different = sum(not new and not np.array_equal(now, was) for new, now, was in rows)
+    different = sum(not new and not equal for new, equal in zip(begun, same, strict=False))
     if different:
         log.warning(
             "simulators do not repeat what they did: the run goes on, but not exactly as it would have",

@@ -51,7 +51,6 @@ log = structlog.get_logger(__name__)
 
 MakeMembers = Callable[[Configuration], Sequence[Member]]
 DONE = End(ExitCode.DONE, "Completed", "all steps are done")
-LOG_INTERVAL = {"DQN": 10, "SAC": 10, "A2C": 50}  # episodes, or rollouts on policy; others: 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -284,7 +283,7 @@ class Attempt:
                     model.learn(
                         missing,
                         conductor,
-                        log_interval=LOG_INTERVAL.get(self._configuration.algorithm.name, 1),
+                        log_interval=algorithms.entry_of(self._algorithm.name).log_interval,
                         reset_num_timesteps=False,
                     )
             else:

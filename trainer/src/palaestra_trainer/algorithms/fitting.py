@@ -1,0 +1,140 @@
+"""Which algorithm fits which environment, and the policy that it gets there.
+
+Everything that does not fit is refused here, by the spaces alone, before a simulator starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gymnasium import spaces
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import BasePolicy
+from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
+
+from palaestra_trainer.algorithms import own
+from palaestra_trainer.algorithms.entries import Entry
+from palaestra_trainer.configuration import Algorithm, Cnn, nearest
+from palaestra_trainer.errors import ConfigurationError
+
+KINDS = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
+# Pixels per side that the convolutions of each network need.
+SMALLEST: Mapping[Cnn | None, int] = {None: 36, "small": 20}
+
+
+def policy_of_spaces(
+    algorithm: Algorithm, entry: Entry, seen: spaces.Space[Any], acted: spaces.Space[Any]
+) -> str | type[BasePolicy]:
+    """Return the policy of an algorithm for these observations and actions.
+
+    Raises:
+        ConfigurationError: the algorithm does not fit the environment; one line for each reason.
+    """
+    lines = [*_about_observations(seen), *_about_actions(algorithm.name, entry, acted)]
+    if not lines:
+        lines += [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]
+    if lines:
+        raise ConfigurationError("\n".join(lines))
+    return named_policy(algorithm, entry) or _usual_policy(algorithm.name, entry, seen)
+
+
+def named_policy(algorithm: Algorithm, entry: Entry) -> str | type[BasePolicy] | None:
+    """Return the policy that the job names: an alias of the algorithm or a class; None: it names none.
+
+    Raises:
+        ConfigurationError: it is neither.
+    """
+    name = algorithm.policy
+    known = aliases(entry.original)
+    if name is None or name in known:
+        return name
+    if own.names_class(name):
+        return own.class_named(name, "algorithm.policy", BasePolicy)
+    raise ConfigurationError(
+        f"algorithm.policy: {algorithm.name} has no policy {name}; {nearest(name, dict(known))}, "
+        "or write module:Class"
+    )
+
+
+def aliases(cls: type[BaseAlgorithm]) -> Mapping[str, type[BasePolicy]]:
+    """Return the policies of an algorithm by their names."""
+    return cls.policy_aliases
+
+
+def images_in(space: spaces.Space[Any]) -> list[spaces.Box]:
+    """Return the images of an observation: itself, or parts of a Dict."""
+    parts = space.spaces.values() if isinstance(space, spaces.Dict) else [space]
+    return [part for part in parts if isinstance(part, spaces.Box) and is_image_space(part)]
+
+
+def scalable(space: spaces.Space[Any]) -> list[str] | bool:
+    """Return the keys of a Dict whose numbers may be normalized; of another space, whether its may be.
+
+    Networks scale images themselves, and the numbers of a Discrete are names.
+    """
+    if isinstance(space, spaces.Dict):
+        return [key for key, part in space.spaces.items() if scalable(part)]
+    return isinstance(space, spaces.Box) and not is_image_space(space)
+
+
+def _about_observations(seen: spaces.Space[Any]) -> list[str]:
+    parts = seen.spaces if isinstance(seen, spaces.Dict) else {"": seen}
+    return [
+        f"environment.id: its observation {key} is a {type(part).__name__}, which no policy takes; "
+        "use Box, Discrete, MultiDiscrete or MultiBinary, or a Dict of these".replace(
+            "observation  ", "observation "
+        )
+        for key, part in parts.items()
+        if not isinstance(part, KINDS)
+    ]
+
+
+def _about_actions(name: str, entry: Entry, acted: spaces.Space[Any]) -> list[str]:
+    known = KINDS if entry.actions is None else entry.actions
+    if isinstance(acted, known):
+        return []
+    kinds = " or ".join(kind.__name__ for kind in known)
+    return [
+        f"algorithm.name: {name} needs {kinds} actions, not {type(acted).__name__}; use another algorithm"
+    ]
+
+
+def _about_images(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:
+    images = images_in(seen)
+    if algorithm.cnn and (not images or isinstance(seen, spaces.Dict)):
+        what = "is a Dict" if isinstance(seen, spaces.Dict) else "is no image"
+        return [f"algorithm.cnn: has no effect, since the environment's observation {what}; remove it"]
+    smallest = SMALLEST[algorithm.cnn]
+    sides = [image.shape[1:] if is_image_space_channels_first(image) else image.shape[:2] for image in images]
+    return [
+        f"environment.id: its images have {rows} x {columns} pixels, and CnnPolicy needs "
+        f"{smallest} x {smallest}; make them larger, or flatten them"
+        for rows, columns in sides
+        if min(rows, columns) < smallest and not _own_network(algorithm)
+    ]
+
+
+def _about_normalization(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:
+    if not (algorithm.normalize and algorithm.normalize.observations) or scalable(seen):
+        return []
+    why = "CnnPolicy scales images itself" if images_in(seen) else f"a {type(seen).__name__} has no scale"
+    return [f"algorithm.normalize.observations: {why}; set it to false"]
+
+
+def _usual_policy(name: str, entry: Entry, seen: spaces.Space[Any]) -> str:
+    if isinstance(seen, spaces.Dict):
+        kind, what = "MultiInput", "a Dict"
+    else:
+        kind, what = ("Cnn", "images") if images_in(seen) else ("Mlp", "numbers")
+    for alias in aliases(entry.original):
+        if alias.startswith(kind):
+            return alias
+    raise ConfigurationError(
+        f"algorithm.name: {name} has no policy for {what}; use another algorithm, or flatten the observation"
+    )
+
+
+def _own_network(algorithm: Algorithm) -> bool:
+    policy = algorithm.hyperparameters.get("policy_kwargs") or {}
+    return algorithm.policy is not None or "features_extractor_class" in policy

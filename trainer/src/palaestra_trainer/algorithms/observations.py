@@ -1,0 +1,57 @@
+"""The observations of all members at once: one array, or an array for each key of a Dict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+Observations = np.ndarray | dict[str, np.ndarray]
+
+
+def part(observations: Any, rows: Any) -> Any:
+    """Return some rows of observations."""
+    return each(observations, lambda column: column[rows])
+
+
+def each(observations: Any, change: Callable[[Any], Any]) -> Any:
+    """Return observations with `change` made to their array, or to each of their arrays."""
+    if isinstance(observations, dict):
+        return {key: change(column) for key, column in observations.items()}
+    return change(observations)
+
+
+def stacked(rows: Sequence[Any]) -> Observations:
+    """Return single observations as those of as many members; without any, an empty array."""
+    if rows and isinstance(rows[0], dict):
+        return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+    return np.array(rows)
+
+
+def by_name(observations: Any, name: str) -> dict[str, Any]:
+    """Return the arrays of observations by name: `name`, or `name/key` for each key of a Dict."""
+    if isinstance(observations, dict):
+        return {f"{name}/{key}": column for key, column in observations.items()}
+    return {name: observations}
+
+
+def from_names(arrays: Mapping[str, np.ndarray], name: str) -> Observations:
+    """Return the observations whose arrays `by_name` returned; other arrays may be among them.
+
+    Raises:
+        KeyError: they are missing.
+    """
+    found = {
+        key.removeprefix(f"{name}/"): column for key, column in arrays.items() if key.startswith(f"{name}/")
+    }
+    return found or arrays[name]
+
+
+def equal_rows(one: Observations, other: Observations) -> np.ndarray:
+    """Return which rows are equal, as far as both have rows; shape (rows,), bool."""
+    pairs = [(column, by_name(other, "")[name]) for name, column in by_name(one, "").items()]
+    rows = min(len(column) for pair in pairs for column in pair)
+    return np.array(
+        [all(np.array_equal(this[row], that[row]) for this, that in pairs) for row in range(rows)], dtype=bool
+    )

@@ -1,0 +1,49 @@
+"""RecurrentPPO's rollouts without invalid rows.
+
+An LSTM learns from whole sequences, so rows are not shuffled. Invalid rows are left out of every sequence.
+The first valid row after them begins an episode, so the LSTM restarts there, in collection and in the update.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from typing import Any
+
+import numpy as np
+from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer, RecurrentRolloutBuffer
+
+from palaestra_trainer.algorithms.buffers import ValidRolloutBuffer
+
+
+class _Sequences(ValidRolloutBuffer):
+    """A rollout buffer that yields minibatches of valid rows in their order."""
+
+    def get(self, batch_size: int | None = None) -> Generator[Any, None, None]:
+        """Yield minibatches of valid rows; they begin at a random row, as in RecurrentPPO's own buffer."""
+        if not self.generator_ready:
+            next(super(ValidRolloutBuffer, self).get(1))  # flattens the rows of all members into one column
+        rows = np.flatnonzero(self.swap_and_flatten(self.valid))
+        first_of_member = np.zeros((self.buffer_size, self.n_envs))
+        first_of_member[0] = 1.0
+        draw: Any = self._get_samples  # RecurrentPPO's has another second argument than RolloutBuffer's
+        turned = np.roll(rows, -np.random.randint(len(rows)))
+        for batch in _batches(turned, batch_size or len(rows)):
+            yield draw(batch, self.swap_and_flatten(first_of_member))
+
+
+class ValidRecurrentRolloutBuffer(_Sequences, RecurrentRolloutBuffer):
+    """The buffer for observations that are one array."""
+
+
+class ValidRecurrentDictRolloutBuffer(_Sequences, RecurrentDictRolloutBuffer):
+    """The buffer for observations that are a Dict."""
+
+
+def _batches(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
+    """Yield `rows` in parts of `size`; a single last row joins the part before it.
+
+    The deviation of a single advantage is NaN.
+    """
+    for start in range(0, max(len(rows) - 1, 1), size):
+        is_last = start + size >= len(rows) - 1
+        yield rows[start:] if is_last else rows[start : start + size]

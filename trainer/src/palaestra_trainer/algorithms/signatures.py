@@ -1,0 +1,48 @@
+"""The parameters of classes that pass keyword arguments on to the class that they extend."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Mapping
+from typing import Any, get_type_hints
+
+from stable_baselines3.common.vec_env import VecEnv
+
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+def parameters(cls: type[object]) -> Mapping[str, inspect.Parameter]:
+    """Return the named parameters of a class by name, with those that its `**kwargs` pass on."""
+    found: dict[str, inspect.Parameter] = {}
+    for constructor in _constructors(cls):
+        named = inspect.signature(constructor).parameters.values()
+        found |= {it.name: it for it in named if it.kind in _NAMED and it.name not in found}
+    return found
+
+
+def types(cls: type[object]) -> Mapping[str, Any]:
+    """Return the annotations of these parameters; Any for one that has none, or that cannot be resolved."""
+    found: dict[str, Any] = {}
+    for constructor in _constructors(cls):
+        found = _hints(constructor) | found
+    return dict.fromkeys(parameters(cls), Any) | found
+
+
+def _constructors(cls: type[object]) -> Iterator[Any]:
+    """Yield the constructors that take part, from the class to the first one without `**kwargs`."""
+    for ancestor in cls.__mro__:
+        constructor = vars(ancestor).get("__init__")
+        if constructor is None:
+            continue
+        yield constructor
+        kinds = {it.kind for it in inspect.signature(constructor).parameters.values()}
+        if inspect.Parameter.VAR_KEYWORD not in kinds:
+            return
+
+
+def _hints(constructor: Any) -> dict[str, Any]:
+    try:
+        # Stable-Baselines3 uses VecEnv in a type, and imports it only for type checkers.
+        return get_type_hints(constructor, localns={"VecEnv": VecEnv})
+    except NameError:
+        return {}

@@ -1,0 +1,101 @@
+"""A task with any pair of spaces, computed in this process, to try algorithms on.
+
+Its observations and rewards depend on the seed of the episode and on every action since, and on nothing else.
+So it repeats itself, and a resumed run that lost a part of its past becomes another run.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Collection, Mapping
+from copy import deepcopy
+from types import MappingProxyType
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from palaestra_trainer.errors import SimulatorDead
+
+_IMAGE = spaces.Box(0, 255, (36, 36, 3), np.uint8)
+_NUMBERS = spaces.Box(-1.0, 1.0, (3,), np.float32)
+OBSERVATIONS: Mapping[str, spaces.Space[Any]] = MappingProxyType(
+    {
+        "Box": _NUMBERS,
+        "Dict": spaces.Dict({"numbers": _NUMBERS, "place": spaces.Discrete(3)}),
+        "image": _IMAGE,
+        "Dict with image": spaces.Dict({"numbers": _NUMBERS, "view": _IMAGE}),
+        "Discrete": spaces.Discrete(5),
+        "MultiDiscrete": spaces.MultiDiscrete([3, 2]),
+        "MultiBinary": spaces.MultiBinary(4),
+        "Tuple": spaces.Tuple((_NUMBERS, spaces.Discrete(3))),
+    }
+)
+ACTIONS: Mapping[str, spaces.Space[Any]] = MappingProxyType(
+    {
+        "Discrete": spaces.Discrete(3),
+        "MultiDiscrete": spaces.MultiDiscrete([2, 3]),
+        "MultiBinary": spaces.MultiBinary(2),
+        "Box": spaces.Box(-1.0, 1.0, (2,), np.float32),
+    }
+)
+
+
+class FakeTask(gymnasium.Env[Any, Any]):
+    """Episodes of at most `max_steps` steps whose observations are drawn anew at each step.
+
+    Args:
+        observation_space: a copy of it is drawn from.
+        action_space: a copy of it is the task's.
+        deaths: numbers of the steps, counted from 1 over its whole life, at which it dies; see `restart`.
+        max_steps: steps after which an episode is truncated.
+    """
+
+    def __init__(
+        self,
+        observation_space: spaces.Space[Any],
+        action_space: spaces.Space[Any],
+        deaths: Collection[int] = (),
+        max_steps: int = 6,
+    ) -> None:
+        self.observation_space = deepcopy(observation_space)
+        self.action_space = deepcopy(action_space)
+        self._deaths = frozenset(deaths)
+        self._max_steps = max_steps
+        self._life = 0
+        self._dead = False
+        self._past = 0
+        self._steps = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode that `seed` decides."""
+        super().reset(seed=seed, options=options)
+        self._live()
+        self._past, self._steps = zlib.crc32(repr(seed).encode()), 0
+        return self._observe(), {}
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Take a step; one of nine ends the episode."""
+        self._life += 1
+        self._dead = self._dead or self._life in self._deaths
+        self._live()
+        self._steps += 1
+        self._past = zlib.crc32(np.ascontiguousarray(action).tobytes(), self._past)
+        over = self._past % 9 == 0
+        truncated = self._steps >= self._max_steps and not over
+        return self._observe(), self._past % 100 / 100, over, truncated, {"is_success": over}
+
+    def restart(self) -> None:
+        """Bring the task back to life."""
+        self._dead = False
+
+    def _observe(self) -> Any:
+        self.observation_space.seed(self._past)
+        return self.observation_space.sample()
+
+    def _live(self) -> None:
+        if self._dead:
+            raise SimulatorDead("fake", f"died at step {self._life}; restart it")
