@@ -2,9 +2,9 @@
 
 Observations are shifted and scaled by their running mean and deviation, rewards scaled by the deviation of
 the discounted return. In a Dict, each Box of numbers has statistics of its own. Images and discrete values
-are not normalized. Rows that a fault spoiled enter neither a statistic nor a loss. The statistics are part of a
-policy, which cannot be used without them, so they are kept in the file of the model. The reasons are
-in docs/decisions/0010-normalize.md.
+are not normalized. Rows that a fault spoiled enter neither a statistic nor a loss. The statistics are part
+of a policy, which cannot be used without them, so they are kept in the file of the model. The reasons are in
+docs/decisions/0010-normalize.md.
 """
 
 from __future__ import annotations

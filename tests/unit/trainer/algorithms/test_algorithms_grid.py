@@ -1,0 +1,136 @@
+"""Every algorithm in tasks of every pair of spaces that it fits: a fault, an interruption, an exact resume."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import zipfile
+
+import numpy as np
+import pytest
+import torch
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.algorithms import ALGORITHMS
+from palaestra_trainer.run import training
+from palaestra_trainer.run_directory import RunDirectory, read_lines
+from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
+from tools.algorithms import refusal
+
+pytestmark = pytest.mark.minutes(3)
+
+COLLECTORS = 2
+OFF_POLICY = {"learning_starts": 8, "batch_size": 8, "buffer_size": 60, "train_freq": 2}
+NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
+ON_POLICY = {"n_steps": 8, "batch_size": 8}
+SMALL = {"net_arch": [8]}
+HYPERPARAMETERS = {
+    "DQN": OFF_POLICY | {"target_update_interval": 4},
+    "QRDQN": OFF_POLICY | {"target_update_interval": 4},
+    "SAC": OFF_POLICY,
+    "TD3": OFF_POLICY | NOISE,
+    "DDPG": OFF_POLICY | NOISE,
+    "TQC": OFF_POLICY,
+    "CrossQ": OFF_POLICY,
+    "PPO": ON_POLICY | {"n_epochs": 2},
+    "A2C": {},
+    "TRPO": ON_POLICY,
+    "RecurrentPPO": ON_POLICY | {"n_epochs": 2, "policy_kwargs": SMALL | {"lstm_hidden_size": 4}},
+    "REINFORCE": {"episodes_per_update": 1},
+}
+CELLS = [(name, seen, acted) for name in ALGORITHMS for seen in OBSERVATIONS for acted in ACTIONS]
+WORKING = [cell for cell in CELLS if not refusal(*cell)]
+
+
+@pytest.fixture
+def play(make_member, make_configuration, tmp_path):
+    """Train into a folder; a signal comes at a step of the first simulator, which dies at each of `deaths`."""
+
+    def run(folder, cell, *, signal_at=0, deaths=(), steps=44):
+        name, seen, acted = cell
+        algorithm = {"name": name, "hyperparameters": {"policy_kwargs": SMALL} | HYPERPARAMETERS[name]}
+        taken = iter(range(1, 10_000))
+
+        def make_members(given):
+            members = [make_member(entry.name) for entry in given.simulators]
+            for member in members:
+                member.env = FakeTask(OBSERVATIONS[seen], ACTIONS[acted])
+            first = members[0]
+            first.env = Interrupted(OBSERVATIONS[seen], ACTIONS[acted], deaths, taken, signal_at)
+            first.restart = first.env.restart
+            return members
+
+        configuration = make_configuration(
+            algorithm=algorithm,
+            steps=steps,
+            collectors=COLLECTORS,
+            evaluation={"everySteps": 20, "episodes": 1, "confirmEpisodes": 0},
+            checkpoint={"everySteps": 10, "keep": 1},
+        )
+        directory = RunDirectory(tmp_path / folder)
+        return training.run(configuration, directory, make_members), directory
+
+    return run
+
+
+class Interrupted(FakeTask):
+    """A task during which a signal comes."""
+
+    def __init__(self, seen, acted, deaths, taken, signal_at):
+        super().__init__(seen, acted, deaths)
+        self._taken, self._signal_at = taken, signal_at
+
+    def step(self, action):
+        """Take a step."""
+        if next(self._taken) == self._signal_at:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return super().step(action)
+
+
+def tensors(path):
+    """Return every tensor of a model's file by name, as lists; NaN is refused."""
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist() if name.endswith(".pth")}
+    return {
+        f"{part}{place}": tensor.tolist()
+        for part, content in parts.items()
+        for place, tensor in flat(torch.load(io.BytesIO(content), weights_only=True))
+    }
+
+
+def flat(value, place=""):
+    """Yield the tensors in nested mappings and lists."""
+    if isinstance(value, torch.Tensor):
+        yield place, value
+    elif isinstance(value, dict | list):
+        for key, part in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from flat(part, f"{place}.{key}")
+
+
+def outcome(directory):
+    """Return all that a run came to, by name."""
+    found = checkpoint.newest(directory.checkpoints)
+    state = json.loads((found.path / "state.json").read_text())
+    state["episodes"] = [episode | {"t": 0} for episode in state["episodes"]]
+    with np.load(found.path / "state.npz", allow_pickle=False) as arrays:
+        state |= {name: array.tolist() for name, array in arrays.items()}
+    experience = {name: digest for name, digest in found.manifest.files.items() if "experience" in name}
+    evaluations = [line | {"seconds": 0} for line in read_lines(directory.evaluations)]
+    return tensors(found.path / "model.zip") | state | experience | {"evaluations": evaluations}
+
+
+@pytest.mark.parametrize("cell", WORKING, ids=", ".join)
+def test_it_survives_a_fault_and_resumes_exactly(play, cell):
+    """A part of the state that a checkpoint lacks makes another run of it; so would a row of a fault."""
+    torch.set_num_threads(1)
+    broken, _ = play("broken", cell, deaths=(3, 9), steps=24)
+    whole, reference = play("whole", cell)
+    interrupted, directory = play("cut", cell, signal_at=15)
+    resumed, _ = play("cut", cell)
+
+    wanted, found = outcome(reference), outcome(directory)
+    assert (broken, whole, interrupted, resumed) == (0, 0, 75, 0)
+    assert [name for name in wanted.keys() | found.keys() if wanted.get(name) != found.get(name)] == []

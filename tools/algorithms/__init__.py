@@ -1,0 +1,5 @@
+"""docs/algorithms.md: the table of algorithms, observations and actions, which is made from the code."""
+
+from tools.algorithms.page import PAGE, page, refusal
+
+__all__ = ["PAGE", "page", "refusal"]

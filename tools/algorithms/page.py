@@ -1,0 +1,59 @@
+"""Which algorithm works with which observations and actions, in docs/algorithms.md.
+
+The reasons are those that a person reads who tries it. tests/unit/trainer/algorithms/test_algorithms_grid.py
+trains in every cell that works.
+"""
+
+from palaestra.api.marks import between_marks
+from palaestra_trainer.algorithms import ALGORITHMS
+from palaestra_trainer.algorithms.fitting import policy_of_spaces
+from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
+
+PAGE = "docs/algorithms.md"
+BEGIN = "<!-- generated: algorithms, observations and actions -->"
+WORKS = "works"
+
+
+def page(text: str) -> str:
+    """Return docs/algorithms.md, of which `text` is what it was, with the table made anew.
+
+    Raises:
+        ValueError: a mark is missing.
+    """
+    return between_marks(text, BEGIN, table())
+
+
+def refusal(name: str, seen: str, acted: str) -> str:
+    """Return why an algorithm is refused in a task with these spaces; "" if it works."""
+    try:
+        policy_of_spaces(Algorithm(name=name), ALGORITHMS[name], OBSERVATIONS[seen], ACTIONS[acted])
+    except ConfigurationError as error:
+        return str(error).splitlines()[0]
+    return ""
+
+
+def table() -> str:
+    """Return a row for each algorithm and observation, a column for each kind of actions, then the reasons."""
+    reasons: dict[str, int] = {}
+    rows = []
+    for name in ALGORITHMS:
+        for seen in OBSERVATIONS:
+            cells = [_cell(refusal(name, seen, acted), reasons) for acted in ACTIONS]
+            rows.append(f"| {name} | {seen} | {' | '.join(cells)} |")
+    return "\n".join(
+        (
+            f"| algorithm | observation | {' | '.join(f'{acted} actions' for acted in ACTIONS)} |",
+            "|---" * (len(ACTIONS) + 2) + "|",
+            *rows,
+            "",
+            *(f"{number}. `{reason}`" for reason, number in reasons.items()),
+            "",
+        )
+    )
+
+
+def _cell(reason: str, reasons: dict[str, int]) -> str:
+    """Return a cell; a new reason gets the next number."""
+    return f"refused ({reasons.setdefault(reason, len(reasons) + 1)})" if reason else WORKS
