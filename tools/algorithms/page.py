@@ -35,7 +35,7 @@ def refusal(name: str, seen: str, acted: str) -> str:
 
 
 def table() -> str:
-    """Return a row for each algorithm and observation, a column for each kind of actions, then the reasons."""
+    """Return a row for each algorithm and observation, a column for each kind of actions, and reasons."""
     reasons: dict[str, int] = {}
     rows = []
     for name in ALGORITHMS:

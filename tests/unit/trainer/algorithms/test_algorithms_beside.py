@@ -48,21 +48,23 @@ NOT_STATE = {"env", "_logger", "policy"}  # the policy's tensors are compared on
 
 def print_of(value):
     """Return plain data that differs if the value changed."""
-    match value:
-        case torch.Tensor():
-            return value.detach().numpy().tobytes()
-        case np.ndarray():
-            return value.tobytes()
-        case nn.Module():
-            return [print_of(tensor) for tensor in value.state_dict().values()]
-        case dict():
-            return {key: print_of(part) for key, part in value.items()}
-        case list() | tuple() | deque():
-            return [print_of(part) for part in value]
-        case ActionNoise():
-            return print_of(vars(value))
-        case _:
-            return repr(value)
+    if isinstance(value, torch.Tensor):
+        return value.detach().numpy().tobytes()
+    if isinstance(value, np.ndarray):
+        return value.tobytes()
+    if isinstance(value, list | tuple | deque):
+        return [print_of(part) for part in value]
+    parts = parts_of(value)
+    return repr(value) if parts is None else {key: print_of(part) for key, part in parts.items()}
+
+
+def parts_of(value):
+    """Return the parts of a value by name; None if it has none."""
+    if isinstance(value, nn.Module):
+        return value.state_dict()
+    if isinstance(value, ActionNoise):
+        return vars(value)
+    return value if isinstance(value, dict) else None
 
 
 class Changes(BaseCallback):

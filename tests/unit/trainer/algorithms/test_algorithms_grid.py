@@ -1,4 +1,4 @@
-"""Every algorithm in tasks of every pair of spaces that it fits: a fault, an interruption, an exact resume."""
+"""Every algorithm in tasks of every pair of spaces that it fits: a fault, a signal, an exact resume."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ from tools.algorithms import refusal
 pytestmark = pytest.mark.minutes(3)
 
 COLLECTORS = 2
-OFF_POLICY = {"learning_starts": 8, "batch_size": 8, "buffer_size": 60, "train_freq": 2}
+OFF_POLICY = {"learning_starts": 8, "batch_size": 8, "buffer_size": 60, "train_freq": 3}
+# A soft update of the target comes between the boundary and the signal, so its second one would be noticed.
+SOFT = {"target_update_interval": 4, "tau": 0.5}
 NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
 ON_POLICY = {"n_steps": 8, "batch_size": 8}
 SMALL = {"net_arch": [8]}
 HYPERPARAMETERS = {
-    "DQN": OFF_POLICY | {"target_update_interval": 4},
-    "QRDQN": OFF_POLICY | {"target_update_interval": 4},
+    "DQN": OFF_POLICY | SOFT,
+    "QRDQN": OFF_POLICY | SOFT,
     "SAC": OFF_POLICY,
     "TD3": OFF_POLICY | NOISE,
     "DDPG": OFF_POLICY | NOISE,
@@ -47,7 +49,7 @@ WORKING = [cell for cell in CELLS if not refusal(*cell)]
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path):
-    """Train into a folder; a signal comes at a step of the first simulator, which dies at each of `deaths`."""
+    """Train into a folder; the first simulator dies at each of `deaths`, and a signal comes at a step of it."""
 
     def run(folder, cell, *, signal_at=0, deaths=(), steps=44):
         name, seen, acted = cell
@@ -91,7 +93,7 @@ class Interrupted(FakeTask):
 
 
 def tensors(path):
-    """Return every tensor of a model's file by name, as lists; NaN is refused."""
+    """Return every tensor of a model's file by name, as lists."""
     with zipfile.ZipFile(path) as archive:
         parts = {name: archive.read(name) for name in archive.namelist() if name.endswith(".pth")}
     return {
