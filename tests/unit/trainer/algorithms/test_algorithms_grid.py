@@ -49,7 +49,7 @@ WORKING = [cell for cell in CELLS if not refusal(*cell)]
 
 @pytest.fixture
 def play(make_member, make_configuration, tmp_path):
-    """Train into a folder; the first simulator dies at each of `deaths`, and a signal comes at a step of it."""
+    """Train into a folder; the first simulator dies at each of `deaths`, a signal comes at a step of it."""
 
     def run(folder, cell, *, signal_at=0, deaths=(), steps=44):
         name, seen, acted = cell

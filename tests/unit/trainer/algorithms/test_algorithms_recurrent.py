@@ -1,0 +1,135 @@
+"""RecurrentPPO: sequences without invalid rows, and a memory that restarts after them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from hypothesis import given
+from hypothesis import strategies as st
+
+from palaestra_trainer.algorithms import check, make_model, policy_of
+from palaestra_trainer.algorithms.recurrent import (
+    ValidRecurrentDictRolloutBuffer,
+    ValidRecurrentRolloutBuffer,
+)
+from palaestra_trainer.configuration import Algorithm
+from palaestra_trainer.episodes.evaluation import evaluate
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.simulators.keeper import Keeper
+
+NUMBER = spaces.Box(-1e6, 1e6, (1,), np.float32)
+HYPERPARAMETERS = {"n_steps": 8, "batch_size": 4, "policy_kwargs": {"net_arch": [4], "lstm_hidden_size": 4}}
+BUFFERS = {
+    ValidRecurrentRolloutBuffer: NUMBER,
+    ValidRecurrentDictRolloutBuffer: spaces.Dict({"mark": NUMBER}),
+}
+
+
+class States:
+    """The states of an LSTM of one unit, all equal to a row's number."""
+
+    def __init__(self, row, members):
+        self.pi = self.vf = (torch.full((1, members, 1), float(row)),) * 2
+
+
+def filled(kind, valid, starts):
+    """Return a full buffer whose observations are the row's number within its member, plus 100 a member."""
+    rows, members = valid.shape
+    buffer = kind(rows, BUFFERS[kind], spaces.Discrete(2), (rows, 1, members, 1), "cpu", n_envs=members)
+    for row in range(rows):
+        marks = (row + 100.0 * np.arange(members))[:, None].astype(np.float32)
+        seen = {"mark": marks} if isinstance(BUFFERS[kind], spaces.Dict) else marks
+        buffer.mark(valid[row])
+        zeros = torch.zeros(members)
+        buffer.add(
+            seen,
+            np.zeros(members),
+            np.zeros(members),
+            starts[row],
+            zeros,
+            zeros,
+            lstm_states=States(row, members),
+        )
+    buffer.compute_returns_and_advantage(torch.zeros(members), np.zeros(members, bool))
+    return buffer
+
+
+def drawn(batches):
+    """Return the marks of all rows that are learned from, batch by batch."""
+    found = []
+    for batch in batches:
+        seen = batch.observations["mark"] if isinstance(batch.observations, dict) else batch.observations
+        found.append(seen[batch.mask > 0].flatten().tolist())
+    return found
+
+
+@pytest.mark.parametrize("kind", BUFFERS)
+@given(data=st.data())
+def test_each_valid_row_is_learned_from_once_and_no_other(kind, data):
+    """Whatever the size of a batch; a batch of one row has no deviation, so there is none."""
+    rows, members = data.draw(st.integers(2, 9)), data.draw(st.integers(1, 3))
+    marks = data.draw(st.lists(st.booleans(), min_size=rows * members, max_size=rows * members))
+    valid = np.array(marks).reshape(rows, members)
+    valid[:2, 0] = True
+    starts = np.vstack([np.ones((1, members)), ~valid[:-1] & valid[1:]])
+
+    batches = drawn(filled(kind, valid, starts).get(data.draw(st.integers(2, 8))))
+
+    wanted = [row + 100.0 * member for row, member in np.argwhere(valid)]
+    assert sorted(mark for batch in batches for mark in batch) == sorted(wanted)
+    assert min(map(len, batches)) > 1
+
+
+def test_a_sequence_begins_anew_after_invalid_rows():
+    """The state that an LSTM had in a broken simulator means nothing."""
+    valid = np.array([[True], [True], [False], [False], [True], [True]])
+    starts = np.array([[1], [0], [0], [0], [1], [0]], np.float32)
+
+    batch = next(filled(ValidRecurrentRolloutBuffer, valid, starts).get())
+
+    begun = {
+        mark: begins
+        for mark, begins, is_row in zip(
+            batch.observations.flatten().tolist(),
+            batch.episode_starts.tolist(),
+            batch.mask.tolist(),
+            strict=True,
+        )
+        if is_row
+    }
+    assert begun == {0.0: 1.0, 1.0: 0.0, 4.0: 1.0, 5.0: 0.0}
+
+
+@pytest.fixture
+def model(make_member):
+    """Make a model whose first member dies twice."""
+    members = [make_member("collect-0", steps=(3, 12)), make_member("collect-1")]
+    wanted = Algorithm(name="RecurrentPPO", hyperparameters=HYPERPARAMETERS)
+    check(wanted)
+    return make_model(wanted, SimulatorsVecEnv([Keeper(member) for member in members], 1), seed=1)
+
+
+def test_the_memory_restarts_with_the_first_valid_row(model):
+    """The last row of a mended simulator ends an episode, so the next one begins one."""
+    found = []
+
+    for _ in range(4):
+        model.learn(16, reset_num_timesteps=False)
+        buffer = model.rollout_buffer
+        valid, starts = buffer.valid, buffer.episode_starts.reshape(2, 8).T
+        for row, member in np.argwhere(valid[1:] & ~valid[:-1]):
+            found.append((row, member))
+            assert starts[row + 1, member]
+
+    assert found
+    assert all(bool(tensor.isfinite().all()) for tensor in model.policy.parameters())
+
+
+def test_an_evaluation_keeps_the_memory_of_an_episode(model, make_member):
+    """From step to step, and not from one episode to the next."""
+    first, again = (evaluate(policy_of(model), make_member(), [seed]) for seed in (5, 5))
+    both = evaluate(policy_of(model), make_member(), [3, 5])
+
+    assert first.episodes == again.episodes == both.episodes[1:]
