@@ -3,6 +3,7 @@
 - `tests/golden/<example>.<layout>.yaml`: the plan of each manifests/examples/*.yaml, worlds by checksum
 - `manifests/crd.yaml`, docs/trainingjob.md: made from the API's models
 - `docs/trainingjob.md`: the default hyperparameters of the algorithms
+- `docs/algorithms.md`: which algorithm works with which observations and actions
 - `docs/metrics.md`: every metric that the programs declare
 - `docs/simulators.md`: the devices of the stub
 - `docs/ros-interface.md`: the services and topics of a robot
@@ -28,7 +29,7 @@ from palaestra.plan.text import as_yaml
 from palaestra_sim.world import builtin
 from tests.chart import installation, readme
 from tests.control_plane.programs import NoPrograms
-from tools import dashboards
+from tools import algorithms, dashboards
 from tools.devices import page as devices
 from tools.hyperparameters import page as hyperparameters
 from tools.interface import page as interface
@@ -56,6 +57,7 @@ def recorded() -> Iterator[tuple[Path, str]]:
     for name, text in generated_files(ROOT).items():
         yield ROOT / name, text
     yield ROOT / hyperparameters.PAGE, hyperparameters.page((ROOT / hyperparameters.PAGE).read_text())
+    yield ROOT / algorithms.PAGE, algorithms.page((ROOT / algorithms.PAGE).read_text())
     yield ROOT / metrics.PAGE, metrics.page((ROOT / metrics.PAGE).read_text())
     yield ROOT / judging.PAGE, judging.page((ROOT / judging.PAGE).read_text())
     yield ROOT / interface.PAGE, interface.page((ROOT / interface.PAGE).read_text())

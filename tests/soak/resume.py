@@ -29,7 +29,20 @@ ALGORITHMS = {
     "PPO": {"n_steps": 64, "batch_size": 32, "n_epochs": 2, "policy_kwargs": SMALL},
     "A2C": {"n_steps": 5, "policy_kwargs": SMALL},
     "REINFORCE": {"episodes_per_update": 2, "policy_kwargs": SMALL},
+    "TD3": REPLAYING | {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.1},
+    "DDPG": REPLAYING | {"noise_type": "normal", "noise_std": 0.1},
+    "QRDQN": REPLAYING | {"tau": 0.5, "target_update_interval": 10},
+    "TQC": REPLAYING,
+    "CrossQ": REPLAYING,
+    "TRPO": {"n_steps": 64, "batch_size": 32, "policy_kwargs": SMALL},
+    "RecurrentPPO": {
+        "n_steps": 64,
+        "batch_size": 32,
+        "n_epochs": 2,
+        "policy_kwargs": SMALL | {"lstm_hidden_size": 16},
+    },
 }
+CONTINUOUS = ("SAC", "TD3", "DDPG", "TQC", "CrossQ")
 COLLECTORS = (1, 2)
 AMID = (100, STEPS - 200)
 LONGEST_S = 600.0
@@ -84,7 +97,7 @@ def interrupt(run, step, way):
 
 def job(name, collectors):
     """Return a job that evaluates and saves a few times."""
-    continuous = {"options": {"max_steps": 50, "actions": "continuous" if name == "SAC" else "discrete"}}
+    continuous = {"options": {"max_steps": 50, "actions": "continuous" if name in CONTINUOUS else "discrete"}}
     return make_job(
         collect={"count": collectors},
         environment={"id": "MoveToTargetEnv-v0"} | continuous,

@@ -40,7 +40,8 @@ def table() -> str:
     rows = []
     for name in ALGORITHMS:
         for seen in OBSERVATIONS:
-            cells = [_cell(refusal(name, seen, acted), reasons) for acted in ACTIONS]
+            found = (refusal(name, seen, acted).replace(name, "NAME") for acted in ACTIONS)
+            cells = [_cell(reason, reasons) for reason in found]
             rows.append(f"| {name} | {seen} | {' | '.join(cells)} |")
     return "\n".join(
         (

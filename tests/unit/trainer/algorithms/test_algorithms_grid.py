@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import torch
 
-from palaestra_trainer import checkpoint
+from palaestra.api.fields import ALGORITHMS as NAMES
+from palaestra_trainer import checkpoint, load_policy
 from palaestra_trainer.algorithms import ALGORITHMS
 from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory, read_lines
@@ -23,7 +24,13 @@ from tools.algorithms import refusal
 pytestmark = pytest.mark.minutes(3)
 
 COLLECTORS = 2
-OFF_POLICY = {"learning_starts": 8, "batch_size": 8, "buffer_size": 60, "train_freq": 3}
+OFF_POLICY = {
+    "learning_starts": 8,
+    "batch_size": 8,
+    "buffer_size": 60,
+    "train_freq": 3,
+    "gradient_steps": 1,
+}
 # A soft update of the target comes between the boundary and the signal, so its second one would be noticed.
 SOFT = {"target_update_interval": 4, "tau": 0.5}
 NOISE = {"noise_type": "ornstein-uhlenbeck", "noise_std": 0.2}
@@ -51,9 +58,10 @@ WORKING = [cell for cell in CELLS if not refusal(*cell)]
 def play(make_member, make_configuration, tmp_path):
     """Train into a folder; the first simulator dies at each of `deaths`, a signal comes at a step of it."""
 
-    def run(folder, cell, *, signal_at=0, deaths=(), steps=44):
+    def run(folder, cell, *, signal_at=0, deaths=(), steps=44, **more):
         name, seen, acted = cell
         algorithm = {"name": name, "hyperparameters": {"policy_kwargs": SMALL} | HYPERPARAMETERS[name]}
+        algorithm |= more
         taken = iter(range(1, 10_000))
 
         def make_members(given):
@@ -67,6 +75,7 @@ def play(make_member, make_configuration, tmp_path):
 
         configuration = make_configuration(
             algorithm=algorithm,
+            environment={"id": "MoveToTargetEnv-v0"},  # `load_policy` needs one that is registered
             steps=steps,
             collectors=COLLECTORS,
             evaluation={"everySteps": 20, "episodes": 1, "confirmEpisodes": 0},
@@ -93,10 +102,12 @@ class Interrupted(FakeTask):
 
 
 def tensors(path):
-    """Return every tensor of a model's file by name, as lists."""
+    """Return every tensor of a model's file by name, as lists, and what it normalizes by."""
     with zipfile.ZipFile(path) as archive:
         parts = {name: archive.read(name) for name in archive.namelist() if name.endswith(".pth")}
-    return {
+        normalized = [name for name in archive.namelist() if name == "normalize.json"]
+        parts_as_json = {name: json.loads(archive.read(name)) for name in normalized}
+    return parts_as_json | {
         f"{part}{place}": tensor.tolist()
         for part, content in parts.items()
         for place, tensor in flat(torch.load(io.BytesIO(content), weights_only=True))
@@ -122,6 +133,35 @@ def outcome(directory):
     experience = {name: digest for name, digest in found.manifest.files.items() if "experience" in name}
     evaluations = [line | {"seconds": 0} for line in read_lines(directory.evaluations)]
     return tensors(found.path / "model.zip") | state | experience | {"evaluations": evaluations}
+
+
+def test_the_job_names_the_algorithms_of_the_table():
+    """The operator accepts what the trainer trains."""
+    assert set(NAMES) == set(ALGORITHMS)
+
+
+def test_what_is_refused_is_refused_before_a_model_is_made(play):
+    """By the sentence that the table in docs/algorithms.md has."""
+    for cell in (("RecurrentPPO", "Box", "MultiBinary"), ("PPO", "Tuple", "Box"), ("CrossQ", "image", "Box")):
+        assert play("refused", cell)[0] == 2
+
+
+@pytest.mark.parametrize("name", ["PPO", "SAC", "RecurrentPPO"])
+@pytest.mark.parametrize("seen", ["Dict", "Dict with image"])
+def test_a_dict_is_normalized_by_key_and_resumes_exactly(play, name, seen):
+    """Each Box of numbers has statistics of its own; an image and a discrete value have none."""
+    cell, normalize = (name, seen, "Box"), {"normalize": {}}
+    whole, reference = play("whole", cell, **normalize)
+    interrupted, directory = play("cut", cell, signal_at=15, **normalize)
+    resumed, _ = play("cut", cell, **normalize)
+
+    wanted, found = outcome(reference), outcome(directory)
+    assert (whole, interrupted, resumed) == (0, 75, 0)
+    assert [name for name in wanted.keys() | found.keys() if wanted.get(name) != found.get(name)] == []
+    assert set(wanted["normalize.json"]) == {"observations/numbers", "rewards", "epsilon"}
+    policy = load_policy(directory.path)
+    assert set(policy.scales) == {"numbers"}
+    assert policy.predict(OBSERVATIONS[seen].sample())[0].shape == ACTIONS["Box"].shape
 
 
 @pytest.mark.parametrize("cell", WORKING, ids=", ".join)

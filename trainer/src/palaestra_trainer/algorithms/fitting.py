@@ -81,10 +81,8 @@ def scalable(space: spaces.Space[Any]) -> list[str] | bool:
 def _about_observations(seen: spaces.Space[Any]) -> list[str]:
     parts = seen.spaces if isinstance(seen, spaces.Dict) else {"": seen}
     return [
-        f"environment.id: its observation {key} is a {type(part).__name__}, which no policy takes; "
-        "use Box, Discrete, MultiDiscrete or MultiBinary, or a Dict of these".replace(
-            "observation  ", "observation "
-        )
+        f"environment.id: its {f'observation {key}'.rstrip()} is a {type(part).__name__}, which no policy "
+        "takes; use Box, Discrete, MultiDiscrete or MultiBinary, or a Dict of these"
         for key, part in parts.items()
         if not isinstance(part, KINDS)
     ]

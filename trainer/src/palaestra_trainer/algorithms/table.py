@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
@@ -94,7 +95,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         # A vector step is num_envs steps: the target can't be updated more often than that.
         chosen["target_update_interval"] = max(chosen["target_update_interval"], env.num_envs)
     if algorithm.normalize:
-        if not algorithm.normalize.observations:
+        if not algorithm.normalize.observations or isinstance(env.observation_space, spaces.Dict):
             env = with_channels_first(env)
         env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
     if chosen.get("normalize_advantage") and (chosen.get("n_steps"), env.num_envs) == (1, 1):
