@@ -153,7 +153,8 @@ def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
             f"algorithm.name: {cls.__name__} is neither an OnPolicyAlgorithm nor an OffPolicyAlgorithm, so "
             "rows that a fault spoiled would reach its losses; use a class that is one of them"
         )
-    return type(cls.__name__, (rows, cls), {"__doc__": cls.__doc__, "__module__": cls.__module__})
+    made = type(cls.__name__, (rows, cls), {"__doc__": cls.__doc__, "__module__": cls.__module__})
+    return cast("type[BaseAlgorithm]", made)
 
 
 def _creates_its_own(model: BaseAlgorithm, buffer: Any) -> TypeError:

@@ -49,11 +49,11 @@ def schedule_of(value: Any) -> LinearSchedule | PiecewiseSchedule | None:
     """Return the schedule that a value of a job writes; None if it writes none."""
     if isinstance(value, str) and (number := LINEAR.fullmatch(value)):
         return LinearSchedule(float(number[1]), 0.0, 1.0)
-    return PiecewiseSchedule(value) if _are_points(value) else None
+    return PiecewiseSchedule(value) if isinstance(value, list) and _are_points(value) else None
 
 
-def _are_points(value: Any) -> bool:
-    if not (isinstance(value, list) and value and all(map(_is_point, value))):
+def _are_points(value: list[Any]) -> bool:
+    if not (value and all(map(_is_point, value))):
         return False
     shares = [share for share, _ in value]
     return all(one < other for one, other in pairwise(shares)) and 0 <= shares[0] <= shares[-1] <= 1
