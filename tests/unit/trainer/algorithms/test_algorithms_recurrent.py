@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
@@ -111,19 +113,25 @@ def model(make_member):
     return make_model(wanted, SimulatorsVecEnv([Keeper(member) for member in members], 1), seed=1)
 
 
+def mended(rows):
+    """Return for each first valid row of the first member after an invalid one whether an episode begins."""
+    pairs = pairwise(rows)
+    return [starts[0] for (before, _), (valid, starts) in pairs if valid[0] and not before[0]]
+
+
 def test_the_memory_restarts_with_the_first_valid_row(model):
     """The last row of a mended simulator ends an episode, so the next one begins one."""
-    found = []
+    rows = []
 
-    for _ in range(4):
-        model.learn(16, reset_num_timesteps=False)
-        buffer = model.rollout_buffer
-        valid, starts = buffer.valid, buffer.episode_starts.reshape(2, 8).T
-        for row, member in np.argwhere(valid[1:] & ~valid[:-1]):
-            found.append((row, member))
-            assert starts[row + 1, member]
+    def note(locals_, _):
+        valid = [info["valid"] for info in locals_["infos"]]
+        rows.append((valid, locals_["self"]._last_episode_starts.tolist()))
+        return True
 
-    assert found
+    while len(mended(rows)) < 2:
+        model.learn(16, note, reset_num_timesteps=False)
+
+    assert all(mended(rows))
     assert all(bool(tensor.isfinite().all()) for tensor in model.policy.parameters())
 
 
