@@ -23,6 +23,9 @@ SENTENCES = [
      "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class")),
     ({"trainer.algorithm.cnn": "large"},
      'spec.trainer.algorithm.cnn: "large" is not a cnn; use small'),
+    ({"trainer.algorithm.callbacks": [{"name": "Bored"}]},
+     ('spec.trainer.algorithm.callbacks[0].name: "Bored" is not the name of a class; '
+     "write it as module:Class")),
     ({"trainer.environment.reward": "dense"},
      'spec.trainer.environment.reward: "dense" is not a reward; use Dense or Sparse'),
     ({"trainer.imagePullPolicy": "Sometimes"},

@@ -70,6 +70,16 @@ def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
     assert read_back(job).algorithm.cnn == cnn
 
 
+@pytest.mark.parametrize("callbacks", [None, [{"name": "mine:Bored", "options": {"patience": 3}}]])
+def test_callbacks_are_read_as_they_were_written(make_job, callbacks):
+    """Their options are free, so their names are not changed to those of a TrainingJob's fields."""
+    job = make_job(trainer={"algorithm": {"name": "PPO"} | ({"callbacks": callbacks} if callbacks else {})})
+
+    read = read_back(job).algorithm.callbacks
+
+    assert (None if read is None else [each.model_dump() for each in read]) == callbacks
+
+
 def test_how_simulators_are_kept_going_is_read_as_it_was_written(make_job):
     """Memory is written in bytes: a trainer compares it with what the kernel says."""
     group = {

@@ -85,6 +85,18 @@ class Normalize(_Section):
     clip_rewards: Annotated[float, Field(gt=0)] = 10.0
 
 
+class Callback(_Section):
+    """A callback of the job's author, see `run.callbacks`.
+
+    Attributes:
+        name: its class, as `module:Class`.
+        options: keyword arguments of the class.
+    """
+
+    name: str
+    options: dict[str, Any] = Field(default_factory=dict)
+
+
 class Algorithm(_Section):
     """The learning algorithm.
 
@@ -94,6 +106,7 @@ class Algorithm(_Section):
         normalize: which values are normalized; None: none.
         cnn: the convolutional network for images; None: Stable-Baselines3's NatureCNN.
         policy: a policy of the algorithm, or `module:Class`; None: the one for the observation.
+        callbacks: callbacks of the job's author, in the order of their calls; None: none.
     """
 
     name: str = "DQN"
@@ -101,6 +114,7 @@ class Algorithm(_Section):
     normalize: Normalize | None = None
     cnn: Cnn | None = None
     policy: str | None = None
+    callbacks: tuple[Callback, ...] | None = None
 
 
 class Evaluation(_Section):

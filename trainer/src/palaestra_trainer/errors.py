@@ -6,6 +6,7 @@ TrainerError
 ├── MasterLost           the ROS master is gone; nothing re-registers         exit 75
 ├── Interrupted          a signal asked the run to end (waiting.interruption) exit 75
 ├── Enough               the wanted success rate is reached (run.selection)   exit 0
+├── CallbackFailed       a callback of the job raised an error               exit 1
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
 ├── NoSuchSensor         this robot does not have it
@@ -43,6 +44,10 @@ class UnreadableAnswer(TrainerError, ValueError):
 
     Services and topics raise it as a fault of the simulator that they belong to.
     """
+
+
+class CallbackFailed(TrainerError, RuntimeError):
+    """A callback of the job raised an error, which is its cause."""
 
 
 class FaultBudgetSpent(TrainerError, RuntimeError):

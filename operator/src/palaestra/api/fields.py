@@ -53,6 +53,7 @@ ALGORITHMS = (
 CLASS = "[A-Za-z_][A-Za-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*"
 ALGORITHM = f"^({'|'.join(ALGORITHMS)}|{CLASS})$"
 POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
+CLASS_NAME = f"^{CLASS}$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
 # The message for a value that does not match: <value> is not <first text>; <second text>
@@ -71,6 +72,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
     WORLD_FILE: ("the path of a world", "give the absolute path of a .wbt or .xml file"),
     ALGORITHM: ("an algorithm", f"use {', '.join(ALGORITHMS)} or module:Class"),
     POLICY: ("a policy", "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class"),
+    CLASS_NAME: ("the name of a class", "write it as module:Class"),
     ENVIRONMENT_ID: (
         "the id of an environment",
         "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",

@@ -6,7 +6,17 @@ from typing import Annotated
 from pydantic import Field
 
 from palaestra.api.container import Environment, Resources
-from palaestra.api.fields import ALGORITHM, ENVIRONMENT_ID, POLICY, Count, FreeObject, Image, Words
+from palaestra.api.fields import (
+    ALGORITHM,
+    CLASS_NAME,
+    ENVIRONMENT_ID,
+    POLICY,
+    Count,
+    FreeObject,
+    Image,
+    Listed,
+    Words,
+)
 from palaestra.api.model import ApiModel, Rule
 
 OWN_TASKS = frozenset({"MoveToTargetEnv-v0", "SeeTarget-v0"})
@@ -89,6 +99,16 @@ class Normalize(ApiModel):
     )
 
 
+class Callback(ApiModel):
+    """A callback of your own, derived from Stable-Baselines3's BaseCallback."""
+
+    name: Annotated[str, Field(min_length=1, max_length=256, pattern=CLASS_NAME)]
+    """Its class as `module:Class`; the trainer must be able to import the module."""
+
+    options: FreeObject = Field(default={})
+    """Keyword arguments of the class."""
+
+
 class Algorithm(ApiModel):
     """The learning algorithm."""
 
@@ -111,6 +131,9 @@ class Algorithm(ApiModel):
     policy: Annotated[str, Field(min_length=1, max_length=256, pattern=POLICY)] | None = None
     """Policy of the algorithm, such as MlpPolicy, or `module:Class`; absent: the one that fits the
     observation."""
+
+    callbacks: Annotated[Listed[Callback], Field(max_length=16)] | None = None
+    """Callbacks that are called at every step and rollout of the built-in loop, in this order."""
 
 
 class Evaluation(ApiModel):

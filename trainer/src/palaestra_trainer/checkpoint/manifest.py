@@ -19,6 +19,7 @@ EXPERIENCE = "experience"
 # 1 lacked random generators and the episodes under way, so a run could go on from it, but not exactly.
 FORMAT = 2
 _OLD_FORMATS = (1,)  # without a digest of the manifest itself
+_NOT_COMPARED = {"callbacks"}  # a run may go on with others: a model does not consist of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +74,7 @@ def describe(configuration: Configuration, step: int, counters: Mapping[str, Any
     return Manifest(
         step=step,
         seed=configuration.seed,
-        algorithm=configuration.algorithm.model_dump(mode="json", exclude_none=True),
+        algorithm=configuration.algorithm.model_dump(mode="json", exclude_none=True, exclude=_NOT_COMPARED),
         environment=configuration.environment.model_dump(mode="json", exclude_none=True),
         counters=dict(counters),
     )
@@ -108,7 +109,7 @@ def refuse_another_run(checkpoint: Checkpoint, configuration: Configuration) -> 
     """
     for part in ("algorithm", "environment"):
         section: BaseModel = getattr(configuration, part)
-        wanted = section.model_dump(mode="json")
+        wanted = section.model_dump(mode="json", exclude=_NOT_COMPARED)
         saved = _completed(getattr(checkpoint.manifest, part), type(section))
         for key in wanted:
             if saved.get(key) != wanted[key]:

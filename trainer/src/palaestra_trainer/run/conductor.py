@@ -66,11 +66,21 @@ class Conductor(BaseCallback):
         self._rollout_ended: float | None = None
         self._updates = 0
         self._resting = False
+        self._cut = False
+
+    def drop_rollout(self) -> None:
+        """Put the model back to the last boundary, because a callback cut the rollout; call `finish` next."""
+        if self._boundary is not None:
+            self._boundary.put_back(self.model)
+        self._cut = True
 
     def finish(self) -> None:
         """Evaluate and save the final model, and confirm the best policy."""
         self._learner.check(self.model.num_timesteps)
-        self._mark_boundary()
+        if self._cut:
+            self._step = self.model.num_timesteps
+        else:
+            self._mark_boundary()
         if self._evaluated != self._step:
             self._evaluate_if_wanted()
         self.save()

@@ -15,6 +15,7 @@ import structlog
 
 from palaestra_protocol.pod.status import ExitCode, Termination
 from palaestra_trainer.errors import (
+    CallbackFailed,
     ConfigurationError,
     Diverged,
     FaultBudgetSpent,
@@ -51,6 +52,7 @@ ENDS: tuple[tuple[type[BaseException], int, str], ...] = (
     (Interrupted, ExitCode.INTERRUPTED, "Interrupted"),
     (MasterLost, ExitCode.INTERRUPTED, "MasterLost"),
     (ConfigurationError, ExitCode.CONFIGURATION, "ConfigurationWrong"),
+    (CallbackFailed, UNEXPECTED, "CallbackFailed"),
     (FaultBudgetSpent, ExitCode.FAULT_BUDGET, "SimulatorBudgetSpent"),
     (Diverged, ExitCode.DIVERGED, "Diverged"),
     (SimulatorHung, ExitCode.STALLED, "SimulatorHung"),

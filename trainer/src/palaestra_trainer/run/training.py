@@ -27,6 +27,7 @@ from palaestra_trainer.configuration import Configuration, dump
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
 from palaestra_trainer.run.attempt import Run
+from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.conductor import Conductor, Resumed
 from palaestra_trainer.run.curves import Curves
 from palaestra_trainer.run.journal import Journal
@@ -134,6 +135,7 @@ class Attempt:
         self._progress = progress
         self._around = around
         self._algorithm = configuration.algorithm
+        self._callbacks = JobCallbacks([])
 
     def play(self) -> End:
         """Train, and return how the run ended. It always stops everything that it started."""
@@ -143,7 +145,7 @@ class Attempt:
                 self._train(*self._prepare(stack))
         except Exception as error:  # the edge of the process: every end has an exit code
             end = end_of(error)
-            if end.reason == "Unexpected":
+            if end.reason in {"Unexpected", "CallbackFailed"}:
                 log.exception("unexpected error")
             return end
         return DONE
@@ -170,6 +172,7 @@ class Attempt:
         """
         configuration, progress = self._configuration, self._progress
         algorithms.check(configuration.algorithm)
+        self._callbacks = make_callbacks(configuration.algorithm.callbacks or ())
         interruption = stack.enter_context(Interruption())
         self._watch(stack)
         found = self._newest()
@@ -244,7 +247,7 @@ class Attempt:
         resumed = self._resume(model, env, found) if found else None
         model.set_logger(Curves(self._directory.tensorboard, self._progress))
         with self._progress.spending(Cause.LEARNING):
-            self._learn(model, Conductor(run, env, resumed))
+            self._learn_with_callbacks(model, Conductor(run, env, resumed))
         write_summary(self._directory, summarise(self._directory, self._progress))
 
     def _forget_what_is_played_again(self) -> None:
@@ -275,6 +278,14 @@ class Attempt:
         link_curves(self._directory, self._configuration)
         log.info("training", attempt=attempt, reason=reason, target=self._configuration.steps)
 
+    def _learn_with_callbacks(self, model: BaseAlgorithm, conductor: Conductor) -> None:
+        try:
+            self._learn(model, conductor)
+        except BaseException as error:
+            self._callbacks.end_after(error)
+            raise
+        self._callbacks.end()
+
     def _learn(self, model: BaseAlgorithm, conductor: Conductor) -> None:
         missing = self._configuration.steps - model.num_timesteps
         try:
@@ -282,12 +293,15 @@ class Attempt:
                 with register_optimizer_step_pre_hook(conductor.leave_update):
                     model.learn(
                         missing,
-                        conductor,
+                        [conductor, self._callbacks],
                         log_interval=algorithms.entry_of(self._algorithm.name).log_interval,
                         reset_num_timesteps=False,
                     )
             else:
                 conductor.init_callback(model)
+            if name := self._callbacks.stopped_by:
+                log.info("done early", fact=f"callback {name} returned False")
+                conductor.drop_rollout()
             self._progress.step = model.num_timesteps
             conductor.finish()
         except Enough as enough:

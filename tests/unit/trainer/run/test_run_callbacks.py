@@ -1,0 +1,238 @@
+"""Callbacks of a job's author, beside the training loop's own."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import textwrap
+
+import pytest
+
+from palaestra_trainer import checkpoint
+from palaestra_trainer.configuration import Callback
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run.callbacks import make_callbacks
+from palaestra_trainer.run_directory import RunDirectory, read_lines
+
+MODULE = """
+    from stable_baselines3.common.callbacks import BaseCallback
+
+    SEEN = []
+
+
+    class Notes(BaseCallback):
+        def __init__(self, word="note", *, stop_at=0, fail_at=0, fail_at_end=False):
+            super().__init__()
+            if word == "":
+                raise ValueError("a word is needed")
+            self.word, self.stop_at, self.fail_at, self.fail_at_end = word, stop_at, fail_at, fail_at_end
+
+        def _on_training_start(self):
+            SEEN.append((self.word, "start", self.num_timesteps))
+
+        def _on_step(self):
+            valid = [info["valid"] for info in self.locals["infos"]]
+            SEEN.append((self.word, "step", self.num_timesteps, valid))
+            if self.n_calls == self.fail_at:
+                raise RuntimeError("no such plot")
+            return self.n_calls != self.stop_at
+
+        def _on_training_end(self):
+            SEEN.append((self.word, "end", self.model.num_timesteps))
+            if self.fail_at_end:
+                raise RuntimeError("no such file")
+
+
+    class Plain:
+        pass
+
+
+    class Unfinished(BaseCallback):
+        pass
+
+
+    class Demanding(Notes):
+        def __init__(self, threshold):
+            super().__init__()
+"""
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    """Return the name of a module with callbacks, which no other test has imported."""
+    name = f"callbacks_{tmp_path.name}".replace("-", "_")
+    (tmp_path / f"{name}.py").write_text(textwrap.dedent(MODULE))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return name
+
+
+@pytest.fixture
+def seen(module):
+    """Return what the callbacks of the module have noted."""
+    return __import__(module).SEEN
+
+
+@pytest.fixture
+def with_callbacks(job, module):
+    """Make the configuration of a short run whose callbacks have these options."""
+
+    def make(*options, name="DQN", **changes):
+        configuration = job(name, **changes)
+        callbacks = tuple(Callback(name=f"{module}:Notes", options=chosen) for chosen in options)
+        algorithm = configuration.algorithm.model_copy(update={"callbacks": callbacks})
+        return configuration.model_copy(update={"algorithm": algorithm})
+
+    return make
+
+
+def events(seen, word, event):
+    """Return the step of each event of a callback."""
+    return [entry[2] for entry in seen if entry[:2] == (word, event)]
+
+
+def test_callbacks_are_called_in_their_order_and_end_last(play, with_callbacks, seen):
+    """At the start of an attempt, at each step, and after the last evaluation and checkpoint."""
+    code, _ = play(with_callbacks({"word": "first"}, {"word": "second"}))
+
+    assert code == 0
+    assert [entry[:2] for entry in seen[:4]] == [
+        (w, e) for e in ("start", "step") for w in ("first", "second")
+    ]
+    assert events(seen, "first", "step") == events(seen, "second", "step") == [*range(1, 101)]
+    assert seen[-2:] == [("first", "end", 100), ("second", "end", 100)]
+
+
+def test_a_callback_sees_which_rows_a_fault_spoiled(play, with_callbacks, seen):
+    """They are among the infos and, until the step is over, among its steps."""
+    play(with_callbacks({}, name="PPO"), {"collect-0": {"steps": [5]}})
+
+    valid = [entry[3] for entry in seen if entry[1] == "step"]
+    assert valid[4] == [False]
+    assert events(seen, "note", "step")[3:7] == [4, 5, 5, 5]
+
+
+def test_a_run_with_callbacks_learns_the_same(play, job, with_callbacks, directory, tmp_path):
+    """They look on."""
+    without = RunDirectory(tmp_path / "without")
+    play(with_callbacks({}))
+    play(job(), into=without)
+
+    assert directory.evaluations.read_text() == without.evaluations.read_text()
+
+
+@pytest.mark.parametrize(("name", "kept"), [("DQN", 52), ("PPO", 48)])
+def test_a_callback_that_returns_false_ends_training_ordinarily(
+    play, with_callbacks, directory, seen, name, kept
+):
+    """At the boundary of the rollout that it cut: evaluated, confirmed, saved and finished."""
+    code, _ = play(with_callbacks({"stop_at": 55}, name=name))
+
+    assert code == 0
+    assert json.loads(directory.summary.read_text())["steps"] == kept
+    assert checkpoint.newest(directory.checkpoints).manifest.step == kept
+    assert [line["step"] for line in read_lines(directory.evaluations)][-1] == kept
+    assert events(seen, "note", "end") == [kept]
+
+
+def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
+    play, job, with_callbacks, directory, tmp_path
+):
+    """Nothing of the rollout that was cut is left, so the way on is the same."""
+    without, longer = RunDirectory(tmp_path / "without"), RunDirectory(tmp_path / "longer")
+    play(job("DQN", evaluation={"everySteps": 0}), into=without)
+    play(with_callbacks({"stop_at": 55}, evaluation={"everySteps": 0}))
+    code, _ = play(job("DQN", resume_from=str(directory.path), evaluation={"everySteps": 0}), into=longer)
+
+    digests = [
+        {name: digest for name, digest in newest.manifest.files.items() if name.endswith(".npy")}
+        for newest in (checkpoint.newest(run.checkpoints) for run in (without, longer))
+    ]
+    assert code == 0
+    assert digests[0] == digests[1]
+
+
+def test_an_error_of_a_callback_ends_the_run_with_its_name_and_a_checkpoint(
+    play, with_callbacks, directory, last_word, module, seen
+):
+    """A retry may help, for example if a server was down."""
+    code, members = play(with_callbacks({"fail_at": 55}))
+
+    assert code == 1
+    assert last_word().reason == (
+        f"CallbackFailed: callback {module}:Notes: raised RuntimeError: no such plot"
+    )
+    assert checkpoint.newest(directory.checkpoints).manifest.step == 52
+    assert members["collect-0"].log[-1] == "stop"
+    assert events(seen, "note", "end") == [52]
+
+
+def test_an_error_at_the_end_is_reported_too(play, with_callbacks, last_word, seen):
+    """After the other callbacks have ended."""
+    code, _ = play(with_callbacks({"fail_at_end": True}, {"word": "second"}))
+
+    assert code == 1
+    assert "raised RuntimeError: no such file" in last_word().reason
+    assert events(seen, "second", "end") == [100]
+
+
+def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_word, seen):
+    """It also learns of the end of the interrupted attempt, whose reason stays the signal."""
+    configuration = with_callbacks({"fail_at_end": True})
+    steps = iter(range(1, 1000))
+
+    play(configuration, on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
+    reason = last_word().reason
+    play(configuration)
+
+    assert reason == "Interrupted: SIGTERM received"
+    assert events(seen, "note", "start") == [0, 40]
+    assert events(seen, "note", "end") == [40, 100]
+
+
+def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
+    """They are no part of the model."""
+    steps = iter(range(1, 1000))
+    play(with_callbacks({}), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
+
+    code, _ = play(job(), must_resume=True)
+
+    assert code == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "fact"),
+    [
+        ("Notes", {}, "[0].name: Notes names no class; write it as module:Class"),
+        ("nowhere:Notes", {}, "[0].name: nowhere cannot be imported (ModuleNotFoundError: No module"),
+        ("{module}:Note", {}, "has no Note; did you mean Notes?"),
+        ("{module}:Plain", {}, "{module}:Plain is no callback; derive it from"),
+        ("{module}:SEEN", {}, "{module}:SEEN is no callback"),
+        ("{module}:Unfinished", {}, "{module}:Unfinished has no _on_step; add this method"),
+        ("{module}:Notes", {"stopat": 1}, "options.stopat: {module}:Notes has no such argument; did you"),
+        ("{module}:Demanding", {}, "options.threshold: {module}:Demanding needs this argument; set it"),
+        ("{module}:Notes", {"word": ""}, "refuses its arguments (ValueError: a word is needed); change them"),
+    ],
+)
+def test_a_wrong_callback_is_refused_with_field_fact_and_remedy(module, name, options, fact):
+    """All that can be known without a simulator is known before one starts."""
+    wanted = Callback(name=name.format(module=module), options=options)
+
+    with pytest.raises(ConfigurationError) as caught:
+        make_callbacks([wanted])
+
+    assert "algorithm.callbacks[0]" in str(caught.value)
+    assert fact.format(module=module) in str(caught.value)
+
+
+def test_all_wrong_callbacks_are_reported_at_once_before_a_simulator_starts(
+    play, with_callbacks, last_word, directory
+):
+    """With exit code 2; no attempt is recorded."""
+    code, members = play(with_callbacks({"stopat": 1}, {}, {"wrd": ""}))
+
+    assert code == 2
+    assert "callbacks[0].options.stopat" in last_word().reason
+    assert "callbacks[2].options.wrd" in last_word().reason
+    assert members == {}
+    assert not directory.attempts.exists()

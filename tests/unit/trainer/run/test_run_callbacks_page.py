@@ -1,0 +1,42 @@
+"""docs/callbacks.md, carried out as it stands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from palaestra.api import load
+from palaestra.plan import ClusterLayout, Images, identified, plan
+from palaestra_trainer.configuration import parse
+from tests.pages import blocks
+
+PAGE = (Path(__file__).parents[4] / "docs" / "callbacks.md").read_text()
+
+
+@pytest.fixture
+def job_of_the_page():
+    """Return the algorithm of a job on the page, as its trainer reads it."""
+
+    def read(kind):
+        job = identified(load(blocks(PAGE, f"yaml {kind}")[0]), "uid")
+        planned = plan(job, ClusterLayout(images=Images.of_release("1"))).replicas[0]
+        return parse(yaml.safe_load(planned.config_map["data"]["training.yaml"])).algorithm
+
+    return read
+
+
+def test_the_callback_of_the_page_ends_training(play, job, directory, job_of_the_page, tmp_path, monkeypatch):
+    """The return of the corridor cannot rise for ever."""
+    (tmp_path / "bored.py").write_text(blocks(PAGE, "python bored")[0])
+    monkeypatch.syspath_prepend(str(tmp_path))
+    short = job("PPO", steps=5000, evaluation={"everySteps": 0})
+    callbacks = job_of_the_page("bored").callbacks
+    algorithm = short.algorithm.model_copy(update={"callbacks": callbacks})
+
+    code, _ = play(short.model_copy(update={"algorithm": algorithm}))
+
+    assert code == 0
+    assert json.loads(directory.summary.read_text())["steps"] < 5000

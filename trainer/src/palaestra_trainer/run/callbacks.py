@@ -1,0 +1,200 @@
+"""The callbacks of a job: Stable-Baselines3 callbacks of its author, beside the conductor.
+
+A mistake in their list is found before a simulator starts. They are called after the conductor, in the order
+of the job. An exception of a callback ends the run with an error that names the callback. No state of a
+callback is saved, since that would need pickling: each attempt creates the callbacks anew.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import structlog
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
+
+from palaestra_trainer.configuration import Callback, nearest
+from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError
+
+log = structlog.get_logger(__name__)
+
+FIELD = "algorithm.callbacks"
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
+    """Return the callbacks of a job, which are new.
+
+    Raises:
+        ConfigurationError: one line for each that cannot be imported, is no callback, or refuses its options.
+    """
+    mistakes: list[str] = []
+    made: list[_Named] = []
+    for index, callback in enumerate(wanted):
+        field = f"{FIELD}[{index}]"
+        try:
+            cls = _class(f"{field}.name", callback.name)
+            _check_options(f"{field}.options", cls, callback)
+            made.append(_Named(callback.name, _made(f"{field}.options", cls, callback)))
+        except ConfigurationError as error:
+            mistakes.append(str(error))
+    if mistakes:
+        raise ConfigurationError("\n".join(mistakes))
+    return JobCallbacks(made)
+
+
+class JobCallbacks(CallbackList):
+    """The callbacks of a job as one.
+
+    Their `_on_training_end` is called by `end`, after the last evaluation and checkpoint, not at the end of
+    `learn`. So a callback sees every scalar that is logged, and also the end of an interrupted attempt.
+
+    Attributes:
+        stopped_by: name of the callback that ended training by returning False; None: none did.
+    """
+
+    def __init__(self, callbacks: Sequence[_Named]) -> None:
+        super().__init__(list(callbacks))
+        self._named = callbacks
+        self._begun = False
+
+    @property
+    def stopped_by(self) -> str | None:
+        """Name of the first callback that has returned False."""
+        return next((callback.name for callback in self._named if callback.stopped), None)
+
+    def end(self) -> None:
+        """Call `_on_training_end` of each callback, if training has begun.
+
+        Raises:
+            CallbackFailed: one of them raised an error; the others were called too.
+        """
+        failed: list[CallbackFailed] = []
+        for callback in self._named if self._begun else ():
+            try:
+                callback.on_training_end()
+            except CallbackFailed as error:
+                failed.append(error)
+        if failed:
+            raise failed[0]
+
+    def end_after(self, error: BaseException) -> None:
+        """Do the same after an error, which a failure of a callback must not hide: it is logged."""
+        try:
+            self.end()
+        except CallbackFailed as failed:
+            if not isinstance(error, CallbackFailed):
+                log.exception("callback failed after the end of training", fact=str(failed))
+
+    def _on_training_start(self) -> None:
+        self._begun = True
+        super()._on_training_start()
+
+    def _on_training_end(self) -> None:
+        """Do nothing: `end` calls the callbacks."""
+
+
+class _Named(CallbackList):
+    """One callback; its exceptions become errors with its name.
+
+    Attributes:
+        name: its class, as the job names it.
+        stopped: whether it has returned False.
+    """
+
+    def __init__(self, name: str, callback: BaseCallback) -> None:
+        super().__init__([callback])
+        self.name = name
+        self.stopped = False
+
+    def _init_callback(self) -> None:
+        self._call(super()._init_callback)
+
+    def _on_training_start(self) -> None:
+        self._call(super()._on_training_start)
+
+    def _on_rollout_start(self) -> None:
+        self._call(super()._on_rollout_start)
+
+    def _on_step(self) -> bool:
+        goes_on = bool(self._call(super()._on_step))
+        self.stopped = self.stopped or not goes_on
+        return goes_on
+
+    def _on_rollout_end(self) -> None:
+        self._call(super()._on_rollout_end)
+
+    def _on_training_end(self) -> None:
+        self._call(super()._on_training_end)
+
+    def _call(self, method: Callable[[], Any]) -> Any:
+        with _naming(self.name):
+            return method()
+
+
+@contextmanager
+def _naming(name: str) -> Iterator[None]:
+    try:
+        yield
+    except TrainerError:
+        raise  # a fault, a signal: not the callback's
+    except Exception as error:  # whatever code of the job's author raises
+        raise CallbackFailed(f"callback {name}: raised {type(error).__name__}: {error}") from error
+
+
+def _class(field: str, name: str) -> type[BaseCallback]:
+    module, colon, attribute = name.partition(":")
+    if not (module and colon and attribute):
+        raise ConfigurationError(f"{field}: {name} names no class; write it as module:Class")
+    try:
+        found = importlib.import_module(module)
+    except Exception as error:  # a module of the job's author may raise anything
+        raise ConfigurationError(
+            f"{field}: {module} cannot be imported ({type(error).__name__}: {error}); "
+            "install it into the trainer's image, or correct the name"
+        ) from error
+    cls = getattr(found, attribute, None)
+    if cls is None:
+        names = [name for name, value in vars(found).items() if isinstance(value, type)]
+        raise ConfigurationError(f"{field}: {module} has no {attribute}; {nearest(attribute, names)}")
+    if not (isinstance(cls, type) and issubclass(cls, BaseCallback)):
+        raise ConfigurationError(
+            f"{field}: {name} is no callback; derive it from stable_baselines3.common.callbacks.BaseCallback"
+        )
+    if inspect.isabstract(cls):
+        raise ConfigurationError(f"{field}: {name} has no _on_step; add this method")
+    return cls
+
+
+def _check_options(field: str, cls: type[BaseCallback], callback: Callback) -> None:
+    parameters = inspect.signature(cls).parameters
+    known = [name for name, parameter in parameters.items() if parameter.kind in _NAMED]
+    anything = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
+    lines = [
+        f"{field}.{name}: {callback.name} has no such argument; {_nearest(name, known)}"
+        for name in callback.options
+        if name not in known and not anything
+    ]
+    lines += [
+        f"{field}.{name}: {callback.name} needs this argument; set it"
+        for name in known
+        if parameters[name].default is inspect.Parameter.empty and name not in callback.options
+    ]
+    if lines:
+        raise ConfigurationError("\n".join(lines))
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    return nearest(name, known) if known else "it has no arguments, so remove this one"
+
+
+def _made(field: str, cls: type[BaseCallback], callback: Callback) -> BaseCallback:
+    try:
+        return cls(**callback.options)
+    except Exception as error:  # a constructor of the job's author may raise anything
+        raise ConfigurationError(
+            f"{field}: {callback.name} refuses its arguments ({type(error).__name__}: {error}); change them"
+        ) from error
