@@ -78,6 +78,11 @@ class RunDirectory:
         """Event files of TensorBoard."""
         return self.path / "tensorboard"
 
+    @property
+    def trackers(self) -> Path:
+        """The id of the run that each experiment tracker has, if the job uses any."""
+        return self.path / "trackers.json"
+
     def begin_attempt(self, pod_uid: str, reason: str) -> int:
         """Record the start of an attempt; return its number, counted from 1."""
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())

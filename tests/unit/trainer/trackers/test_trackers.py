@@ -1,0 +1,109 @@
+"""The part that all trackers share, tried with one that keeps everything in memory."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+from typing import Any, ClassVar
+
+import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+from palaestra_trainer.configuration import Callback
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run import callbacks
+from palaestra_trainer.run.callbacks import make_callbacks
+from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run, title_of
+
+
+class Memory(Tracker):
+    """Keeps what it gets, for all attempts together."""
+
+    begun: ClassVar[list[Any]] = []
+    points: ClassVar[list[Any]] = []
+    ended: ClassVar[list[int]] = []
+
+    def begin(self, directory, configuration):
+        """Continue the run that is known, or begin the first."""
+        run = known_run(directory, "memory")
+        if run is None:
+            remember_run(directory, "memory", "the-run")
+        self.begun.append((run, configuration))
+
+    def log_scalars(self, step, scalars):
+        """Keep them."""
+        self.points.append((step, scalars))
+
+    def end(self):
+        """Note it."""
+        self.ended.append(len(self.points))
+
+
+@pytest.fixture
+def memory(monkeypatch):
+    """Return the tracker, empty, as the class of every callback."""
+    for name in ("begun", "points", "ended"):
+        monkeypatch.setattr(Memory, name, [])
+    monkeypatch.setattr(callbacks, "_class", lambda *_: Memory)
+    return Memory
+
+
+@pytest.fixture
+def tracked(job):
+    """Make the configuration of a short run with the tracker."""
+
+    def make(name="DQN", **changes):
+        configuration = job(name, **changes)
+        algorithm = configuration.algorithm.model_copy(update={"callbacks": (Callback(name="a:Memory"),)})
+        return configuration.model_copy(update={"algorithm": algorithm})
+
+    return make
+
+
+def test_a_tracker_gets_every_scalar_of_tensorboard_at_the_same_step(play, tracked, memory, directory):
+    """Also those of the last evaluation and of the confirmation, after the end of learning."""
+    play(tracked("PPO"))
+
+    points = {(name, step): value for step, scalars in memory.points for name, value in scalars.items()}
+    curves = EventAccumulator(str(directory.tensorboard)).Reload()
+    names = curves.Tags()["scalars"]
+    assert {(name, point.step) for name in names for point in curves.Scalars(name)} == points.keys()
+    assert [points["eval/mean_reward", point.step] for point in curves.Scalars("eval/mean_reward")] == (
+        pytest.approx([point.value for point in curves.Scalars("eval/mean_reward")])
+    )
+    assert "confirm/success_rate" in names
+    assert memory.ended == [len(memory.points)]
+
+
+def test_a_tracker_gets_the_configuration_with_every_hyperparameter(play, tracked, memory):
+    """Defaults too, because a later release may have others."""
+    play(tracked())
+
+    run, configuration = memory.begun[0]
+    assert run is None
+    assert (configuration["job"], configuration["steps"]) == ("corridor", 100)
+    assert configuration["algorithm"]["hyperparameters"].keys() >= {"gamma", "buffer_size", "policy_kwargs"}
+    assert title_of(configuration) == "corridor-0"
+
+
+def test_every_attempt_continues_the_same_run_of_the_tracker(play, tracked, memory):
+    """Its id is in the run directory, which outlives an attempt."""
+    steps = iter(range(1, 1000))
+    play(tracked(), on_step=lambda: next(steps) == 42 and os.kill(os.getpid(), signal.SIGTERM))
+    play(tracked())
+
+    assert [run for run, _ in memory.begun] == [None, "the-run"]
+    assert len(memory.ended) == 2
+    assert max(step for step, _ in memory.points) == 100
+
+
+@pytest.mark.parametrize("tracker", ["wandb:Wandb", "mlflow:MLflow"])
+def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
+    """Before a simulator starts."""
+    library, _, _ = tracker.partition(":")
+    if importlib.util.find_spec(library):
+        pytest.skip(f"{library} is installed")
+
+    with pytest.raises(ConfigurationError, match=f"No module named '{library}'.*; install it into the"):
+        make_callbacks([Callback(name=f"palaestra_trainer.trackers.{tracker}")])

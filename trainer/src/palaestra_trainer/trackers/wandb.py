@@ -1,0 +1,64 @@
+"""Weights & Biases, by default offline: its files are in the run directory, and `wandb sync` uploads them."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Mapping
+from typing import Any
+
+import wandb
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run, title_of
+
+NAME = "wandb"
+MODES = ("offline", "online")
+
+
+class Wandb(Tracker):
+    """Sends the curves of a run to Weights & Biases.
+
+    Args:
+        project: project of the run.
+        mode: `offline` writes files only; `online` also uploads and needs WANDB_API_KEY and network access.
+        entity: user or team of the project; None: the default of the account.
+    """
+
+    def __init__(self, project: str = "palaestra", mode: str = MODES[0], entity: str | None = None) -> None:
+        super().__init__()
+        if mode not in MODES:
+            raise ConfigurationError(f"mode: {mode!r} is not a mode; use {' or '.join(MODES)}")
+        self._project, self._mode, self._entity = project, mode, entity
+        self._step = 0
+
+    def begin(self, directory: RunDirectory, configuration: Mapping[str, Any]) -> None:
+        """Begin the run, or continue it: attempts of one id are uploaded as one run."""
+        run = known_run(directory, NAME)
+        if run is None:
+            run = secrets.token_hex(4)
+            remember_run(directory, NAME, run)
+        self._run = wandb.init(
+            project=self._project,
+            entity=self._entity,
+            mode=self._mode,
+            id=run,
+            resume="allow",
+            name=title_of(configuration),
+            group=configuration["job"],
+            config=dict(configuration),
+            dir=str(directory.path),
+            # The log of the run is the pod's; a program of git may be missing.
+            settings=wandb.Settings(console="off", disable_git=True, silent=True),
+        )
+        self._run.define_metric("step")
+        self._run.define_metric("*", step_metric="step")
+
+    def log_scalars(self, step: int, scalars: Mapping[str, float]) -> None:
+        """Log the scalars; `step` is a value too, the x axis: W&B ignores a step below its last one."""
+        self._step = max(self._step, step)
+        self._run.log({**scalars, "step": step}, step=self._step)
+
+    def end(self) -> None:
+        """Write what is still buffered, and end W&B's process."""
+        self._run.finish()
