@@ -22,12 +22,14 @@ from torch.utils.tensorboard.writer import SummaryWriter
 from palaestra_protocol.pod.status import Cause, ExitCode, SuccessInterval, Termination
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.algorithms.divergence import Learner
+from palaestra_trainer.algorithms.replay_size import replay_size
 from palaestra_trainer.checkpoint import Checkpoint
 from palaestra_trainer.configuration import Configuration, dump
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
 from palaestra_trainer.run.attempt import Run
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
+from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
 from palaestra_trainer.run.conductor import Conductor, Resumed
 from palaestra_trainer.run.curves import Curves
 from palaestra_trainer.run.journal import Journal
@@ -209,6 +211,8 @@ class Attempt:
         wanted = self._configuration
         env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check)
         stack.callback(env.close)
+        replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
+        refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))
         return Learning(env, algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device))
 
     def _take_over(self, found: Checkpoint | None) -> None:

@@ -1,0 +1,84 @@
+"""The size of a replay buffer, computed from the spaces before the buffer exists.
+
+NumPy allocates memory when a row is first written. So a buffer that is larger than the run has steps needs
+memory for the steps only.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from gymnasium import spaces
+from stable_baselines3.common.preprocessing import get_action_dim, get_obs_shape
+
+from palaestra_trainer.algorithms.fitting import KINDS
+from palaestra_trainer.configuration import Algorithm
+
+_FLOAT = np.dtype(np.float32).itemsize
+_REWARD_DONE_TIMEOUT = 3 * _FLOAT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplaySize:
+    """A replay buffer by its size.
+
+    Attributes:
+        rows: rows that the run can fill: `buffer_size`, or the steps of the run if they are fewer.
+        row_bytes: observation, next observation, action, reward, end and time limit of one row.
+    """
+
+    rows: int
+    row_bytes: int
+
+    @property
+    def memory_bytes(self) -> int:
+        """Memory of all rows."""
+        return self.rows * self.row_bytes
+
+    def disk_bytes(self, every_steps: int, keep: int) -> int:
+        """Size of all checkpoints together: they share the rows that did not change between them.
+
+        Each but the newest has rows of its own, as many as were overwritten until the next one. One more
+        checkpoint than is kept exists while it is written.
+        """
+        return self.memory_bytes + keep * min(every_steps, self.rows) * self.row_bytes
+
+    def most_rows(self, memory_bytes: int, disk_bytes: int, every_steps: int, keep: int) -> int:
+        """Return the number of rows with which a buffer fits into memory, and its checkpoints on the disk."""
+        in_memory = memory_bytes // self.row_bytes
+        on_disk = disk_bytes // self.row_bytes
+        # Up to `every_steps` rows, every checkpoint may have all rows; beyond, each has `every_steps` more.
+        fitting = on_disk - keep * every_steps
+        return max(0, min(in_memory, fitting if fitting >= every_steps else on_disk // (keep + 1)))
+
+
+def replay_size(
+    algorithm: Algorithm, observation: spaces.Space[Any], action: spaces.Space[Any], steps: int
+) -> ReplaySize | None:
+    """Return the size of an algorithm's replay buffer; None: it has none, or no policy takes the space.
+
+    Args:
+        algorithm: with all its hyperparameters.
+        observation: the environment's space.
+        action: the environment's space.
+        steps: steps of the whole run.
+    """
+    buffer_size = algorithm.hyperparameters.get("buffer_size")
+    parts = observation.spaces.values() if isinstance(observation, spaces.Dict) else [observation]
+    if buffer_size is None or not all(isinstance(part, KINDS) for part in parts):
+        return None
+    seen = sum(math.prod(cast("tuple[int, ...]", get_obs_shape(part))) * _itemsize(part) for part in parts)
+    # Stable-Baselines3 stores actions of float64 as float32.
+    acted = get_action_dim(action) * min(_itemsize(action), _FLOAT if _is_float(action) else math.inf)
+    return ReplaySize(rows=min(buffer_size, steps), row_bytes=int(2 * seen + acted) + _REWARD_DONE_TIMEOUT)
+
+
+def _itemsize(space: spaces.Space[Any]) -> int:
+    return np.dtype(space.dtype).itemsize
+
+
+def _is_float(space: spaces.Space[Any]) -> bool:
+    return np.issubdtype(np.dtype(space.dtype), np.floating)

@@ -1,0 +1,150 @@
+"""The memory and the disk that a run may use, and refusing a replay buffer that does not fit.
+
+A container's memory limit is its control group's, so `limits.memory` of a job need not be passed on. Without
+a limit, the machine's available memory counts. A volume's free space is what the file system reports.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from palaestra_trainer.algorithms.replay_size import ReplaySize
+from palaestra_trainer.configuration import Checkpoint
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run_directory import RunDirectory
+
+# For an update with its batches, evaluations, and the write of a checkpoint: by far more than they need here.
+RESERVE_BYTES = 128 << 20
+CONTROL_GROUPS = Path("/sys/fs/cgroup")
+_KIB = 1024
+_GB = 10**9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Capacity:
+    """The room that a replay buffer has.
+
+    Attributes:
+        memory_bytes: memory that this process may still allocate; None: unknown.
+        memory_limit: whether a limit of the container, or of another control group, determines it.
+        disk_bytes: room for checkpoints on the volume of the run directory, with those that are there.
+    """
+
+    memory_bytes: int | None
+    memory_limit: bool
+    disk_bytes: int
+
+
+def capacity_now(
+    directory: RunDirectory, *, groups: Path = CONTROL_GROUPS, processes: Path = Path("/proc")
+) -> Capacity:
+    """Return the room that there is now.
+
+    Args:
+        directory: of the run; it exists.
+        groups: where the control groups are mounted.
+        processes: where the kernel reports memory, and the control group of this process.
+    """
+    machine = _available(processes / "meminfo")
+    limited = min(_left_in_groups(groups, processes / "self" / "cgroup"), default=None)
+    found = [left for left in (machine, limited) if left is not None]
+    return Capacity(
+        memory_bytes=max(min(found) - RESERVE_BYTES, 0) if found else None,
+        memory_limit=limited is not None and limited == min(found),
+        disk_bytes=shutil.disk_usage(directory.path).free + _size(directory.checkpoints),
+    )
+
+
+def refuse_what_does_not_fit(replay: ReplaySize | None, wanted: Checkpoint, capacity: Capacity) -> None:
+    """Return if the replay buffer fits into memory and its checkpoints on the volume.
+
+    Raises:
+        ConfigurationError: they do not; with both numbers, and the largest buffer that fits.
+    """
+    if replay is None:
+        return
+    memory = replay.memory_bytes if capacity.memory_bytes is None else capacity.memory_bytes
+    most = replay.most_rows(memory, capacity.disk_bytes, wanted.every_steps, wanted.keep)
+    disk_bytes = replay.disk_bytes(wanted.every_steps, wanted.keep)
+    what = f"algorithm.hyperparameters.buffer_size: {replay.rows:,} rows of {replay.row_bytes:,} bytes need"
+    lines = []
+    if replay.memory_bytes > memory:
+        remedy = "raise trainer.resources.limits.memory" if capacity.memory_limit else "free some memory"
+        lines.append(
+            f"{what} {_gb(replay.memory_bytes)} of memory, and {_gb(memory)} are left; "
+            f"set at most {most}, or {remedy}"
+        )
+    if disk_bytes > capacity.disk_bytes:
+        lines.append(
+            f"{what} {_gb(disk_bytes)} for checkpoints, and the run directory's volume has "
+            f"{_gb(capacity.disk_bytes)}; set at most {most}, or use a larger volume (storage.size)"
+        )
+    if lines:
+        raise ConfigurationError("\n".join(lines))
+
+
+def _available(meminfo: Path) -> int | None:
+    """Return the memory that the machine can still give, which is reported in KiB; None: unknown."""
+    for name, value in _pairs(meminfo):
+        if name == "MemAvailable:":
+            return value * _KIB
+    return None
+
+
+def _left_in_groups(groups: Path, own: Path) -> Iterator[int]:
+    """Yield the room below the memory limit of each control group that this process is in.
+
+    Memory that caches files is not counted as used, because the kernel frees it first.
+    """
+    for line in _lines(own):
+        _, controllers, path = line.split(":", 2)
+        if controllers == "":
+            yield from _left(groups, path, ("memory.max", "memory.current", ("inactive_file", "active_file")))
+        elif "memory" in controllers.split(","):
+            names = ("memory.limit_in_bytes", "memory.usage_in_bytes")
+            caches = ("total_inactive_file", "total_active_file")
+            yield from _left(groups / "memory", path, (*names, caches))
+
+
+def _left(root: Path, path: str, names: tuple[str, str, tuple[str, ...]]) -> Iterator[int]:
+    limit_name, used_name, caches = names
+    group = root / path.strip("/")
+    for folder in (group, *group.parents):
+        limit, used = _number(folder / limit_name), _number(folder / used_name)
+        if limit is not None and used is not None:
+            cached = sum(value for name, value in _pairs(folder / "memory.stat") if name in caches)
+            yield max(limit - max(used - cached, 0), 0)
+        if folder == root:
+            return
+
+
+def _pairs(path: Path) -> Iterator[tuple[str, int]]:
+    for line in _lines(path):
+        name, value, *_ = line.split()
+        yield name, int(value)
+
+
+def _number(path: Path) -> int | None:
+    """Return the number in a file; None: there is no file, or no limit."""
+    lines = _lines(path)
+    return int(lines[0]) if lines and lines[0].isdigit() else None
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+
+
+def _size(folder: Path) -> int:
+    """Return the size of all files in a folder; several names of one file count once."""
+    found = (path.lstat() for path in folder.rglob("*") if path.is_file())
+    return sum({entry.st_ino: entry.st_size for entry in found}.values())
+
+
+def _gb(size_bytes: int) -> str:
+    return f"{size_bytes / _GB:,.2f} GB"
