@@ -19,7 +19,7 @@ from palaestra.api.fields import (
 )
 from palaestra.api.model import ApiModel, Rule
 
-OWN_TASKS = frozenset({"MoveToTargetEnv-v0", "SeeTarget-v0"})
+OWN_TASKS = frozenset({"MoveToTargetEnv-v0", "MoveToTargetGoalEnv-v0", "SeeTarget-v0"})
 
 
 class Reward(StrEnum):

@@ -40,11 +40,19 @@ class Positions(NamedTuple):
         next: row for the next step.
         full: whether every row is in use; if not, the rows before `next` are.
         newest: for each member the row of its last step; None if it has none.
+        columns: for each member its next row and whether its column is full; none without such columns.
     """
 
     next: int
     full: bool
     newest: tuple[int | None, ...]
+    columns: tuple[tuple[int, bool], ...] = ()
+
+    @classmethod
+    def from_json(cls, content: Sequence[Any]) -> Positions:
+        """Return the positions that were written as JSON; older releases wrote no columns."""
+        row, full, newest, *columns = content
+        return cls(row, full, tuple(newest), tuple((at, filled) for at, filled in (columns or [()])[0]))
 
 
 class ValidReplayBuffer(ReplayBuffer):
@@ -80,8 +88,12 @@ class ValidReplayBuffer(ReplayBuffer):
 
     @positions.setter
     def positions(self, positions: Positions) -> None:
-        self.pos, self.full, newest = positions
+        self.pos, self.full, newest, _ = positions
         self._newest = list(newest)
+
+    def can_sample(self) -> bool:
+        """Return whether there is a row to learn from."""
+        return self.size() > 0
 
     def add(
         self,

@@ -21,7 +21,7 @@ from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-from palaestra_trainer.algorithms import noise, own
+from palaestra_trainer.algorithms import her, noise, own
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import with_valid_rows
 from palaestra_trainer.algorithms.signatures import parameters
@@ -69,16 +69,29 @@ class Entry:
         return "action_noise" in parameters(self.original)
 
     @property
+    def replays(self) -> bool:
+        """Whether it learns from a replay buffer."""
+        return issubclass(self.original, OffPolicyAlgorithm)
+
+    @property
     def known(self) -> list[str]:
         """The names of its hyperparameters."""
         names = [name for name in parameters(self.original) if name not in OURS]
-        return [*names, *(noise.NAMES if self.takes_noise else ())]
+        return [
+            *names,
+            *(noise.NAMES if self.takes_noise else ()),
+            *(her.NAMES if self.replays else ()),
+        ]
 
     @property
     def defaults(self) -> dict[str, Any]:
         """The defaults of the class, without those that JSON cannot write."""
         known = parameters(self.original)
-        return {name: known[name].default for name in self.known if name in known and _is_plain(known[name])}
+        return {
+            name: known[name].default
+            for name in self.known
+            if name in known and name not in her.NAMES and _is_plain(known[name])
+        }
 
 
 def _is_plain(parameter: inspect.Parameter) -> bool:

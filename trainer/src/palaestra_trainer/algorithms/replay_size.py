@@ -14,11 +14,13 @@ import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.preprocessing import get_action_dim, get_obs_shape
 
+from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.fitting import KINDS
 from palaestra_trainer.configuration import Algorithm
 
 _FLOAT = np.dtype(np.float32).itemsize
 _REWARD_DONE_TIMEOUT = 3 * _FLOAT
+_EPISODE = 2 * np.dtype(np.int64).itemsize  # start and length, with hindsight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +75,9 @@ def replay_size(
     seen = sum(math.prod(cast("tuple[int, ...]", get_obs_shape(part))) * _itemsize(part) for part in parts)
     # Stable-Baselines3 stores actions of float64 as float32.
     acted = get_action_dim(action) * min(_itemsize(action), _FLOAT if _is_float(action) else math.inf)
-    return ReplaySize(rows=min(buffer_size, steps), row_bytes=int(2 * seen + acted) + _REWARD_DONE_TIMEOUT)
+    episode = _EPISODE if her.wanted(algorithm) else 0
+    row_bytes = int(2 * seen + acted) + _REWARD_DONE_TIMEOUT + episode
+    return ReplaySize(rows=min(buffer_size, steps), row_bytes=row_bytes)
 
 
 def _itemsize(space: spaces.Space[Any]) -> int:

@@ -31,6 +31,7 @@ from palaestra_trainer.algorithms.buffers import (
     ValidRolloutBuffer,
     valid_rows,
 )
+from palaestra_trainer.algorithms.her import ValidHerReplayBuffer
 from palaestra_trainer.algorithms.recurrent import (
     ValidRecurrentDictRolloutBuffer,
     ValidRecurrentRolloutBuffer,
@@ -45,7 +46,7 @@ _MASKED: Mapping[type[RolloutBuffer], type[Any]] = {
     RecurrentRolloutBuffer: ValidRecurrentRolloutBuffer,
     RecurrentDictRolloutBuffer: ValidRecurrentDictRolloutBuffer,
 }
-_BUFFERS = ("replay_buffer_class", "rollout_buffer_class")
+_BUFFERS = ("replay_buffer_class", "replay_buffer_kwargs", "rollout_buffer_class")
 
 
 class ValidRowsCounted(BaseAlgorithm):
@@ -68,8 +69,9 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     """
 
     def _setup_model(self) -> None:
-        as_dict = isinstance(self.observation_space, spaces.Dict)
-        self.replay_buffer_class = ValidDictReplayBuffer if as_dict else ValidReplayBuffer
+        if self.replay_buffer_class is not ValidHerReplayBuffer:
+            as_dict = isinstance(self.observation_space, spaces.Dict)
+            self.replay_buffer_class = ValidDictReplayBuffer if as_dict else ValidReplayBuffer
         super()._setup_model()
         if not isinstance(self.replay_buffer, ValidReplayBuffer):
             raise _creates_its_own(self, self.replay_buffer)
@@ -84,8 +86,8 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
         return super().collect_rollouts(env, callback, train_freq, *args, **kwargs)
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
-        """Learn from the buffer, unless faults have left it empty."""
-        if self.replay_buffer is not None and self.replay_buffer.size():
+        """Learn from the buffer, unless it has nothing to sample, e.g. because of faults."""
+        if cast("ValidReplayBuffer", self.replay_buffer).can_sample():
             super().train(gradient_steps=gradient_steps, batch_size=batch_size)
 
 

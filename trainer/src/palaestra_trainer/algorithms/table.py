@@ -14,7 +14,7 @@ from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.algorithms import noise, values
+from palaestra_trainer.algorithms import her, noise, values
 from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
 from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
@@ -39,10 +39,10 @@ def check(algorithm: Algorithm) -> Entry:
         for name in given
         if name not in known
     ]
-    lines += values.mistakes(
-        entry.original, policy, {name: value for name, value in given.items() if name in known}
-    )
+    plain = {name: value for name, value in given.items() if name in known and name not in her.NAMES}
+    lines += values.mistakes(entry.original, policy, plain)
     lines += noise.mistakes(given, values.FIELD) if entry.takes_noise else []
+    lines += her.mistakes(given, values.FIELD) if entry.replays else []
     if given.get("n_steps", 1) != 1 and "train_freq" in known:
         lines.append(
             "algorithm.hyperparameters.n_steps: rows of several simulators lie in one buffer, "
@@ -86,8 +86,12 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
     )
     added = noise.action_noise(given, env) if entry.takes_noise else None
     chosen = values.arguments(
-        entry.original, {name: value for name, value in given.items() if name not in noise.NAMES}
+        entry.original,
+        {name: value for name, value in given.items() if name not in {*noise.NAMES, *her.NAMES}},
     )
+    if her.wanted(algorithm):
+        her.refuse_other_observations(env.observation_space)
+    chosen |= her.arguments(given)
     if entry.takes_noise:
         chosen["action_noise"] = added
     chosen["policy_kwargs"] = with_network(chosen["policy_kwargs"], algorithm.cnn)

@@ -170,7 +170,7 @@ class State:
             episode_starts=arrays["episode_starts"],
             episodes=content["episodes"],
             successes=content["successes"],
-            positions=positions and Positions(positions[0], positions[1], tuple(positions[2])),
+            positions=positions and Positions.from_json(positions),
             members=[
                 EpisodeState(episode, arrays.get(f"actions-{index}"))
                 for index, episode in enumerate(content["members"])

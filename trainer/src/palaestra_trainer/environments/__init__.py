@@ -8,12 +8,16 @@ Both ways work: `import palaestra_trainer.environments`, then
 import gymnasium
 
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
-from palaestra_trainer.environments.options import Options, SeeOptions
+from palaestra_trainer.environments.move_to_target_goal import MoveToTargetGoalEnv
+from palaestra_trainer.environments.options import GoalOptions, Options, SeeOptions
 from palaestra_trainer.environments.see_target import SeeTargetEnv
 
-__all__ = ["MoveToTargetEnv", "Options", "SeeOptions", "SeeTargetEnv"]
+__all__ = ["GoalOptions", "MoveToTargetEnv", "MoveToTargetGoalEnv", "Options", "SeeOptions", "SeeTargetEnv"]
 
 # As text, since the entry point finds simulators, which this package does not know.
 # No max_episode_steps: the environments count their steps themselves, since Sparse rewards the last.
 gymnasium.register(id="MoveToTargetEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make")
 gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.entry_point:make_seeing")
+gymnasium.register(
+    id="MoveToTargetGoalEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make_goal"
+)

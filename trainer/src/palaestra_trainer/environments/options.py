@@ -77,6 +77,26 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class GoalOptions(Options):
+    """The options of `MoveToTargetGoalEnv`, checked: those of `Options` with other defaults.
+
+    Args:
+        observe: the parts of `observation`; `target` is refused, because the goal has keys of its own.
+        time_up: see `Options`; `truncated`, because time-up has no reward.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+
+    observe: Sequence[str] = ("sensors", "velocity", "position", "time_left")
+    time_up: str | None = TIME_UP[1]
+
+    def __post_init__(self) -> None:
+        parts = (*_mistakes_of_parts(self.observe), *_mistakes_of_goals(self.observe))
+        _refuse((*_mistakes(self), *parts))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SeeOptions:
     """The options of `SeeTargetEnv`, checked.
 
@@ -119,7 +139,7 @@ def parse(given: Mapping[str, Any]) -> Options:
     return parse_as(Options, given)
 
 
-_Chosen = TypeVar("_Chosen", Options, SeeOptions)
+_Chosen = TypeVar("_Chosen", bound=Options | SeeOptions)
 
 
 def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
@@ -171,6 +191,11 @@ def _mistakes_of_parts(names: Sequence[str]) -> Iterator[str]:
         yield f"observe: is empty; choose from {', '.join(PARTS)}"
     if len(set(names)) < len(names):
         yield "observe: contains a part twice; name each once"
+
+
+def _mistakes_of_goals(names: Sequence[str]) -> Iterator[str]:
+    if "target" in names:
+        yield "observe: target would show the goal to a policy that learns other goals; remove it"
 
 
 def _mistakes_of_images(options: SeeOptions) -> Iterator[str]:

@@ -11,17 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
+from palaestra_trainer.simulators.member import Environment
 from palaestra_trainer.waiting.interruption import Check, go_on
 from palaestra_trainer.waiting.turns import take_turns
+
+COMPUTE_REWARD = "compute_reward"  # the method of goal environments
 
 
 class SimulatorsVecEnv(MembersVecEnv):
@@ -31,11 +35,20 @@ class SimulatorsVecEnv(MembersVecEnv):
         keepers: one for each member; rows are in their order.
         run_seed: the replica's seed; each episode's seed is derived from it.
         check: called every tenth of a second during waits for members; raises to stop the wait.
+        judge: an environment without a simulator that computes rewards of goals; None: members do it.
     """
 
-    def __init__(self, keepers: Sequence[Keeper], run_seed: int, *, check: Check = go_on) -> None:
+    def __init__(
+        self,
+        keepers: Sequence[Keeper],
+        run_seed: int,
+        *,
+        check: Check = go_on,
+        judge: Environment | None = None,
+    ) -> None:
         super().__init__(keepers)
         self._check = check
+        self._judge = judge
         self._collectors = [Collector(keeper, run_seed, index, check) for index, keeper in enumerate(keepers)]
         self._watcher = keepers[0].watcher
         self._seeds = [None] * self.num_envs
@@ -114,6 +127,17 @@ class SimulatorsVecEnv(MembersVecEnv):
         for keeper in self._keepers:
             if not keeper.busy:
                 keeper.member.env.close()
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Return what a method of the chosen environments returns.
+
+        `compute_reward` is called on the judge, because members may be restarting.
+        """
+        if self._judge is None or method_name != COMPUTE_REWARD:
+            return super().env_method(method_name, *method_args, indices=indices, **method_kwargs)
+        return [self._judge.get_wrapper_attr(method_name)(*method_args, **method_kwargs)]
 
     def _await_somebody(self) -> None:
         """Return when a member can step or has become ready; a vector of only invalid rows is useless."""

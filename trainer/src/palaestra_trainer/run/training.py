@@ -21,6 +21,7 @@ from torch.utils.tensorboard.writer import SummaryWriter
 
 from palaestra_protocol.pod.status import Cause, ExitCode, SuccessInterval, Termination
 from palaestra_trainer import algorithms, checkpoint
+from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.replay_size import replay_size
 from palaestra_trainer.checkpoint import Checkpoint
@@ -33,6 +34,7 @@ from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fi
 from palaestra_trainer.run.conductor import Conductor, Resumed
 from palaestra_trainer.run.curves import Curves
 from palaestra_trainer.run.journal import Journal
+from palaestra_trainer.run.judging import make_judge
 from palaestra_trainer.run.rejoining import rejoin
 from palaestra_trainer.run.selection import Enough, forget_after
 from palaestra_trainer.run.summary import finished, summarise, write_summary
@@ -209,7 +211,8 @@ class Attempt:
         """Return a new model with its environment; no simulator has to be up."""
         use_threads(self._around.environment)
         wanted = self._configuration
-        env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check)
+        judge = make_judge(wanted.environment) if her.wanted(self._algorithm) else None
+        env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
         stack.callback(env.close)
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
         refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))

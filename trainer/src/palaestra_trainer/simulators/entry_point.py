@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
-from palaestra_trainer.environments.options import SeeOptions, parse, parse_as
+from palaestra_trainer.environments.move_to_target_goal import MoveToTargetGoalEnv
+from palaestra_trainer.environments.options import GoalOptions, SeeOptions, parse, parse_as
 from palaestra_trainer.environments.see_target import SeeTargetEnv
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
@@ -47,6 +48,30 @@ def make(
     chosen = parse(options)
     place = _place(robot, scene, simulator, role)
     return MoveToTargetEnv(place.robot, place.scene, chosen, place.release)
+
+
+def make_goal(
+    robot: RobotinoAbc | None = None,
+    scene: Scene | None = None,
+    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
+    role: str = Role.COLLECT,
+    **options: Any,
+) -> MoveToTargetGoalEnv:
+    """Return the environment for `gymnasium.make("MoveToTargetGoalEnv-v0", ...)`.
+
+    Args:
+        robot: see `make`.
+        scene: see `make`.
+        simulator: see `make`.
+        role: see `make`.
+        options: see `GoalOptions`; names of movements and parts are text.
+
+    Raises:
+        ConfigurationError: an option is wrong, or no simulator with this role is left.
+    """
+    chosen = parse_as(GoalOptions, options)
+    place = _place(robot, scene, simulator, role)
+    return MoveToTargetGoalEnv(place.robot, place.scene, chosen, place.release)
 
 
 def make_seeing(

@@ -1,0 +1,185 @@
+"""The task with its goal in the observation: drive to the target and stay there.
+
+For algorithms that learn from other goals than the wanted one, such as hindsight experience replay. The
+interface is that of gymnasium-robotics: a Dict with `achieved_goal` and `desired_goal`, and rewards that are
+a function of both. Robot, scene and faults are as in `MoveToTargetEnv`, which plays the episodes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from palaestra_trainer.environments.arena import HALF_SIDE_M
+from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTargetEnv
+from palaestra_trainer.environments.options import GoalOptions, time_up_terminates
+from palaestra_trainer.environments.rewards import Outcome
+from palaestra_trainer.robots.base import RobotinoAbc, Scene
+
+Numbers = NDArray[np.float32]
+Observation = dict[str, Numbers]
+Info = dict[str, Any]
+
+FARTHEST_M = 2.0 * math.sqrt(2.0) * HALF_SIDE_M  # from corner to corner
+
+
+class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
+    """Drive to the target and stay there, within 0.20 m, until time is up.
+
+    Robot, floor, start and target are those of `MoveToTargetEnv`, and so are the actions.
+
+    ## Observation
+
+    `Dict`, with the numbers of `observation` as on the sheet of `MoveToTargetEnv`: by default its parts
+    sensors, velocity, position and time_left. `target` is refused there.
+
+    | key           | index | meaning                                      | unit | min | max |
+    |---------------|-------|----------------------------------------------|------|-----|-----|
+    | observation   | 0-17  | the parts named by `observe`                 |      |     |     |
+    | achieved_goal | 0-1   | x, y of the robot in the world's frame       | m    | -2  | 2   |
+    | desired_goal  | 0-1   | x, y of the target in the world's frame      | m    | -2  | 2   |
+
+    ## Reward
+
+    `compute_reward(achieved_goal, desired_goal, info)`, also for many goals at once; `info` is not used.
+    It is the term `reached` in `info["reward_terms"]`.
+
+    | reward | min | max | is                                                            |
+    |--------|-----|-----|---------------------------------------------------------------|
+    | Sparse | 0   | 1   | 1 within 0.20 m of the desired goal                           |
+    | Dense  | 0   | 1   | 1 at the desired goal, falling in a line to 0 at 5.66 m        |
+
+    No reward is negative, unlike in gymnasium-robotics: a collision ends the episode, and an end must not
+    be worth more than going on.
+
+    ## Start
+
+    As in `MoveToTargetEnv`, with the same seeds and options.
+
+    ## End of an episode
+
+    Terminated: the robot bumped into something (`compute_terminated`). Arriving ends no episode, so the
+    value of a goal does not depend on whose goal it was. After `max_steps` steps the episode is truncated
+    (`compute_truncated`), or terminated with `time_up="terminated"`.
+
+    ## Info
+
+    `is_success`: the robot is within 0.20 m of the target; the last step of an episode counts.
+    `outcome` (running, reached, collided, time_up), `reward_terms`, `extra_steps`.
+
+    Args:
+        robot: the robot to drive.
+        scene: arranges episodes.
+        options: observation, actions and rewards.
+        on_close: called by `close`.
+    """
+
+    def __init__(
+        self,
+        robot: RobotinoAbc,
+        scene: Scene,
+        options: GoalOptions | None = None,
+        on_close: Callable[[], None] | None = None,
+    ) -> None:
+        self.options = options or GoalOptions()
+        self._drive = MoveToTargetEnv(robot, scene, self.options, on_close)
+        self.action_space = self._drive.action_space
+        place = spaces.Box(-HALF_SIDE_M, HALF_SIDE_M, (2,), np.float32)
+        self.observation_space = spaces.Dict(
+            {
+                "observation": self._drive.observation_space,
+                "achieved_goal": place,
+                "desired_goal": spaces.Box(-HALF_SIDE_M, HALF_SIDE_M, (2,), np.float32),
+            }
+        )
+        self._steps = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, Info]:
+        """Begin an episode; see `MoveToTargetEnv.reset`."""
+        super().reset(seed=seed)
+        numbers, info = self._drive.reset(seed=seed, options=options)
+        self._steps = 0
+        return self._seen(numbers), info
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:
+        """Drive according to `action` for one control period; return the result.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+            SimulatorFault: as the robot raised it.
+        """
+        numbers, _, _, _, driven = self._drive.step(action)
+        self._steps += 1
+        seen = self._seen(numbers)
+        achieved, desired = seen["achieved_goal"], seen["desired_goal"]
+        reached = bool(_distance_m(achieved, desired) < REACHED_M)
+        info = {
+            "is_success": reached,
+            "outcome": self._outcome(reached=reached).value,
+            "extra_steps": driven["extra_steps"],
+        }
+        reward = float(self.compute_reward(achieved, desired, info))
+        info["reward_terms"] = {"reached": reward}
+        terminated = self.compute_terminated(achieved, desired, info)
+        return seen, reward, terminated, self.compute_truncated(achieved, desired, info), info
+
+    def compute_reward(self, achieved_goal: Numbers, desired_goal: Numbers, info: Any) -> Numbers:
+        """Return the reward of each pair of goals; shape (...), for goals of shape (..., 2)."""
+        del info
+        distance_m = _distance_m(achieved_goal, desired_goal)
+        if self.options.reward == "Sparse":
+            return np.asarray(distance_m < REACHED_M, np.float32)
+        return np.asarray(1.0 - distance_m / FARTHEST_M, np.float32)
+
+    def compute_terminated(
+        self, achieved_goal: Numbers, desired_goal: Numbers, info: Mapping[str, Any]
+    ) -> bool:
+        """Return whether a step with this info ends the episode for good."""
+        del achieved_goal, desired_goal
+        time_up = self._is_time_up(info) and time_up_terminates(self.options)
+        return info["outcome"] == Outcome.COLLIDED.value or time_up
+
+    def compute_truncated(
+        self, achieved_goal: Numbers, desired_goal: Numbers, info: Mapping[str, Any]
+    ) -> bool:
+        """Return whether a step with this info is the last one that there is time for."""
+        del achieved_goal, desired_goal
+        return self._is_time_up(info) and not time_up_terminates(self.options)
+
+    def close(self) -> None:
+        """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
+        self._drive.close()
+
+    def _outcome(self, *, reached: bool) -> Outcome:
+        if self._drive.situation.bumped:
+            return Outcome.COLLIDED
+        if self._steps < self.options.max_steps:
+            return Outcome.RUNNING
+        return Outcome.REACHED if reached else Outcome.TIME_UP
+
+    def _is_time_up(self, info: Mapping[str, Any]) -> bool:
+        return info["outcome"] in {Outcome.REACHED.value, Outcome.TIME_UP.value}
+
+    def _seen(self, numbers: Numbers) -> Observation:
+        now = self._drive.situation
+        return {
+            "observation": numbers,
+            "achieved_goal": _place(now.pose.x_m, now.pose.y_m),
+            "desired_goal": _place(*now.target),
+        }
+
+
+def _place(x_m: float, y_m: float) -> Numbers:
+    return np.clip(np.array((x_m, y_m), np.float32), -HALF_SIDE_M, HALF_SIDE_M)
+
+
+def _distance_m(one: Numbers, other: Numbers) -> Any:
+    return np.linalg.norm(np.asarray(one) - np.asarray(other), axis=-1)
