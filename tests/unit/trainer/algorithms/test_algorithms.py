@@ -95,7 +95,7 @@ def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name
     assert "use one of batch_size, " in lines[2]
 
 
-@pytest.mark.parametrize("name", ["env", "seed", "replay_buffer_class", "device"])
+@pytest.mark.parametrize("name", ["env", "seed", "optimize_memory_usage", "device"])
 def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
     """Else a file could undo what keeps invalid rows out."""
     with pytest.raises(ConfigurationError, match="has no such hyperparameter"):

@@ -105,5 +105,5 @@ def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
     if importlib.util.find_spec(library):
         pytest.skip(f"{library} is installed")
 
-    with pytest.raises(ConfigurationError, match=f"No module named '{library}'.*; install it into the"):
+    with pytest.raises(ConfigurationError, match=f"No module named '{library}'.*; install its package"):
         make_callbacks([Callback(name=f"palaestra_trainer.trackers.{tracker}")])

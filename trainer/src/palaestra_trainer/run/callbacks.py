@@ -7,7 +7,6 @@ callback is saved, since that would need pickling: each attempt creates the call
 
 from __future__ import annotations
 
-import importlib
 import inspect
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from typing import Any
 import structlog
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
+from palaestra_trainer.algorithms import own
 from palaestra_trainer.configuration import Callback, nearest
 from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError
 
@@ -146,24 +146,9 @@ def _naming(name: str) -> Iterator[None]:
 
 
 def _class(field: str, name: str) -> type[BaseCallback]:
-    module, colon, attribute = name.partition(":")
-    if not (module and colon and attribute):
+    if not own.names_class(name):
         raise ConfigurationError(f"{field}: {name} names no class; write it as module:Class")
-    try:
-        found = importlib.import_module(module)
-    except Exception as error:  # a module of the job's author may raise anything
-        raise ConfigurationError(
-            f"{field}: {module} cannot be imported ({type(error).__name__}: {error}); "
-            "install it into the trainer's image, or correct the name"
-        ) from error
-    cls = getattr(found, attribute, None)
-    if cls is None:
-        names = [name for name, value in vars(found).items() if isinstance(value, type)]
-        raise ConfigurationError(f"{field}: {module} has no {attribute}; {nearest(attribute, names)}")
-    if not (isinstance(cls, type) and issubclass(cls, BaseCallback)):
-        raise ConfigurationError(
-            f"{field}: {name} is no callback; derive it from stable_baselines3.common.callbacks.BaseCallback"
-        )
+    cls = own.class_named(name, field, BaseCallback)
     if inspect.isabstract(cls):
         raise ConfigurationError(f"{field}: {name} has no _on_step; add this method")
     return cls
