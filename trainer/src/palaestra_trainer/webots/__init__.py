@@ -15,16 +15,22 @@ from palaestra_trainer.webots.devices import (
     set_velocities,
 )
 from palaestra_trainer.webots.facade import Launcher, Webots
+from palaestra_trainer.webots.levers import Command, Lever
 from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.requirements import require_node
-from palaestra_trainer.webots.simulation import Simulation
+from palaestra_trainer.webots.simulation import Actuator, Simulation
 from palaestra_trainer.webots.supervisor import Supervisor
+from palaestra_trainer.webots.surroundings import FLOOR, Surroundings, Thing
 
 __all__ = [
+    "FLOOR",
+    "Actuator",
     "Attached",
     "Camera",
+    "Command",
     "DistanceSensor",
     "Launcher",
+    "Lever",
     "Lidar",
     "LidarPoints",
     "Mode",
@@ -35,6 +41,8 @@ __all__ = [
     "Sensor",
     "Simulation",
     "Supervisor",
+    "Surroundings",
+    "Thing",
     "TouchSensor",
     "Webots",
     "require_node",

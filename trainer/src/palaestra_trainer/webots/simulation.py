@@ -11,17 +11,40 @@ receive the request that lets it pass.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 from palaestra_trainer.errors import Paused, SimulatorFault, SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, call_together
 from palaestra_trainer.waiting.turns import let_others
-from palaestra_trainer.webots.devices import Motor, Sensor
+from palaestra_trainer.webots.devices import Sensor
 from palaestra_trainer.webots.observer import Observer
 from palaestra_trainer.webots.requirements import require_devices, require_node
 from palaestra_trainer.webots.supervisor import Supervisor
 
 # Two extra steps deliver the messages of a lost wake-up; a sensor without a message after them is broken.
 _MOST_EXTRA_STEPS = 2
+
+
+class Actuator(Protocol):
+    """A motor, as far as a simulation knows it."""
+
+    @property
+    def robot(self) -> str:
+        """The ROS name of the robot's controller."""
+        ...
+
+    @property
+    def device(self) -> str:
+        """The name in the world."""
+        ...
+
+    def release(self) -> None:
+        """Take back all commands, as needed at the start and after every reset."""
+        ...
+
+    def close(self) -> None:
+        """Close the connections."""
+        ...
 
 
 class Simulation:
@@ -46,11 +69,11 @@ class Simulation:
         self._supervisor = supervisor
         self._steps = [RosService(f"/{robot}/robot/time_step", "webots_ros/set_int") for robot in robots]
         self._sensors: list[Sensor] = []
-        self._motors: list[Motor] = []
+        self._motors: list[Actuator] = []
         self._tracked: dict[str, tuple[float, float, float] | None] = {}
         self._connected = False
 
-    def add(self, sensors: Sequence[Sensor], motors: Sequence[Motor]) -> None:
+    def add(self, sensors: Sequence[Sensor], motors: Sequence[Actuator]) -> None:
         """Add a robot's devices: its sensors are read at each step, its motors released at resets."""
         self._sensors += sensors
         self._motors += motors
@@ -72,6 +95,24 @@ class Simulation:
                 sensor.close()
                 raise
         self._sensors.append(sensor)
+
+    def use_motor(self, motor: Actuator) -> None:
+        """Add a motor unless it is there; if the simulator is connected, release it.
+
+        Raises:
+            WorldMisfit: the robot lacks the motor; it is not added.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        if motor in self._motors:
+            return
+        if self._connected:
+            try:
+                require_devices(motor.robot, [motor.device])
+                motor.release()
+            except SimulatorFault:
+                motor.close()
+                raise
+        self._motors.append(motor)
 
     def track(self, name: str) -> None:
         """Read the pose of the node with DEF `name` at each step, for `pose`."""
@@ -136,13 +177,13 @@ class Simulation:
     def close(self) -> None:
         """Close all connections of steps, sensors and motors."""
         self._connected = False
-        parts: tuple[RosService | Sensor | Motor, ...] = (*self._steps, *self._sensors, *self._motors)
+        parts: tuple[RosService | Sensor | Actuator, ...] = (*self._steps, *self._sensors, *self._motors)
         for part in parts:
             part.close()
 
     def _require_all(self) -> None:
         wanted: dict[str, list[str]] = {}
-        parts: tuple[Sensor | Motor, ...] = (*self._sensors, *self._motors)
+        parts: tuple[Sensor | Actuator, ...] = (*self._sensors, *self._motors)
         for part in parts:
             wanted.setdefault(part.robot, []).append(part.device)
         for robot, devices in wanted.items():

@@ -124,6 +124,15 @@ class Supervisor:
         service = self._services.get(f"supervisor/field/set_{kind.name}", f"field_set_{kind.name}")
         service(field=self._observer.field(name, field), index=index, value=wire)
 
+    def set_joint(self, name: str, position: float) -> None:
+        """Put the joint with DEF `name` to radians or meters; it is at rest there.
+
+        Raises:
+            WrongData: also if there is no such joint, or it has stops before that position.
+        """
+        service = self._services.get("supervisor/node/set_joint_position", "node_set_joint_position")
+        service(node=self._observer.node(name), position=position, index=1)
+
     def velocity(self, name: str) -> tuple[Vector, Vector]:
         """Return the linear (m/s) and angular (rad/s) velocity of the node with DEF `name`, in world axes."""
         service = self._services.get("supervisor/node/get_velocity", "node_get_velocity")

@@ -1,0 +1,58 @@
+"""Motors that one kind of command moves: of grippers, forks, arms and models of MuJoCo."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from palaestra_trainer.webots.devices import topic_name
+from palaestra_trainer.webots.services import Services
+
+Command = Literal["position", "velocity", "force", "torque"]
+
+
+class Lever:
+    """A motor under one kind of command.
+
+    Args:
+        robot: the ROS name of the robot's controller.
+        device: the motor's name in the world.
+        command: "position" (rad or m), "velocity", "force" (N) or "torque" (N m).
+
+    Attributes:
+        robot: see above.
+        device: see above.
+        service: sets the command.
+    """
+
+    __slots__ = ("_position", "_services", "device", "robot", "service")
+
+    def __init__(self, robot: str, device: str, command: Command) -> None:
+        self._services = Services(robot)
+        name = topic_name(device)
+        self.robot = robot
+        self.device = device
+        self.service = self._services.get(f"{name}/set_{command}", "set_float")
+        self._position = self._services.get(f"{name}/set_position", "set_float")
+
+    def set(self, value: float) -> None:
+        """Set the command from the next step on.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
+        self.service(value=value)
+
+    def release(self) -> None:
+        """Set the command to 0, as needed at the start and after every reset.
+
+        Raises:
+            SimulatorDead, SimulatorHung, WrongData: as `RosService`.
+        """
+        if self.service.name.endswith("set_velocity"):
+            self._position(value=math.inf)
+        self.set(0.0)
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._services.close()
