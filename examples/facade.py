@@ -1,13 +1,14 @@
 """Drive a simulated Robotino and read its sensors: from a script, or cell by cell in a notebook."""
 
 from palaestra_trainer.robots import Movement, Pose
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Webots
 
 with Webots("robotino", "arena") as webots:  # starts the simulator, and a ROS master if there is none
     robot = Robotino(webots)
     robot.connect()
-    RobotinoScene(webots, robot).reset(seed=1, start=Pose(-1.5, 0.0, 0.0), target=(1.0, 0.0))
+    SimulatedScene(webots, robot).reset(seed=1, start=Pose(-1.5, 0.0, 0.0), target=(1.0, 0.0))
     robot.move(Movement.FORWARD)
     for _ in range(16):  # control periods of 192 ms
         robot.advance()

@@ -3,7 +3,8 @@
 from contextlib import contextmanager
 
 from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Mode, Webots
 
 
@@ -17,7 +18,7 @@ def running(*options, world="arena", name="robotino"):
     robot = Robotino(webots)
     robot.connect()
     try:
-        yield robot, RobotinoScene(webots, robot), launcher
+        yield robot, SimulatedScene(webots, robot), launcher
     finally:
         robot.close()
         webots.stop()

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Rectangle
 from palaestra_trainer import load_policy
 from palaestra_trainer.environments import arena
 from palaestra_trainer.environments.move_to_target import REACHED_M
-from palaestra_trainer.simulators.connect import Arena
+from palaestra_trainer.simulators.connect import OwnSimulator
 from palaestra_trainer.simulators.entry_point import make
 from tests.local_run import ROOT
 
@@ -43,7 +43,7 @@ def main(run: str) -> int:
 def _drives(run: str) -> list[tuple[list[arena.Point], arena.Point, bool]]:
     """Return places (m), target (m) and success of an episode for each seed."""
     policy = load_policy(run)
-    with closing(Arena()) as simulator:
+    with closing(OwnSimulator()) as simulator:
         env = make(simulator.robot, simulator.scene, **policy.environment_options)
         return [_drive(policy, env, simulator.robot, seed) for seed in SEEDS]
 

@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from palaestra_trainer.robots import Pose
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Webots
 from tests.local_run import LocalRun
 from tests.pages import fenced
@@ -44,7 +45,7 @@ def test_the_same_seed_places_the_same_cylinders(master, module):
     spec.loader.exec_module(scattered)
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)
-    scene = RobotinoScene(webots, robot)
+    scene = SimulatedScene(webots, robot)
     moving = scattered.ScatteredScene(robot, scene)
     try:
         with webots:

@@ -12,7 +12,8 @@ import pytest
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.robots import Pose
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master, RosService
 from palaestra_trainer.webots import Mode, Webots
 
@@ -34,7 +35,7 @@ class Player:
         self.launcher = ProcessLauncher("arena", options=options)
         self.webots = Webots("robotino", "arena", launcher=self.launcher, start_deadline_s=20.0)
         self.robot = Robotino(self.webots)
-        self.scene = RobotinoScene(self.webots, self.robot)
+        self.scene = SimulatedScene(self.webots, self.robot)
         self.fault = None
         self.durations_s = []
         self.extra_steps = 0

@@ -3,7 +3,8 @@
 import pytest
 
 from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Mode, Webots
 
 
@@ -16,7 +17,7 @@ class Setup:
         self.webots.start()
         self.webots.supervisor.set_mode(Mode.FAST)
         self.robot = Robotino(self.webots, robot)
-        self.scene = RobotinoScene(self.webots, self.robot)
+        self.scene = SimulatedScene(self.webots, self.robot)
         self.robot.connect()
 
     @property

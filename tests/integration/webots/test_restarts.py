@@ -7,7 +7,8 @@ import gymnasium
 import pytest
 
 import palaestra_trainer.environments  # noqa: F401 - registers the environment
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Webots
 
 STANDS = 0
@@ -33,7 +34,7 @@ def test_a_robot_that_was_made_before_the_simulator_needs_no_connect(master):
     del master
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)
-    env = environment(robot, RobotinoScene(webots, robot))
+    env = environment(robot, SimulatedScene(webots, robot))
 
     webots.run(lambda: env.reset(seed=1))
     collected = webots.run(lambda: [env.step(STANDS) for _ in range(3)])

@@ -13,7 +13,8 @@ from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.launching.reservations import Reservation
 from palaestra_trainer.robots import Movement, Pose
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.ros import Master
 from palaestra_trainer.webots import Attached, Webots
 
@@ -54,7 +55,7 @@ def test_two_facades_of_one_world_drive_a_simulator_each(make, name):
     """The second one gets the next free name, and says which."""
     first, second = make(), make()
     robots = [Robotino(webots) for webots in (first, second)]
-    scenes = [RobotinoScene(webots, robot) for webots, robot in zip((first, second), robots, strict=True)]
+    scenes = [SimulatedScene(webots, robot) for webots, robot in zip((first, second), robots, strict=True)]
 
     with first, second:
         for scene in scenes:

@@ -11,7 +11,8 @@ from palaestra_sim.ros import Loop, RosNode
 from palaestra_sim.world import builtin
 from palaestra_trainer.errors import ConfigurationError, WorldMisfit
 from palaestra_trainer.launching.process import ProcessLauncher
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.simulators.keeper import Keeper, await_one
 from palaestra_trainer.simulators.simulator import Simulator
 from palaestra_trainer.webots import Webots
@@ -48,7 +49,7 @@ def test_a_start_names_what_the_world_lacks(master, world, source, fact):
     assert source != ARENA
     webots = Webots("robotino", world(source), start_deadline_s=DEADLINE_S)
     robot = Robotino(webots)
-    RobotinoScene(webots, robot)
+    SimulatedScene(webots, robot)
     try:
         with pytest.raises(WorldMisfit, match=fact):
             webots.start()

@@ -42,6 +42,7 @@ Reward = Literal["Dense", "Sparse"]
 Device = Literal["cpu", "cuda"]
 Cnn = Literal["small"]
 DEFAULT_REWARD: Reward = "Dense"
+DEFAULT_ROBOT = "Robotino"
 
 
 class _Section(BaseModel):
@@ -210,6 +211,8 @@ class Configuration(_Section):
         resume_from: the run directory of another job; a run without a checkpoint of its own resumes from
             the newest checkpoint there.
         stall_deadline_seconds: the run fails after this long without an environment step.
+        robot: class of the robot, `module:Class` or a name of `robots.choosing`; None: `DEFAULT_ROBOT`. None
+            is left out of the file, since an older trainer ignores the field.
         command: the user's own program that replaces the built-in loop; not used here.
         status_address: `host:port` of /metrics, /status and /healthz.
     """
@@ -220,6 +223,7 @@ class Configuration(_Section):
     replica: Annotated[int, Field(ge=0)] = 0
     seed: Annotated[int, Field(ge=0)] = 0
     environment: Environment
+    robot: Annotated[str, Field(min_length=1)] | None = None
     algorithm: Algorithm = Field(default_factory=Algorithm)
     device: Device = "cpu"
     steps: Positive

@@ -10,6 +10,7 @@ TrainerError
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
 ├── NoSuchSensor         this robot does not have it
+│   └── MissingCapability  a ConfigurationError too: the task needs it        exit 2
 ├── NoReading            a sensor was read before its first message arrived
 ├── NotConforming        a robot breaks a rule of the interface (testing.conformance)
 ├── Paused               a step was requested while the simulation is paused
@@ -60,6 +61,10 @@ class Diverged(TrainerError, ArithmeticError):
 
 class NoSuchSensor(TrainerError, NotImplementedError):
     """The robot has no such sensor, e.g. no camera."""
+
+
+class MissingCapability(ConfigurationError, NoSuchSensor):
+    """The robot lacks a capability that the task needs, so they do not fit together."""
 
 
 class NoReading(TrainerError, RuntimeError):

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from palaestra_trainer.environments.arena import gap
 from palaestra_trainer.errors import SimulatorDead
 from palaestra_trainer.robots import Movement, Pose
 from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, RobotinoAbc
 from palaestra_trainer.testing import (
     FakeRobotino,
+    FakeSeeingRobotino,
     NotConforming,
     check_robot,
     check_scene,
@@ -116,7 +116,7 @@ def test_it_never_leaves_the_floor_and_its_readings_never_leave_their_range(seed
         robot.advance()
         pose, distances = robot.pose(), robot.distances()
 
-        assert gap(pose.x_m, pose.y_m) >= RADIUS_M - 1e-6
+        assert scene.layout().gap(pose.x_m, pose.y_m) >= RADIUS_M - 1e-6
         assert -math.pi < pose.heading_rad <= math.pi
         assert distances.min() >= np.float32(SENSOR_RANGE_M[0])
         assert distances.max() <= np.float32(SENSOR_RANGE_M[1])
@@ -157,11 +157,11 @@ def test_the_dead_answer_nothing_until_they_are_restarted():
 OWN_ARRAY = np.full(9, 0.3, np.float32)
 
 
-class _Flawed(FakeRobotino):
+class _Flawed(FakeSeeingRobotino):
     """A robot that breaks one rule, by one method of its own."""
 
     def __init__(self, method: str, answer) -> None:
-        super().__init__(cameras=True)
+        super().__init__()
         setattr(self, method, lambda *_: answer(super(_Flawed, self)))
 
 
@@ -217,8 +217,9 @@ def test_conformance_sees_a_robot_that_rolls_on():
     """A robot that ignores STOP would drive through its target."""
 
     class Rolling(FakeRobotino):
-        def move(self, movement: Movement) -> None:
-            super().move(Movement.FORWARD if movement is Movement.STOP else movement)
+        def drive(self, vx: float, vy: float, omega: float) -> None:
+            if (vx, vy, omega) != Movement.STOP.twist:
+                super().drive(vx, vy, omega)
 
     with pytest.raises(NotConforming) as caught:
         check_robot(Rolling())

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from palaestra_sim.world import builtin, parse
-from palaestra_trainer.environments.arena import CYLINDER_NAMES, CYLINDERS
 from palaestra_trainer.robots import Pose
 from palaestra_trainer.testing import fake_camera, fake_seeing
 from palaestra_trainer.testing.fake_camera import CYLINDER, FLOOR, POLE, SKY, WALL
@@ -25,8 +24,8 @@ def look():
     def images(pose, target, *, cylinders=False):
         scene.reset(0, pose, target)
         if cylinders:
-            for name, (x, y) in zip(CYLINDER_NAMES, CYLINDERS, strict=True):
-                scene.put(name, (x, y, 0.2))
+            for thing in scene.layout().obstacles:
+                scene.put(thing.name, (thing.x_m, thing.y_m, 0.2))
         return robot.color_image(), robot.depth_image()
 
     return images

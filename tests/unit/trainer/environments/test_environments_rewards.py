@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from palaestra_trainer.environments import rewards
 from palaestra_trainer.environments.rewards import TERMS, WEIGHTS, Outcome, Transition, reward_terms
 
+SINGLE = tuple(it for it in Outcome if it is not Outcome.DELIVERED)  # what a task with one target can lead to
+
 
 def transition(
     before_m: float = 1.0,
@@ -59,7 +61,7 @@ def test_proximity_grows_as_things_come_nearer(nearest_m, worth):
 )
 def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
     """No two ends are mixed up, and none is paid twice."""
-    paid = {it: term(transition(outcome=it)) for it in Outcome}
+    paid = {it: term(transition(outcome=it)) for it in SINGLE}
 
     assert paid == {it: float(it is outcome) for it in Outcome}
 
@@ -93,9 +95,20 @@ def test_sparse_pays_at_the_end_only():
 
 
 @pytest.mark.parametrize("reward", WEIGHTS)
+def test_each_of_several_targets_is_worth_as_much_as_a_single_one(reward):
+    """The episode goes on after all but the last."""
+    delivered, reached = (
+        reward_terms(reward, transition(outcome=it)) for it in (Outcome.DELIVERED, Outcome.REACHED)
+    )
+
+    assert delivered == reached
+    assert not Outcome.DELIVERED.terminal
+
+
+@pytest.mark.parametrize("reward", WEIGHTS)
 def test_reaching_the_target_is_the_best_end(reward):
     """Neither giving up nor running into a cylinder early may pay."""
-    worth = {it: sum(reward_terms(reward, transition(outcome=it)).values()) for it in Outcome}
+    worth = {it: sum(reward_terms(reward, transition(outcome=it)).values()) for it in SINGLE}
 
     assert max(worth, key=worth.__getitem__) is Outcome.REACHED
     assert min(worth, key=worth.__getitem__) is Outcome.COLLIDED

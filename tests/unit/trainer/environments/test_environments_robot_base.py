@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palaestra_trainer.errors import NoSuchSensor
-from palaestra_trainer.robots import Movement
-from palaestra_trainer.testing import FakeRobotino
+from palaestra_trainer.errors import ConfigurationError, MissingCapability, NoSuchSensor
+from palaestra_trainer.robots import Cameras, Joints, Localization, Movement, require
+from palaestra_trainer.testing import FakeRobotino, FakeSeeingRobotino
 
 
 @pytest.mark.parametrize(
@@ -42,24 +42,39 @@ def test_a_movement_drives_at_its_twist():
     assert moving.pose() == driving.pose()
 
 
-@pytest.mark.parametrize("take", ["color_image", "depth_image"])
-def test_a_robot_without_cameras_says_so(take):
-    """The error is typed, so that a caller can ask whether there is a camera."""
-    with pytest.raises(NoSuchSensor, match=r"FakeRobotino has no .* camera; use distances\(\)"):
-        getattr(FakeRobotino(), take)()
+def test_a_refusal_names_the_robot_the_task_and_what_is_missing():
+    """With what the robot has, so that its author sees what to choose instead."""
+    with pytest.raises(MissingCapability) as refusal:
+        require(FakeRobotino(), (Localization, Cameras, Joints), "Sorting-v0")
+
+    assert str(refusal.value) == (
+        "trainer.robot: FakeRobotino has no Cameras and no Joints, which Sorting-v0 needs; it has Steering, "
+        "Omnidrive, Localization, Distances, Bumper. Use a robot or a task that fits the other"
+    )
 
 
-@pytest.mark.parametrize("camera", ["color", "depth"])
-def test_a_robot_without_cameras_lets_none_be_used(camera):
-    """Before an episode that would need it."""
-    with pytest.raises(NoSuchSensor, match=f"FakeRobotino has no {camera} camera"):
-        FakeRobotino().use_cameras(**{camera: True})
+def test_a_refusal_is_a_mistake_of_the_configuration_and_about_a_sensor():
+    """A job with it ends at once; code that asks for a camera catches it as before."""
+    assert issubclass(MissingCapability, ConfigurationError)
+    assert issubclass(MissingCapability, NoSuchSensor)
+
+
+def test_a_robot_that_drives_in_every_direction_steers_too():
+    """So a task for two wheels is one for a Robotino."""
+    steered, driven = FakeRobotino(), FakeRobotino()
+
+    steered.steer(0.3, 0.5)
+    driven.drive(0.3, 0.0, 0.5)
+    steered.advance()
+    driven.advance()
+
+    assert steered.pose() == driven.pose()
 
 
 @pytest.mark.parametrize("camera", ["color", "depth"])
 def test_a_camera_that_is_not_in_use_has_no_image(camera):
     """The error says how to use it."""
-    robot = FakeRobotino(cameras=True)
+    robot = FakeSeeingRobotino()
     robot.use_cameras(**{"depth" if camera == "color" else "color": True})
 
     with pytest.raises(NoSuchSensor, match=rf"call use_cameras\({camera}=True\), then advance"):

@@ -15,13 +15,13 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 from palaestra_trainer.environments import SeeOptions, SeeTargetEnv
-from palaestra_trainer.environments.arena import CYLINDERS, gap
 from palaestra_trainer.environments.rewards import TERMS, WEIGHTS
 from palaestra_trainer.environments.see_target import IMAGE, REACHED_M
-from palaestra_trainer.errors import ConfigurationError, NoSuchSensor, SimulatorDead
+from palaestra_trainer.errors import ConfigurationError, MissingCapability, SimulatorDead
 from palaestra_trainer.robots import Movement
 from palaestra_trainer.simulators.entry_point import make_seeing
-from palaestra_trainer.testing import FakeRobotino, FakeScene, fake_arena, fake_camera, fake_seeing
+from palaestra_trainer.testing import FakeScene, FakeSeeingRobotino, fake_arena, fake_camera, fake_seeing
+from palaestra_trainer.testing.fake_scene import arena
 
 NAME = "SeeTarget-v0"
 SHEET = inspect.getdoc(SeeTargetEnv) or ""
@@ -166,15 +166,15 @@ def test_an_observation_is_what_the_camera_sees(make_env):
 def test_an_observation_stays_as_it_was_after_the_next_step():
     """The array of a facade does not: the next image is written to the same place."""
 
-    class Reusing(FakeRobotino):
+    class Reusing(FakeSeeingRobotino):
         buffer = np.zeros(IMAGE, np.uint8)
 
         def color_image(self):
             self.buffer[:] = super().color_image()
             return self.buffer
 
-    robot = Reusing(cameras=True)
-    env = SeeTargetEnv(robot, FakeScene(robot, ()), SeeOptions(frames=3))
+    robot = Reusing()
+    env = SeeTargetEnv(robot, FakeScene(robot, arena(())), SeeOptions(frames=3))
     first, _ = env.reset(seed=1)
     kept = first.copy()
 
@@ -204,7 +204,7 @@ def test_without_cylinders_episodes_use_the_whole_floor(make_env):
 
     places = [env.reset(seed=seed)[1]["target"] for seed in range(60)]
 
-    assert any(gap(*place) < 0.0 for place in places)
+    assert any(arena().gap(*place) < 0.0 for place in places)
 
 
 def test_with_cylinders_they_stand_and_starts_keep_clear_of_them(make_env):
@@ -213,12 +213,11 @@ def test_with_cylinders_they_stand_and_starts_keep_clear_of_them(make_env):
 
     for seed in range(30):
         observation, info = env.reset(seed=seed)
-        assert gap(info["start"].x_m, info["start"].y_m) > 0.3
+        assert arena().gap(info["start"].x_m, info["start"].y_m) > 0.3
         assert env.target_m >= 1.0
     observation, _ = env.reset(options={"start": (0.0, 0.8, 0.0), "target": (1.6, 0.8)})
 
     assert tuple(observation[24, 32]) == fake_camera.CYLINDER
-    assert len(CYLINDERS) == 4
 
 
 def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
@@ -226,26 +225,13 @@ def test_a_start_in_a_cylinder_is_refused_only_where_there_is_one(make_env):
     episode = {"start": (0.8, 0.8, math.pi), "target": (-1.0, 0.0)}
     make_env().reset(seed=1, options=episode)
 
-    with pytest.raises(ConfigurationError, match="puts the robot in a wall or a cylinder"):
+    with pytest.raises(ConfigurationError, match="puts the robot in an obstacle"):
         make_env(cylinders=True).reset(seed=1, options=episode)
-
-
-def test_a_scene_that_moves_nothing_has_no_cylinders():
-    """A scene from another package, with reset alone."""
-
-    class Bare:
-        def reset(self, seed, start, target):
-            pass
-
-    with pytest.raises(
-        ConfigurationError, match="cylinders: Bare cannot move them, since it has no method put"
-    ):
-        SeeTargetEnv(fake_seeing()[0], Bare(), SeeOptions(cylinders=True))
 
 
 def test_a_robot_without_a_camera_is_refused_before_the_first_episode():
     """By a typed error, not in the middle of a run."""
-    with pytest.raises(NoSuchSensor, match="has no color camera"):
+    with pytest.raises(MissingCapability, match="FakeRobotino has no Cameras, which SeeTargetEnv needs"):
         make_seeing(*fake_arena())
 
 
@@ -257,7 +243,7 @@ def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
     monkeypatch.setenv("PALAESTRA_CONFIG", "training.yaml")
     monkeypatch.setattr("palaestra_trainer.simulators.configured.simulator_for", lambda *_: taken)
 
-    with pytest.raises(NoSuchSensor):
+    with pytest.raises(MissingCapability):
         make_seeing()
 
     assert released == [True]
@@ -266,14 +252,14 @@ def test_a_simulator_is_given_back_if_its_robot_has_no_camera(monkeypatch):
 def test_an_image_of_another_size_is_refused():
     """The message names both sizes and where the size is set."""
 
-    class Large(FakeRobotino):
+    class Large(FakeSeeingRobotino):
         def color_image(self):
             return np.zeros((480, 640, 3), np.uint8)
 
     _, scene = fake_seeing()
 
     with pytest.raises(ConfigurationError, match=r"\(480, 640, 3\), and SeeTarget-v0 needs \(48, 64, 3\)"):
-        SeeTargetEnv(Large(cameras=True), scene).reset(seed=1)
+        SeeTargetEnv(Large(), scene).reset(seed=1)
 
 
 def test_without_mujoco_an_environment_of_its_own_is_refused(monkeypatch):

@@ -7,12 +7,31 @@ Both ways work: `import palaestra_trainer.environments`, then
 
 import gymnasium
 
+from palaestra_trainer.environments.deliver import DeliverEnv
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.move_to_target_goal import MoveToTargetGoalEnv
-from palaestra_trainer.environments.options import GoalOptions, Options, SeeOptions
+from palaestra_trainer.environments.navigate import NavigateEnv
+from palaestra_trainer.environments.options import (
+    DeliverOptions,
+    GoalOptions,
+    NavigateOptions,
+    Options,
+    SeeOptions,
+)
 from palaestra_trainer.environments.see_target import SeeTargetEnv
 
-__all__ = ["GoalOptions", "MoveToTargetEnv", "MoveToTargetGoalEnv", "Options", "SeeOptions", "SeeTargetEnv"]
+__all__ = [
+    "DeliverEnv",
+    "DeliverOptions",
+    "GoalOptions",
+    "MoveToTargetEnv",
+    "MoveToTargetGoalEnv",
+    "NavigateEnv",
+    "NavigateOptions",
+    "Options",
+    "SeeOptions",
+    "SeeTargetEnv",
+]
 
 # As text, since the entry point finds simulators, which this package does not know.
 # No max_episode_steps: the environments count their steps themselves, since Sparse rewards the last.
@@ -21,3 +40,5 @@ gymnasium.register(id="SeeTarget-v0", entry_point="palaestra_trainer.simulators.
 gymnasium.register(
     id="MoveToTargetGoalEnv-v0", entry_point="palaestra_trainer.simulators.entry_point:make_goal"
 )
+gymnasium.register(id="Deliver-v0", entry_point="palaestra_trainer.simulators.entry_point:make_delivering")
+gymnasium.register(id="Navigate-v0", entry_point="palaestra_trainer.simulators.entry_point:make_navigating")

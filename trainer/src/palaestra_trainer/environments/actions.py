@@ -10,7 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from palaestra_trainer.environments.options import Driving
-from palaestra_trainer.robots.base import SPEED_M_S, TURN_RAD_S, Movement, Twist
+from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Movement, Twist
 
 SCALE = (SPEED_M_S, SPEED_M_S, TURN_RAD_S)  # the velocity of 1 in a continuous action
 
@@ -23,7 +23,7 @@ def action_space(options: Driving) -> spaces.Space[Any]:
 
 
 def twist(action: Any, options: Driving) -> Twist:
-    """Return the velocity of an action of `action_space(options)`, see `RobotinoAbc.drive`."""
+    """Return the velocity of an action of `action_space(options)`, see `Omnidrive.drive`."""
     if options.actions == "continuous":
         return _scaled(action)
     return options.movements[int(action)].twist

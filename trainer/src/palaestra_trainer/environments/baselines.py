@@ -12,7 +12,7 @@ from typing import Any
 
 from palaestra_trainer.environments.actions import nearest
 from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTargetEnv
-from palaestra_trainer.robots.base import SPEED_M_S
+from palaestra_trainer.robots.geometry import SPEED_M_S
 
 NEAR_M = 0.5 * REACHED_M  # the distance at which `straight_to_target` stops
 

@@ -23,19 +23,22 @@ from gymnasium.envs.registration import (
 from palaestra_trainer.configuration import DEFAULT_REWARD, Environment, nearest
 from palaestra_trainer.environments.checking import held
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.capabilities import require
 
 _OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
-def make_environment(wanted: Environment, robot: RobotinoAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
+def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
     """Return the environment of a job with `robot` and `scene`; its first reset and step are checked.
 
     Raises:
         ConfigurationError: it is not registered, or its signature does not fit the job.
+        MissingCapability: the robot lacks one of its `needs`.
     """
     arguments = _checked(wanted, {"robot": robot, "scene": scene})
+    require(robot, getattr(_creator(wanted.id, _spec(wanted.id)), "needs", ()), wanted.id)
     try:
         # `held` replaces gymnasium's wrapper, whose warnings would not end the run.
         env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)

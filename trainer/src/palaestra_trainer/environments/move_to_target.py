@@ -8,8 +8,9 @@ the environment decides what the fault means for learning.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -18,11 +19,13 @@ from numpy.typing import NDArray
 
 from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
-from palaestra_trainer.environments.arena import Point, chosen_task
 from palaestra_trainer.environments.observation import Situation
 from palaestra_trainer.environments.options import Options, time_up_terminates
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
-from palaestra_trainer.robots.base import RobotinoAbc, Scene, Twist
+from palaestra_trainer.environments.tasks import Places
+from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.robots.capabilities import require
+from palaestra_trainer.robots.geometry import Point, Twist
 
 REACHED_M = 0.20
 STANDING_M_S = 0.05
@@ -78,8 +81,9 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
     | position  | 2-3   | cosine, sine of the heading                   | 1         | -1   | 1   |
     | target    | 0-1   | forward, left from the robot                  | 2 m       | -3   | 3   |
     | time_left | 0     | steps left of `max_steps`                     | 1         | 0    | 1   |
+    | to_reach  | 0     | targets left; always 1 with a single target   | 1         | 0    | 1   |
 
-    By default everything but `position`: see docs/environments.md for what that costs.
+    By default everything but `position` and `to_reach`: see docs/environments.md for what that costs.
 
     ## Reward
 
@@ -122,7 +126,12 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         scene: arranges episodes.
         options: observation, actions and rewards.
         on_close: called by `close`.
+
+    Raises:
+        MissingCapability: the robot is no Robotino.
     """
+
+    needs: ClassVar[tuple[type, ...]] = (RobotinoAbc,)
 
     def __init__(
         self,
@@ -131,6 +140,7 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         options: Options | None = None,
         on_close: Callable[[], None] | None = None,
     ) -> None:
+        require(robot, self.needs, type(self).__name__)
         self.options = options or Options()
         self.observation_space = self._numbers = observation.space(self.options.observe)
         self.action_space = action_space(self.options)
@@ -138,7 +148,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         self._scene = scene
         self._on_close = on_close
         self._situation: Situation | None = None
-        self._target: Point = (0.0, 0.0)
+        self._targets: list[Point] = []
+        self._at = 0  # index of the target to which the robot drives
         self._steps = 0
 
     @property
@@ -162,13 +173,16 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
             options: `start` (x, y, heading) and `target` (x, y), in meters and radians.
 
         Raises:
-            ConfigurationError: an option is unknown, or is in a wall or a cylinder.
+            ConfigurationError: an option is unknown, or is in an obstacle.
             SimulatorFault: as the robot raised it.
         """
         super().reset(seed=seed)
-        task = chosen_task(self.np_random, options or {})
-        self._scene.reset(int(self.np_random.integers(2**31)), task.start, task.target)
-        self._target = task.target
+        self._scene.begin(int(self.np_random.integers(2**31)))
+        places = Places(layout=self._scene.layout(), radius_m=self._robot.radius_m)
+        task = places.chosen_task(self.np_random, options or {})
+        self._scene.place(task.start, task.target)
+        self._targets = [task.target, *self._more_targets(places, task.target)]
+        self._at = 0
         self._steps = 0
         self._situation = seen = self._look((0.0, 0.0, 0.0))
         return self._numbers_of(seen), {"start": task.start, "target": task.target}
@@ -189,6 +203,8 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         self._situation = after
         outcome = self._outcome(after)
         terms = reward_terms(self.options.reward, _transition(before, after, outcome))
+        if outcome is Outcome.DELIVERED:
+            self._situation = after = self._next_target(after)
         info = {
             "is_success": outcome is Outcome.REACHED,
             "outcome": outcome.value,
@@ -210,16 +226,29 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
             bumped=self._robot.bumped(),
             pose=self._robot.pose(),
             velocity=velocity,
-            target=self._target,
+            target=self._targets[self._at],
             time_left=1.0 - self._steps / self.options.max_steps,
+            to_reach=1.0 - self._at / len(self._targets),
         )
 
     def _outcome(self, seen: Situation) -> Outcome:
         if seen.bumped:
             return Outcome.COLLIDED
         if seen.target_distance_m < REACHED_M and seen.speed_m_s < STANDING_M_S:
-            return Outcome.REACHED
+            return Outcome.REACHED if self._at == len(self._targets) - 1 else Outcome.DELIVERED
         return Outcome.TIME_UP if self._steps >= self.options.max_steps else Outcome.RUNNING
+
+    def _more_targets(self, places: Places, first: Point) -> Iterable[Point]:
+        """Return the targets after the first; here there are none."""
+        del places, first
+        return ()
+
+    def _next_target(self, seen: Situation) -> Situation:
+        """Let the robot drive to the next target; return what it sees then."""
+        self._at += 1
+        target = self._targets[self._at]
+        self._scene.mark(target)
+        return replace(seen, target=target, to_reach=1.0 - self._at / len(self._targets))
 
     def _numbers_of(self, seen: Situation) -> Observation:
         return observation.observe(seen, self.options.observe, self._numbers)

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from palaestra_trainer.environments.arena import HALF_SIDE_M
 from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTargetEnv
+from palaestra_trainer.environments.observation import UNIT_M
 from palaestra_trainer.environments.options import GoalOptions, time_up_terminates
 from palaestra_trainer.environments.rewards import Outcome
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
@@ -26,7 +26,7 @@ Numbers = NDArray[np.float32]
 Observation = dict[str, Numbers]
 Info = dict[str, Any]
 
-FARTHEST_M = 2.0 * math.sqrt(2.0) * HALF_SIDE_M  # from corner to corner
+FARTHEST_M = 2.0 * math.sqrt(2.0) * UNIT_M  # from corner to corner
 
 
 class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
@@ -80,6 +80,8 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         on_close: called by `close`.
     """
 
+    needs: ClassVar[tuple[type, ...]] = MoveToTargetEnv.needs
+
     def __init__(
         self,
         robot: RobotinoAbc,
@@ -90,12 +92,12 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         self.options = options or GoalOptions()
         self._drive = MoveToTargetEnv(robot, scene, self.options, on_close)
         self.action_space = self._drive.action_space
-        place = spaces.Box(-HALF_SIDE_M, HALF_SIDE_M, (2,), np.float32)
+        place = spaces.Box(-UNIT_M, UNIT_M, (2,), np.float32)
         self.observation_space = spaces.Dict(
             {
                 "observation": self._drive.observation_space,
                 "achieved_goal": place,
-                "desired_goal": spaces.Box(-HALF_SIDE_M, HALF_SIDE_M, (2,), np.float32),
+                "desired_goal": spaces.Box(-UNIT_M, UNIT_M, (2,), np.float32),
             }
         )
         self._steps = 0
@@ -178,7 +180,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
 
 
 def _place(x_m: float, y_m: float) -> Numbers:
-    return np.clip(np.array((x_m, y_m), np.float32), -HALF_SIDE_M, HALF_SIDE_M)
+    return np.clip(np.array((x_m, y_m), np.float32), -UNIT_M, UNIT_M)
 
 
 def _distance_m(one: Numbers, other: Numbers) -> Any:

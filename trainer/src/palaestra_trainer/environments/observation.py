@@ -15,8 +15,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from palaestra_trainer.environments.arena import HALF_SIDE_M, Point
-from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS, SPEED_M_S, TURN_RAD_S, Pose, Twist
+from palaestra_trainer.robots.base import SENSOR_RANGE_M, SENSORS
+from palaestra_trainer.robots.geometry import SPEED_M_S, TURN_RAD_S, Point, Pose, Twist
+
+UNIT_M = 2.0  # of positions in an observation: half of the arena
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,12 +26,13 @@ class Situation:
     """The complete state after a step.
 
     Attributes:
-        distances_m: shape (9,), see `RobotinoAbc.distances`.
+        distances_m: shape (9,), see `RobotinoAbc`.
         bumped: whether the bumper touches something.
         pose: in the world's frame.
         velocity: forward, left (m/s), counter-clockwise (rad/s): means over the last step.
         target: x, y in meters, in the world's frame.
         time_left: of the episode, from 1 to 0.
+        to_reach: share of the episode's targets that are left, with this one: from 1 down.
     """
 
     distances_m: NDArray[np.float32]
@@ -38,6 +41,7 @@ class Situation:
     velocity: Twist
     target: Point
     time_left: float
+    to_reach: float = 1.0
 
     @property
     def speed_m_s(self) -> float:
@@ -94,16 +98,20 @@ def _velocity(seen: Situation) -> Sequence[float]:
 
 def _position(seen: Situation) -> Sequence[float]:
     x_m, y_m, heading_rad = seen.pose.x_m, seen.pose.y_m, seen.pose.heading_rad
-    return x_m / HALF_SIDE_M, y_m / HALF_SIDE_M, math.cos(heading_rad), math.sin(heading_rad)
+    return x_m / UNIT_M, y_m / UNIT_M, math.cos(heading_rad), math.sin(heading_rad)
 
 
 def _target(seen: Situation) -> Sequence[float]:
     forward_m, left_m = seen.target_ahead
-    return forward_m / HALF_SIDE_M, left_m / HALF_SIDE_M
+    return forward_m / UNIT_M, left_m / UNIT_M
 
 
 def _time_left(seen: Situation) -> Sequence[float]:
     return (seen.time_left,)
+
+
+def _to_reach(seen: Situation) -> Sequence[float]:
+    return (seen.to_reach,)
 
 
 PARTS: dict[str, Part] = {
@@ -112,6 +120,7 @@ PARTS: dict[str, Part] = {
     "position": Part(_position, (-1.0,) * 4, (1.0,) * 4),
     "target": Part(_target, (-3.0,) * 2, (3.0,) * 2),
     "time_left": Part(_time_left, (0.0,), (1.0,)),
+    "to_reach": Part(_to_reach, (0.0,), (1.0,)),
 }
 
 

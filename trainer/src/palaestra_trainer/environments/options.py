@@ -9,7 +9,7 @@ from typing import Any, Protocol, TypeVar
 from palaestra_trainer.environments.observation import PARTS
 from palaestra_trainer.environments.rewards import WEIGHTS
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.base import Movement
+from palaestra_trainer.robots.geometry import Movement
 
 ACTIONS = ("discrete", "continuous")
 TIME_UP = ("terminated", "truncated")
@@ -20,17 +20,12 @@ TIME_UP_OF = {"Dense": "truncated", "Sparse": "terminated"}
 FRAMES = (1, 3)
 
 
-class Driving(Protocol):
-    """The options of every task in which a robot drives to a target; see `Options`."""
+class Episodes(Protocol):
+    """The options of every task that ends at a target; see `Options`."""
 
     @property
     def reward(self) -> str:
         """`Dense` or `Sparse`."""
-        ...
-
-    @property
-    def movements(self) -> Sequence[Movement]:
-        """The choices of a discrete action, in this order."""
         ...
 
     @property
@@ -46,6 +41,15 @@ class Driving(Protocol):
     @property
     def time_up(self) -> str | None:
         """How an episode then ends; None: `TIME_UP_OF` the reward."""
+        ...
+
+
+class Driving(Episodes, Protocol):
+    """The options of every task of a robot that drives in all directions; see `Options`."""
+
+    @property
+    def movements(self) -> Sequence[Movement]:
+        """The choices of a discrete action, in this order."""
         ...
 
 
@@ -97,6 +101,26 @@ class GoalOptions(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DeliverOptions(Options):
+    """The options of `DeliverEnv`, checked: those of `Options`, with defaults for several targets.
+
+    Args:
+        targets: how many targets an episode has.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+
+    observe: Sequence[str] = ("sensors", "velocity", "target", "time_left", "to_reach")
+    max_steps: int = 300
+    targets: int = 3
+
+    def __post_init__(self) -> None:
+        too_few = () if self.targets >= 1 else (f"targets: {self.targets} are too few; use at least 1",)
+        _refuse((*_mistakes(self), *_mistakes_of_parts(self.observe), *too_few))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SeeOptions:
     """The options of `SeeTargetEnv`, checked.
 
@@ -125,7 +149,30 @@ class SeeOptions:
         _refuse((*_mistakes(self), *_mistakes_of_images(self)))
 
 
-def time_up_terminates(options: Driving) -> bool:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigateOptions:
+    """The options of `NavigateEnv`, checked.
+
+    Args:
+        reward: see `Options`.
+        actions: see `Options`.
+        max_steps: see `Options`.
+        time_up: see `Options`.
+
+    Raises:
+        ConfigurationError: one line for every mistake.
+    """
+
+    reward: str = "Dense"
+    actions: str = "discrete"
+    max_steps: int = 150
+    time_up: str | None = None
+
+    def __post_init__(self) -> None:
+        _refuse(tuple(_mistakes_of_episodes(self)))
+
+
+def time_up_terminates(options: Episodes) -> bool:
     """Return whether time-up ends an episode as terminated: a learner then estimates no value beyond it."""
     return (options.time_up or TIME_UP_OF[options.reward]) == "terminated"
 
@@ -139,7 +186,7 @@ def parse(given: Mapping[str, Any]) -> Options:
     return parse_as(Options, given)
 
 
-_Chosen = TypeVar("_Chosen", bound=Options | SeeOptions)
+_Chosen = TypeVar("_Chosen", bound=Options | SeeOptions | NavigateOptions)
 
 
 def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
@@ -153,7 +200,9 @@ def parse_as(kind: type[_Chosen], given: Mapping[str, Any]) -> _Chosen:
         raise ConfigurationError(
             "\n".join(f"{name}: is not an option; use {', '.join(known)}" for name in unknown)
         )
-    return kind(**{**given, "movements": _movements(given.get("movements", tuple(Movement)))})
+    if "movements" in given:
+        given = {**given, "movements": _movements(given["movements"])}
+    return kind(**given)
 
 
 def _movements(given: Sequence[Movement | str]) -> tuple[Movement, ...]:
@@ -169,14 +218,18 @@ def _refuse(mistakes: Sequence[str]) -> None:
 
 
 def _mistakes(options: Driving) -> Iterator[str]:
-    if options.reward not in WEIGHTS:
-        yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
-    if options.actions not in ACTIONS:
-        yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
+    yield from _mistakes_of_episodes(options)
     if not options.movements:
         yield f"movements: is empty; choose from {', '.join(Movement.__members__)}"
     if len(set(options.movements)) < len(options.movements):
         yield "movements: contains a movement twice; name each once"
+
+
+def _mistakes_of_episodes(options: Episodes) -> Iterator[str]:
+    if options.reward not in WEIGHTS:
+        yield f"reward: {options.reward!r} is not a reward; use {' or '.join(WEIGHTS)}"
+    if options.actions not in ACTIONS:
+        yield f"actions: {options.actions!r} is not known; use {' or '.join(ACTIONS)}"
     if options.max_steps < 1:
         yield f"max_steps: {options.max_steps} leaves no time; use at least 1"
     if options.time_up not in (None, *TIME_UP):

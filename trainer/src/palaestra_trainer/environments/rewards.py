@@ -17,9 +17,10 @@ MARGIN_M = 0.18  # what should be kept free around the robot: it drives half of 
 
 
 class Outcome(Enum):
-    """How an episode ended, or that it goes on."""
+    """How an episode ended, or that it goes on; also with the next of several targets."""
 
     RUNNING = "running"
+    DELIVERED = "delivered"
     REACHED = "reached"
     COLLIDED = "collided"
     TIME_UP = "time_up"
@@ -59,8 +60,8 @@ def progress(step: Transition) -> float:
 
 
 def success(step: Transition) -> float:
-    """Return 1 when the robot came to stand on the target, else 0."""
-    return float(step.outcome is Outcome.REACHED)
+    """Return 1 when the robot came to stand on the target, or on one of several, else 0."""
+    return float(step.outcome in (Outcome.REACHED, Outcome.DELIVERED))
 
 
 def collision(step: Transition) -> float:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -18,31 +18,19 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from palaestra_trainer.environments.actions import action_space, twist
-from palaestra_trainer.environments.arena import (
-    CYLINDER_CENTER_M,
-    CYLINDER_NAMES,
-    CYLINDERS,
-    Point,
-    chosen_task,
-)
 from palaestra_trainer.environments.options import SeeOptions, time_up_terminates
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
+from palaestra_trainer.environments.tasks import Places
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.robots.capabilities import Cameras, require
+from palaestra_trainer.robots.geometry import Point
 
 REACHED_M = 0.45
 IMAGE = (48, 64, 3)  # rows, columns, colors
 
 Observation = NDArray[np.uint8]
 Info = dict[str, Any]
-
-
-@runtime_checkable
-class Stage(Scene, Protocol):
-    """A scene in which things can be moved."""
-
-    def put(self, name: str, place: tuple[float, float, float]) -> None:
-        """Put the node with DEF `name` to x, y, z (meters) with the next period; a reset undoes it."""
 
 
 class SeeTargetEnv(gymnasium.Env[Observation, Any]):
@@ -89,7 +77,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     `reset(seed=s)` alone decides the episode. Start and pole are drawn uniformly from the
     places where the robot has 0.1 m to spare, at least 1 m apart, and the heading from all
     directions. `options={"start": (x, y, heading), "target": (x, y)}` sets one or both.
-    With `cylinders=True` the arena's four cylinders stand on the floor and hide the pole.
+    With `cylinders=True` the world's four cylinders stand on the floor and hide the pole.
 
     ## End of an episode
 
@@ -102,36 +90,40 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     weighted), `extra_steps` (control periods that a late sensor made necessary).
 
     Args:
-        robot: the robot to drive; its color camera has 64 x 48 pixels.
-        scene: arranges episodes; with `cylinders`, it moves things too.
+        robot: the robot to drive, a `RobotinoAbc` with `Cameras`; its color camera has 64 x 48 pixels.
+        scene: arranges episodes.
         options: images, actions and rewards.
         on_close: called by `close`.
 
     Raises:
-        ConfigurationError: the scene cannot move the cylinders.
-        NoSuchSensor: the robot has no color camera.
+        MissingCapability: the robot is no Robotino with cameras.
+        NoSuchSensor: the robot is connected and lacks the color camera.
     """
+
+    needs: ClassVar[tuple[type, ...]] = (RobotinoAbc, Cameras)
 
     def __init__(
         self,
-        robot: RobotinoAbc,
+        robot: Any,
         scene: Scene,
         options: SeeOptions | None = None,
         on_close: Callable[[], None] | None = None,
     ) -> None:
+        require(robot, self.needs, type(self).__name__)
         self.options = options or SeeOptions()
         rows, columns, colors = IMAGE
         shape = (rows, columns, colors * self.options.frames)
         self.observation_space = gymnasium.spaces.Box(0, 255, shape, np.uint8)
         self.action_space = action_space(self.options)
-        self._robot = robot
+        # Two views of one robot: Python has no type for a class with two capabilities.
+        self._robot: RobotinoAbc = robot
+        self._eyes: Cameras = robot
         self._scene = scene
-        self._stage = _stage(scene) if self.options.cylinders else None
         self._on_close = on_close
         self._frames: deque[Observation] = deque(maxlen=self.options.frames)
         self._target: Point | None = None
         self._steps = 0
-        robot.use_cameras(color=True)
+        self._eyes.use_cameras(color=True)
 
     @property
     def target_m(self) -> float:
@@ -153,13 +145,12 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
             SimulatorFault: as the robot raised it.
         """
         super().reset(seed=seed)
-        cylinders: Sequence[Point] = CYLINDERS if self._stage else ()
-        task = chosen_task(self.np_random, options or {}, cylinders)
-        self._scene.reset(int(self.np_random.integers(2**31)), task.start, task.target)
-        if self._stage:
-            for name, (x_m, y_m) in zip(CYLINDER_NAMES, CYLINDERS, strict=True):
-                self._stage.put(name, (x_m, y_m, CYLINDER_CENTER_M))
-            self._robot.advance()  # the cylinders are there from then on, and the sensors see them
+        self._scene.begin(int(self.np_random.integers(2**31)))
+        if self.options.cylinders:
+            self._raise_cylinders()
+        places = Places(layout=self._scene.layout(), radius_m=self._robot.radius_m)
+        task = places.chosen_task(self.np_random, options or {})
+        self._scene.place(task.start, task.target)
         self._target, self._steps = task.target, 0
         self._frames.extend([self._image()] * self.options.frames)
         return self._seen(), {"start": task.start, "target": task.target}
@@ -199,6 +190,12 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         if self._on_close is not None:
             self._on_close()
 
+    def _raise_cylinders(self) -> None:
+        """Put the things that the world stores under its floor on top of it."""
+        for thing in self._scene.layout().obstacles:
+            if thing.top_m < 0.0:
+                self._scene.put(thing.name, (thing.x_m, thing.y_m, 0.5 * (thing.top_m - thing.bottom_m)))
+
     def _outcome(self) -> Outcome:
         if self._robot.bumped():
             return Outcome.COLLIDED
@@ -208,7 +205,7 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
 
     def _image(self) -> Observation:
         """Return a copy of the camera's image, which is valid until the next step only."""
-        image = self._robot.color_image()
+        image = self._eyes.color_image()
         if image.shape != IMAGE:
             raise ConfigurationError(
                 f"the camera's image has the shape {image.shape}, and SeeTarget-v0 needs {IMAGE}; "
@@ -219,12 +216,3 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
     def _seen(self) -> Observation:
         """Return the newest images as one new array."""
         return np.concatenate(self._frames, axis=2)
-
-
-def _stage(scene: Scene) -> Stage:
-    if not isinstance(scene, Stage):
-        raise ConfigurationError(
-            f"cylinders: {type(scene).__name__} cannot move them, since it has no method put; "
-            "set cylinders to false, or add the method"
-        )
-    return scene

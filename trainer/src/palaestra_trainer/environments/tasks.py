@@ -1,13 +1,13 @@
-"""The arena of the shipped world, and the tasks that are drawn in it.
+"""Tasks on a floor: from a start to a target, at free places of a layout.
 
-It is a square floor with four cylinders. The environment needs its dimensions only
-to draw free starts and targets, and to scale observations.
+The layout comes from the scene, so nothing here knows a world. A place is free for a robot if its outline
+keeps `CLEARANCE_M` from everything that stands there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -15,18 +15,12 @@ from typing import Any
 import numpy as np
 
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.base import RADIUS_M, Pose
+from palaestra_trainer.robots.geometry import Point, Pose
+from palaestra_trainer.robots.layout import Layout
 
-HALF_SIDE_M = 2.0  # from the center to the inner faces of the walls
-CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
-CYLINDER_NAMES = ("CYLINDER_0", "CYLINDER_1", "CYLINDER_2", "CYLINDER_3")  # DEF names in the worlds
-CYLINDER_CENTER_M = 0.2  # above the floor
-CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
-OUTLINE_M = 0.2286  # radius of the body and its bumper in the shipped world
-CLEARANCE_M = 0.10  # between the robot's body and any obstacle, at the start and on the target
+CLEARANCE_M = 0.10  # between the robot's outline and any obstacle, at the start and on the target
 APART_M = 1.0  # least distance from start to target
-
-Point = tuple[float, float]
+MOST_DRAWS = 10_000  # a layout in which so many points are not free has no room
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,67 +31,109 @@ class Task:
     target: Point
 
 
-def gap(x_m: float, y_m: float, cylinders: Sequence[Point] = CYLINDERS) -> float:
-    """Return meters from a point to the nearest wall or cylinder; negative inside one."""
-    wall = HALF_SIDE_M - max(abs(x_m), abs(y_m))
-    middle = min((math.hypot(x_m - x, y_m - y) for x, y in cylinders), default=math.inf)
-    return min(wall, middle - CYLINDER_RADIUS_M)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Places:
+    """The free places of a layout for a robot.
 
-
-def free(x_m: float, y_m: float, cylinders: Sequence[Point] = CYLINDERS) -> bool:
-    """Return whether a robot at this place keeps at least `CLEARANCE_M` from every obstacle."""
-    return gap(x_m, y_m, cylinders) >= RADIUS_M + CLEARANCE_M
-
-
-def apart(one: Point, other: Point) -> bool:
-    """Return whether two points are far enough apart to be start and target."""
-    return math.dist(one, other) >= APART_M
-
-
-def draw_point(random: np.random.Generator, cylinders: Sequence[Point] = CYLINDERS) -> Point:
-    """Return x, y in meters of a random free place; all free places are equally likely."""
-    while True:
-        x_m, y_m = random.uniform(-HALF_SIDE_M, HALF_SIDE_M, size=2).tolist()
-        if free(x_m, y_m, cylinders):
-            return x_m, y_m
-
-
-def draw_task(
-    random: np.random.Generator,
-    start: Pose | None = None,
-    target: Point | None = None,
-    cylinders: Sequence[Point] = CYLINDERS,
-) -> Task:
-    """Return a task with free places `APART_M` apart and a random heading; given values are kept."""
-    heading_rad = float(random.uniform(-math.pi, math.pi))
-    while True:
-        begin = start or Pose(*draw_point(random, cylinders), heading_rad)
-        end = target or draw_point(random, cylinders)
-        if (start and target) or apart((begin.x_m, begin.y_m), end):
-            return Task(start=begin, target=end)
-
-
-def chosen_task(
-    random: np.random.Generator, chosen: Mapping[str, Any], cylinders: Sequence[Point] = CYLINDERS
-) -> Task:
-    """Return a task whose `start` (x, y, heading; or a Pose) and `target` (x, y) may be chosen.
-
-    Raises:
-        ConfigurationError: an unknown name, a wrong number of values, a target inside a wall or a
-            cylinder, or a start at which the robot would touch one.
+    Attributes:
+        layout: the floor and what stands on it.
+        radius_m: of the robot's outline.
+        apart_m: least distance from start to target.
     """
-    if unknown := sorted(set(chosen) - {"start", "target"}):
-        raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
-    start, target = chosen.get("start"), chosen.get("target")
-    if start is not None:
-        if not isinstance(start, Pose):
-            start = Pose(*_numbers("start", start, ("x", "y", "heading")))
-        _check_place("start", start.x_m, start.y_m, OUTLINE_M, cylinders)
-    if target is not None:
-        x_m, y_m = _numbers("target", target, ("x", "y"))
-        _check_place("target", x_m, y_m, 0.0, cylinders)
-        target = x_m, y_m
-    return draw_task(random, start, target, cylinders)
+
+    layout: Layout
+    radius_m: float
+    apart_m: float = APART_M
+
+    def free(self, x_m: float, y_m: float) -> bool:
+        """Return whether the robot keeps at least `CLEARANCE_M` from every obstacle at this place."""
+        return self.layout.gap(x_m, y_m) >= self.radius_m + CLEARANCE_M
+
+    def draw(self, random: np.random.Generator) -> Point:
+        """Return x, y in meters of a random free place; all free places are equally likely.
+
+        Raises:
+            ConfigurationError: the floor has none.
+        """
+        low, high = self.layout.low, self.layout.high
+        for _ in range(MOST_DRAWS):
+            x_m, y_m = random.uniform(low, high).tolist()
+            if self.free(x_m, y_m):
+                return x_m, y_m
+        raise self._full()
+
+    def draw_from(self, random: np.random.Generator, start: Point) -> Point:
+        """Return a random free place that is `apart_m` from `start`.
+
+        Raises:
+            ConfigurationError: the floor has none.
+        """
+        for _ in range(MOST_DRAWS):
+            target = self.draw(random)
+            if math.dist(start, target) >= self.apart_m:
+                return target
+        raise self._full()
+
+    def draw_task(
+        self, random: np.random.Generator, start: Pose | None = None, target: Point | None = None
+    ) -> Task:
+        """Return a task with free places `apart_m` apart and a random heading; given values are kept.
+
+        Raises:
+            ConfigurationError: the floor has no such places.
+        """
+        heading_rad = float(random.uniform(-math.pi, math.pi))
+        if start and target:
+            return Task(start=start, target=target)
+        if start:
+            return Task(start=start, target=self.draw_from(random, (start.x_m, start.y_m)))
+        if target:
+            return Task(start=Pose(*self.draw_from(random, target), heading_rad), target=target)
+        for _ in range(MOST_DRAWS):
+            begin, end = self.draw(random), self.draw(random)
+            if math.dist(begin, end) >= self.apart_m:
+                return Task(start=Pose(*begin, heading_rad), target=end)
+        raise self._full()
+
+    def chosen_task(self, random: np.random.Generator, chosen: Mapping[str, Any]) -> Task:
+        """Return a task whose `start` (x, y, heading; or a Pose) and `target` (x, y) may be chosen.
+
+        Raises:
+            ConfigurationError: an unknown name, a wrong number of values, a target inside an obstacle, a
+                start at which the robot would touch one, or no free place.
+        """
+        if unknown := sorted(set(chosen) - {"start", "target"}):
+            raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
+        start, target = chosen.get("start"), chosen.get("target")
+        if start is not None:
+            if not isinstance(start, Pose):
+                start = Pose(*_numbers("start", start, ("x", "y", "heading")))
+            self._check("start", start.x_m, start.y_m, self.radius_m)
+        if target is not None:
+            x_m, y_m = _numbers("target", target, ("x", "y"))
+            self._check("target", x_m, y_m, 0.0)
+            target = x_m, y_m
+        return self.draw_task(random, start, target)
+
+    def _check(self, name: str, x_m: float, y_m: float, radius_m: float) -> None:
+        """Refuse a place without `radius_m` of free floor; the simulator would push the robot away."""
+        if self.layout.gap(x_m, y_m) > radius_m:  # false for NaN too
+            return
+        fact = "puts the robot in an obstacle" if radius_m else "is in an obstacle"
+        least, most = (
+            [edge + sign * radius_m for edge in edges]
+            for sign, edges in ((1.0, self.layout.low), (-1.0, self.layout.high))
+        )
+        raise ConfigurationError(
+            f"reset option {name}: ({x_m:g}, {y_m:g}) {fact} or beyond the floor; choose a free place with"
+            f" x from {least[0]:g} to {most[0]:g} and y from {least[1]:g} to {most[1]:g}"
+        )
+
+    def _full(self) -> ConfigurationError:
+        return ConfigurationError(
+            f"the layout of the world has no free places for a robot of radius {self.radius_m:g} m that are"
+            f" {self.apart_m:g} m apart; use a larger floor or fewer obstacles"
+        )
 
 
 def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
@@ -109,13 +145,3 @@ def _numbers(name: str, given: Any, wanted: tuple[str, ...]) -> list[float]:
     raise ConfigurationError(
         f"reset option {name}: {given!r} is not {len(wanted)} numbers; give {', '.join(wanted)}"
     )
-
-
-def _check_place(name: str, x_m: float, y_m: float, radius_m: float, cylinders: Sequence[Point]) -> None:
-    """Refuse a place without `radius_m` of free floor around it; the simulator would push the robot away."""
-    if not gap(x_m, y_m, cylinders) > radius_m:  # written so that NaN is refused too
-        fact = "is in a wall or a cylinder" if not radius_m else "puts the robot in a wall or a cylinder"
-        raise ConfigurationError(
-            f"reset option {name}: ({x_m:g}, {y_m:g}) {fact}; choose a free place within"
-            f" {HALF_SIDE_M - radius_m:g} m of the center on each axis"
-        )

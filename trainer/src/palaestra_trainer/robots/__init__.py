@@ -1,5 +1,39 @@
 """Robots as an environment sees them: what they sense, how they drive, when time passes."""
 
-from palaestra_trainer.robots.base import Movement, Pose, RobotinoAbc, Scene
+from palaestra_trainer.robots.base import RobotAbc, RobotinoAbc, Scene
+from palaestra_trainer.robots.capabilities import (
+    Bumper,
+    Cameras,
+    Distances,
+    Forklift,
+    Gripper,
+    Joints,
+    Localization,
+    Omnidrive,
+    Scanner,
+    Steering,
+    require,
+)
+from palaestra_trainer.robots.geometry import Movement, Pose
+from palaestra_trainer.robots.layout import Layout, Obstacle
 
-__all__ = ["Movement", "Pose", "RobotinoAbc", "Scene"]
+__all__ = [
+    "Bumper",
+    "Cameras",
+    "Distances",
+    "Forklift",
+    "Gripper",
+    "Joints",
+    "Layout",
+    "Localization",
+    "Movement",
+    "Obstacle",
+    "Omnidrive",
+    "Pose",
+    "RobotAbc",
+    "RobotinoAbc",
+    "Scanner",
+    "Scene",
+    "Steering",
+    "require",
+]

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.simulators.allocation import allocate
-from palaestra_trainer.simulators.connect import Arena, connect
+from palaestra_trainer.simulators.connect import OwnSimulator, connect
 from palaestra_trainer.simulators.offered import offered_simulator
 
 
@@ -32,7 +32,7 @@ class Configured:
     """
 
     name: str
-    robot: RobotinoAbc
+    robot: RobotAbc
     scene: Scene
     release: Callable[[], None]
 

@@ -10,12 +10,15 @@ from functools import partial
 from pathlib import Path
 
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
-from palaestra_trainer.configuration import Configuration, SimulatorConfiguration, load
+from palaestra_trainer.configuration import DEFAULT_ROBOT, Configuration, SimulatorConfiguration, load
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.choosing import robot_class
+from palaestra_trainer.robots.differential import TurtleBot3Burger
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import limit_of
 from palaestra_trainer.simulators.member import Member
@@ -31,7 +34,7 @@ def connect(configuration: Configuration | None = None) -> list[Simulator]:
     Standbys are left out, because the caller keeps using the same simulators.
 
     Raises:
-        ConfigurationError: the configuration cannot be read, or its environment is unknown.
+        ConfigurationError: the configuration cannot be read, or its environment or robot is unknown.
         MasterLost: no ROS master answers.
         SimulatorDead, SimulatorHung: a sidecar does not answer.
     """
@@ -67,11 +70,19 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
     ]
 
 
-class Arena:
-    """A started simulator with a Robotino, as a process of this program; `close` ends it.
+# Worlds that ship: the ROS name of the supervisor in each, and the class of its robot.
+_WORLDS: dict[str, tuple[str, type[SimulatedRobot]]] = {
+    "arena": ("robotino", Robotino),
+    "seeing": ("robotino", Robotino),
+    "court": ("burger", TurtleBot3Burger),
+}
+
+
+class OwnSimulator:
+    """A started simulator with a world that ships, as a process of this program; `close` ends it.
 
     Args:
-        world: the name of a world that ships: arena or seeing.
+        world: the name of the world.
         driver: stub or mujoco.
 
     Raises:
@@ -79,10 +90,11 @@ class Arena:
     """
 
     def __init__(self, world: str = "arena", driver: str = "stub") -> None:
-        self.webots = Webots("robotino", world, driver=driver)
+        supervisor, robot = _WORLDS[world]
+        self.webots = Webots(supervisor, world, driver=driver)
         withdraw(self.webots)
-        self.robot = Robotino(self.webots)
-        self.scene = RobotinoScene(self.webots, self.robot)
+        self.robot = robot(self.webots)
+        self.scene = SimulatedScene(self.webots, self.robot)
         try:
             self.webots.start()  # connects the robot too
             self.webots.supervisor.set_mode(Mode.FAST)
@@ -125,4 +137,5 @@ def simulator_at(sidecar: Sidecar, configuration: Configuration, entry: Simulato
         SimulatorDead, SimulatorHung: the sidecar does not answer.
     """
     make = partial(make_environment, configuration.environment)
-    return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle)
+    robot = robot_class(configuration.robot or DEFAULT_ROBOT)
+    return Simulator(entry.name, sidecar, make, entry.start_deadline_seconds, entry.recycle, robot)

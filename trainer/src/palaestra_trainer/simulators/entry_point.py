@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from palaestra_protocol.pod.terms import Role
+from palaestra_trainer.environments.deliver import DeliverEnv
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.move_to_target_goal import MoveToTargetGoalEnv
-from palaestra_trainer.environments.options import GoalOptions, SeeOptions, parse, parse_as
+from palaestra_trainer.environments.navigate import NavigateEnv
+from palaestra_trainer.environments.options import (
+    DeliverOptions,
+    GoalOptions,
+    NavigateOptions,
+    SeeOptions,
+    parse,
+    parse_as,
+)
 from palaestra_trainer.environments.see_target import SeeTargetEnv
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.robots.base import RobotAbc, Scene
 
 _ARENA = ("arena", "stub")
 _SEEING = ("seeing", "mujoco")
+_COURT = ("court", "stub")
 
 
 def own_world(environment: str) -> tuple[str, str]:
     """Return world and driver of the simulator that an environment with this id starts for itself."""
-    return _SEEING if environment.rpartition(":")[2] == "SeeTarget-v0" else _ARENA
+    return {"SeeTarget-v0": _SEEING, "Navigate-v0": _COURT}.get(environment.rpartition(":")[2], _ARENA)
 
 
 def make(
-    robot: RobotinoAbc | None = None,
+    robot: RobotAbc | None = None,
     scene: Scene | None = None,
-    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
+    simulator: Callable[[], tuple[RobotAbc, Scene]] | None = None,
     role: str = Role.COLLECT,
     **options: Any,
 ) -> MoveToTargetEnv:
@@ -47,13 +57,54 @@ def make(
     """
     chosen = parse(options)
     place = _place(robot, scene, simulator, role)
-    return MoveToTargetEnv(place.robot, place.scene, chosen, place.release)
+    return _made(MoveToTargetEnv, place, chosen)
+
+
+def make_delivering(
+    robot: RobotAbc | None = None,
+    scene: Scene | None = None,
+    simulator: Callable[[], tuple[RobotAbc, Scene]] | None = None,
+    role: str = Role.COLLECT,
+    **options: Any,
+) -> DeliverEnv:
+    """Return the environment for `gymnasium.make("Deliver-v0", ...)`.
+
+    Arguments and errors are those of `make`, and `options` are those of `DeliverOptions`.
+    """
+    chosen = parse_as(DeliverOptions, options)
+    place = _place(robot, scene, simulator, role)
+    return _made(DeliverEnv, place, chosen)
+
+
+def make_navigating(
+    robot: RobotAbc | None = None,
+    scene: Scene | None = None,
+    simulator: Callable[[], tuple[RobotAbc, Scene]] | None = None,
+    role: str = Role.COLLECT,
+    **options: Any,
+) -> NavigateEnv:
+    """Return the environment for `gymnasium.make("Navigate-v0", ...)`.
+
+    Args:
+        robot: see `make`; it has the capabilities that `NavigateEnv` needs.
+        scene: see `make`.
+        simulator: see `make`. `palaestra_trainer.testing.fake_court` needs no simulator.
+        role: see `make`. Without PALAESTRA_CONFIG it starts a stub with the world `court`.
+        options: see `NavigateOptions`.
+
+    Raises:
+        ConfigurationError: an option is wrong, or no simulator with this role is left.
+        MissingCapability: the robot does not fit.
+    """
+    chosen = parse_as(NavigateOptions, options)
+    place = _place(robot, scene, simulator, role, _COURT)
+    return _made(NavigateEnv, place, chosen)
 
 
 def make_goal(
-    robot: RobotinoAbc | None = None,
+    robot: RobotAbc | None = None,
     scene: Scene | None = None,
-    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
+    simulator: Callable[[], tuple[RobotAbc, Scene]] | None = None,
     role: str = Role.COLLECT,
     **options: Any,
 ) -> MoveToTargetGoalEnv:
@@ -71,13 +122,13 @@ def make_goal(
     """
     chosen = parse_as(GoalOptions, options)
     place = _place(robot, scene, simulator, role)
-    return MoveToTargetGoalEnv(place.robot, place.scene, chosen, place.release)
+    return _made(MoveToTargetGoalEnv, place, chosen)
 
 
 def make_seeing(
-    robot: RobotinoAbc | None = None,
+    robot: RobotAbc | None = None,
     scene: Scene | None = None,
-    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None = None,
+    simulator: Callable[[], tuple[RobotAbc, Scene]] | None = None,
     role: str = Role.COLLECT,
     **options: Any,
 ) -> SeeTargetEnv:
@@ -96,26 +147,21 @@ def make_seeing(
     """
     chosen = parse_as(SeeOptions, options)
     place = _place(robot, scene, simulator, role, _SEEING)
-    try:
-        return SeeTargetEnv(place.robot, place.scene, chosen, place.release)
-    except BaseException:
-        if place.release is not None:
-            place.release()
-        raise
+    return _made(SeeTargetEnv, place, chosen)
 
 
 class _Place(NamedTuple):
     """Where an environment is played, and how it gives that back."""
 
-    robot: RobotinoAbc
+    robot: Any  # of the capabilities that the environment asks for, which it checks
     scene: Scene
     release: Callable[[], None] | None = None
 
 
 def _place(
-    robot: RobotinoAbc | None,
+    robot: RobotAbc | None,
     scene: Scene | None,
-    simulator: Callable[[], tuple[RobotinoAbc, Scene]] | None,
+    simulator: Callable[[], tuple[RobotAbc, Scene]] | None,
     role: str,
     own: tuple[str, str] = _ARENA,
 ) -> _Place:
@@ -130,6 +176,19 @@ def _place(
 
     taken = simulator_for(role_of(role), *own)
     return _Place(taken.robot, taken.scene, taken.release)
+
+
+_Made = TypeVar("_Made")
+
+
+def _made(kind: Callable[..., _Made], place: _Place, options: object) -> _Made:
+    """Return the environment at a place, which is given back if the robot there does not fit."""
+    try:
+        return kind(place.robot, place.scene, options, place.release)
+    except BaseException:
+        if place.release is not None:
+            place.release()
+        raise
 
 
 def role_of(name: str) -> Role:

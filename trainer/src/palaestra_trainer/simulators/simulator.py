@@ -13,15 +13,16 @@ import gymnasium
 from palaestra_trainer.configuration import Recycle
 from palaestra_trainer.errors import ConfigurationError, SimulatorFault
 from palaestra_trainer.launching.sidecar import Sidecar
-from palaestra_trainer.robots.base import RobotinoAbc, Scene
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.simulators.recycling import Wear
 from palaestra_trainer.webots import Mode, Webots
 from palaestra_trainer.webots.offers import withdraw
 
 _POLL_S = 0.1
 
-MakeEnvironment = Callable[[RobotinoAbc, Scene], gymnasium.Env[Any, Any]]
+MakeEnvironment = Callable[[RobotAbc, Scene], gymnasium.Env[Any, Any]]
 
 
 class Simulator:
@@ -33,6 +34,7 @@ class Simulator:
         make_environment: creates the environment from robot and scene.
         start_deadline_s: the longest time for the sidecar to answer, and for the simulator after a start.
         recycle: limits at which it is restarted between two episodes; by default never.
+        robot: the class of the robot in its world.
 
     Raises:
         SimulatorDead, SimulatorHung: the sidecar does not report the robots' names.
@@ -46,6 +48,7 @@ class Simulator:
         make_environment: MakeEnvironment,
         start_deadline_s: float,
         recycle: Recycle | None = None,
+        robot: type[SimulatedRobot] = Robotino,
     ) -> None:
         self.name = name
         self.sidecar = sidecar
@@ -53,16 +56,16 @@ class Simulator:
         self.wear = Wear(recycle, self._memory)
         self._abandoned = threading.Event()
         state = sidecar.first_state(start_deadline_s)
-        supervisor = next((robot for robot in state.robots if robot.supervisor), None)
+        supervisor = next((each for each in state.robots if each.supervisor), None)
         if supervisor is None:
             raise ConfigurationError(f"{name}: the world has no robot with supervisor TRUE; set it on one")
-        driven = next((robot for robot in state.robots if not robot.supervisor), supervisor)
+        driven = next((each for each in state.robots if not each.supervisor), supervisor)
         self.webots = Webots(
             supervisor.ros_name, state.world, launcher=sidecar, start_deadline_s=start_deadline_s
         )
         withdraw(self.webots)
-        self.robot = Robotino(self.webots, driven.ros_name, robots=[robot.ros_name for robot in state.robots])
-        self.scene = RobotinoScene(self.webots, self.robot)
+        self.robot = robot(self.webots, driven.ros_name, robots=[each.ros_name for each in state.robots])
+        self.scene = SimulatedScene(self.webots, self.robot)
         self.env = make_environment(self.robot, self.scene)
 
     @property

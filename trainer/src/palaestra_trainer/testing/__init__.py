@@ -1,19 +1,29 @@
-"""A Robotino and a task that need no simulator, and the checks that every Robotino must pass.
+"""Robots and a task that need no simulator, and the checks that every robot must pass.
 
 They are shipped, not kept among the tests, because authors of environments, robots and algorithms need them.
 """
 
 from palaestra_trainer.testing.conformance import NotConforming, check_robot, check_scene
-from palaestra_trainer.testing.fake import FakeRobotino, FakeScene, fake_arena, fake_seeing
+from palaestra_trainer.testing.fake_burger import FakeBurger, fake_court
+from palaestra_trainer.testing.fake_robotino import (
+    FakeRobotino,
+    FakeSeeingRobotino,
+    fake_arena,
+    fake_seeing,
+)
+from palaestra_trainer.testing.fake_scene import FakeScene
 from palaestra_trainer.testing.fake_task import FakeTask
 
 __all__ = [
+    "FakeBurger",
     "FakeRobotino",
     "FakeScene",
+    "FakeSeeingRobotino",
     "FakeTask",
     "NotConforming",
     "check_robot",
     "check_scene",
     "fake_arena",
+    "fake_court",
     "fake_seeing",
 ]

@@ -1,72 +1,85 @@
-"""The definition of "a Robotino", as checks for any implementation.
+"""The definition of a robot and of each capability, as checks for any implementation.
 
-The fake, the simulated and the real robot pass the same checks, so an environment
+A fake, a simulated and a real robot of one class pass the same checks, so an environment
 can be moved from one to the other. Each rule is a constant: the sentence in the
-error of a robot that fails it. Each check drives, so give the robot half a meter of
+error of a robot that fails it. The checks drive, so give the robot half a meter of
 free floor on every side.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from palaestra_trainer.errors import NoSuchSensor, TrainerError
-from palaestra_trainer.robots.base import (
-    SENSOR_RANGE_M,
-    SENSORS,
-    Movement,
-    Pose,
-    RobotinoAbc,
-    Scene,
-    Twist,
+from palaestra_trainer.robots.base import RobotAbc, Scene
+from palaestra_trainer.robots.capabilities import (
+    Bumper,
+    Cameras,
+    Distances,
+    Forklift,
+    Gripper,
+    Joints,
+    Localization,
+    Omnidrive,
+    Scanner,
+    Steering,
 )
+from palaestra_trainer.robots.geometry import Movement, Pose, Twist
 
 PERIOD_IS_POSITIVE = "period_s is a positive number of seconds and does not change"
-DISTANCES_HAVE_SHAPE = "distances() returns float32 of shape (9,)"
-DISTANCES_ARE_METRES = "distances() lie in SENSOR_RANGE_M"
+ADVANCE_COUNTS = "advance() returns how many extra periods passed, an int not below 0"
+READINGS_STAND_STILL = "readings change in advance() only"
+DISTANCES_HAVE_SHAPE = "distances() returns float32 of shape (sensors,), one for each of bearings_rad"
+DISTANCES_ARE_METRES = "distances() lie in distance_range_m"
 DISTANCES_ARE_OWN = "distances() returns an array that the caller may change"
 BUMPED_IS_BOOL = "bumped() returns a bool"
 POSE_IS_FINITE = "pose() is finite, with a heading in (-pi, pi]"
-READINGS_STAND_STILL = "readings change in advance() only"
-ADVANCE_COUNTS = "advance() returns how many extra periods passed, an int not below 0"
+LIMITS_ARE_POSITIVE = "radius_m, speed_m_s and turn_rad_s are positive"
+STEERING_MOVES = "steer() moves the robot forward or turns it, at about its speed"
 MOVEMENTS_MOVE = "each Movement moves the robot along its own axis, at about its speed"
 STOP_STOPS = "after two periods of STOP the robot stands"
 COLORS_ARE_TYPED = "color_image() returns uint8 of shape (height, width, 3)"
 DEPTHS_ARE_TYPED = "depth_image() returns float32 of shape (height, width), no meters below 0"
+SCANS_ARE_TYPED = "scan() returns float32 of shape (rays,) in scan_range_m"
+JOINTS_ARE_TYPED = "joints() returns finite float64 of shape (sensors,)"
+MOTORS_ARE_NAMED = "motors has a name and greatest a positive number for each motor"
 RESET_PLACES = "Scene.reset() leaves the robot at rest at the start, with fresh readings"
 RESET_DECIDES = "the same seed, start and commands give the same readings"
 
 PERIODS = 3  # of each movement: enough for the constant speed to outweigh the acceleration
 STILL_M = 0.002  # apparent motion of a standing robot: odometry has steps
 RESET_M = 0.01  # a simulator may let the robot settle on its wheels
+SHARE = 0.5  # of its greatest speeds, at which steering is checked
 
 
 class NotConforming(TrainerError, AssertionError):
     """A robot broke one of the rules."""
 
 
-def check_robot(robot: RobotinoAbc) -> None:
-    """Check a robot, standing on free floor, against every rule that needs no scene.
+def check_robot(robot: RobotAbc) -> None:
+    """Check a robot, standing on free floor, against the rules of all robots and of its capabilities.
 
     Raises:
         NotConforming: with the broken rule and the observed value.
     """
-    _check_readings(robot)
-    _check_standing_still(robot)
-    for movement in Movement:
-        _check_movement(robot, movement)
-    _check_images(robot)
+    _check_time(robot)
+    for capability, check in _CHECKS:
+        if isinstance(robot, capability):
+            check(robot)
+    _check_readings_stand_still(robot)
 
 
-def check_scene(robot: RobotinoAbc, scene: Scene, start: Pose, target: tuple[float, float]) -> None:
+def check_scene(robot: Any, scene: Scene, start: Pose, target: tuple[float, float]) -> None:
     """Check a simulated robot and its scene against the rules about resets.
 
     Args:
-        robot: the robot in the scene.
+        robot: the robot in the scene, with `Steering` and `Localization`.
         scene: the scene to check.
         start: a pose with half a meter of free floor on every side.
         target: x, y in meters of another free place.
@@ -80,58 +93,75 @@ def check_scene(robot: RobotinoAbc, scene: Scene, start: Pose, target: tuple[flo
         _require(np.array_equal(one, other), RESET_DECIDES, (one, other))
 
 
-def _check_readings(robot: RobotinoAbc) -> None:
+def _check_time(robot: RobotAbc) -> None:
     extra = robot.advance()
-    distances = robot.distances()
-    pose = robot.pose()
     _require(type(extra) is int and extra >= 0, ADVANCE_COUNTS, extra)
     _require(0.0 < robot.period_s == robot.period_s, PERIOD_IS_POSITIVE, robot.period_s)
+
+
+def _check_distances(robot: Distances) -> None:
+    distances = robot.distances()
     _require(
-        distances.shape == (SENSORS,) and distances.dtype == np.float32,
+        distances.shape == (len(robot.bearings_rad),) and distances.dtype == np.float32,
         DISTANCES_HAVE_SHAPE,
         (distances.shape, distances.dtype),
     )
-    least, most = np.array(SENSOR_RANGE_M, np.float32)
+    least, most = np.array(robot.distance_range_m, np.float32)
     _require(bool(((distances >= least) & (distances <= most)).all()), DISTANCES_ARE_METRES, distances)
+    distances.fill(np.nan)
+    _require(not np.isnan(robot.distances()).any(), DISTANCES_ARE_OWN, robot.distances())
+
+
+def _check_bumper(robot: Bumper) -> None:
     _require(type(robot.bumped()) is bool, BUMPED_IS_BOOL, robot.bumped())
+
+
+def _check_pose(robot: Localization) -> None:
+    pose = robot.pose()
     _require(math.isfinite(pose.x_m + pose.y_m), POSE_IS_FINITE, pose)
     _require(-math.pi < pose.heading_rad <= math.pi, POSE_IS_FINITE, pose)
 
 
-def _check_standing_still(robot: RobotinoAbc) -> None:
-    before = robot.distances(), robot.pose()
-    robot.distances().fill(np.nan)
-    _require(not np.isnan(robot.distances()).any(), DISTANCES_ARE_OWN, robot.distances())
-    robot.move(Movement.FORWARD)
-    after = robot.distances(), robot.pose()
-    robot.move(Movement.STOP)
-    same = np.array_equal(before[0], after[0]) and before[1] == after[1]
-    _require(same, READINGS_STAND_STILL, (before, after))
+def _check_steering(robot: Any) -> None:
+    limits = robot.radius_m, robot.speed_m_s, robot.turn_rad_s
+    _require(min(limits) > 0.0, LIMITS_ARE_POSITIVE, limits)
+    if not _knows_where_it_is(robot):
+        return
+    for forward, turn in ((robot.speed_m_s, 0.0), (-robot.speed_m_s, 0.0), (0.0, robot.turn_rad_s)):
+        wanted = (SHARE * forward, 0.0, SHARE * turn)
+        _check_motion(robot, lambda twist: robot.steer(twist[0], twist[2]), wanted, STEERING_MOVES)
 
 
-def _check_movement(robot: RobotinoAbc, movement: Movement) -> None:
+def _check_movements(robot: Any) -> None:
+    if _knows_where_it_is(robot):
+        for movement in Movement:
+            _check_motion(robot, lambda twist: robot.drive(*twist), movement.twist, MOVEMENTS_MOVE)
+
+
+def _knows_where_it_is(robot: object) -> bool:
+    return isinstance(robot, Localization)
+
+
+def _check_motion(robot: Any, drive: Callable[[Twist], None], wanted: Twist, rule: str) -> None:
+    """Compare the driven distance (m, m, rad) with the commanded one, then stop."""
     before = robot.pose()
-    robot.move(movement)
+    drive(wanted)
     elapsed_s = sum(robot.period_s * (1 + robot.advance()) for _ in range(PERIODS))
-    _check_twist(movement, moved(before, robot.pose()), elapsed_s)
-    robot.move(Movement.STOP)
+    driven = moved(before, robot.pose())
+    for asked, got in zip(wanted, driven, strict=True):
+        ideal = asked * elapsed_s
+        slack = 0.5 * abs(ideal) if asked else 0.05
+        _require(abs(got - ideal) <= slack, rule, (wanted, driven))
+    drive((0.0, 0.0, 0.0))
     robot.advance()
     robot.advance()
     stopped = robot.pose()
     robot.advance()
     drift = moved(stopped, robot.pose())
-    _require(max(map(abs, drift)) <= STILL_M, STOP_STOPS, (movement, drift))
+    _require(max(map(abs, drift)) <= STILL_M, STOP_STOPS, (wanted, drift))
 
 
-def _check_twist(movement: Movement, seen: Twist, elapsed_s: float) -> None:
-    """Compare the driven distance (m, m, rad) with the commanded one."""
-    for asked, driven in zip(movement.twist, seen, strict=True):
-        ideal = asked * elapsed_s
-        slack = 0.5 * abs(ideal) if asked else 0.05
-        _require(abs(driven - ideal) <= slack, MOVEMENTS_MOVE, (movement, seen))
-
-
-def _check_images(robot: RobotinoAbc) -> None:
+def _check_images(robot: Any) -> None:
     """Check the images of the cameras that the robot has."""
     with suppress(NoSuchSensor):
         robot.use_cameras(color=True)
@@ -147,20 +177,96 @@ def _check_images(robot: RobotinoAbc) -> None:
         _require(typed and bool((depths >= 0.0).all()), DEPTHS_ARE_TYPED, (depths.shape, depths.dtype))
 
 
+def _check_scan(robot: Any) -> None:
+    with suppress(NoSuchSensor):
+        robot.use_scanner()
+        robot.advance()
+        scan = robot.scan()
+        least, most = np.array(robot.scan_range_m, np.float32)
+        _require(scan.ndim == 1 and scan.dtype == np.float32, SCANS_ARE_TYPED, (scan.shape, scan.dtype))
+        _require(bool(((scan >= least) & (scan <= most)).all()), SCANS_ARE_TYPED, scan)
+
+
+def _check_joints(robot: Joints) -> None:
+    one_each = len(robot.greatest) == len(robot.motors) > 0 and min(robot.greatest) > 0.0
+    _require(one_each, MOTORS_ARE_NAMED, (robot.motors, robot.greatest))
+    robot.command([0.0] * len(robot.motors))
+    joints = robot.joints()
+    typed = joints.shape == (len(robot.sensors),) and joints.dtype == np.float64
+    _require(typed and bool(np.isfinite(joints).all()), JOINTS_ARE_TYPED, joints)
+
+
+def _check_gripper(robot: Any) -> None:
+    with suppress(NoSuchSensor):
+        robot.use_gripper()
+        robot.grip(1.0)
+        robot.advance()
+        robot.grip(0.0)
+
+
+def _check_fork(robot: Any) -> None:
+    with suppress(NoSuchSensor):
+        robot.use_forklift()
+        robot.lift(robot.lift_range_m[1])
+        robot.advance()
+        robot.lift(robot.lift_range_m[0])
+
+
+_CHECKS: tuple[tuple[type, Callable[[Any], None]], ...] = (
+    (Distances, _check_distances),
+    (Bumper, _check_bumper),
+    (Localization, _check_pose),
+    (Omnidrive, _check_movements),
+    (Steering, _check_steering),
+    (Cameras, _check_images),
+    (Scanner, _check_scan),
+    (Joints, _check_joints),
+    (Gripper, _check_gripper),
+    (Forklift, _check_fork),
+)
+
+
+def _check_readings_stand_still(robot: RobotAbc) -> None:
+    before = _readings(robot)
+    if isinstance(robot, Steering):
+        robot.steer(robot.speed_m_s, 0.0)
+    after = _readings(robot)
+    if isinstance(robot, Steering):
+        robot.steer(0.0, 0.0)
+    _require(before == after, READINGS_STAND_STILL, (before, after))
+
+
+def _readings(robot: object) -> list[Any]:
+    """Return what the robot senses without devices that have to be taken into use, as lists."""
+    return [
+        *(robot.distances().tolist() if isinstance(robot, Distances) else ()),
+        *(robot.joints().tolist() if isinstance(robot, Joints) else ()),
+        *([robot.bumped()] if isinstance(robot, Bumper) else ()),
+        *([robot.pose()] if isinstance(robot, Localization) else ()),
+    ]
+
+
 def _drive_after_reset(
-    robot: RobotinoAbc, scene: Scene, start: Pose, target: tuple[float, float]
-) -> list[NDArray[np.float32]]:
+    robot: Any, scene: Scene, start: Pose, target: tuple[float, float]
+) -> list[NDArray[np.float64]]:
     """Return the readings of a short drive that begins with a reset."""
     scene.reset(7, start, target)
     off = moved(start, robot.pose())
-    _require(max(map(abs, off)) <= RESET_M and not robot.bumped(), RESET_PLACES, robot.pose())
-    readings = [robot.distances()]
-    robot.move(Movement.LEFT)
+    bumped = isinstance(robot, Bumper) and robot.bumped()
+    _require(max(map(abs, off)) <= RESET_M and not bumped, RESET_PLACES, robot.pose())
+    readings = [_numbers(robot)]
+    robot.steer(0.5 * robot.speed_m_s, 0.5 * robot.turn_rad_s)
     for _ in range(PERIODS):
         robot.advance()
-        readings.append(robot.distances())
-    robot.move(Movement.STOP)
+        readings.append(_numbers(robot))
+    robot.steer(0.0, 0.0)
     return readings
+
+
+def _numbers(robot: Any) -> NDArray[np.float64]:
+    pose = robot.pose()
+    distances = robot.distances() if isinstance(robot, Distances) else ()
+    return np.array([pose.x_m, pose.y_m, pose.heading_rad, *distances])
 
 
 def moved(before: Pose, after: Pose) -> Twist:

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.environments.arena import CYLINDER_RADIUS_M, HALF_SIDE_M, Point
-from palaestra_trainer.robots.base import Pose
+from palaestra_trainer.robots.geometry import Point, Pose
+from palaestra_trainer.testing.fake_scene import CYLINDER_HEIGHT_M, CYLINDER_RADIUS_M, HALF_SIDE_M
 
 HEIGHT, WIDTH = 48, 64  # pixels
 FIELD_OF_VIEW_RAD = 1.0472  # horizontal
@@ -26,7 +26,6 @@ FORWARD_M, ABOVE_M = 0.23, 0.3  # from the robot's center, from the floor
 RANGE_M = (0.05, 6.0)  # of the depth camera
 POLE_HEIGHT_M, POLE_RADIUS_M = 0.5, 0.05
 WALL_HEIGHT_M = 0.3
-CYLINDER_HEIGHT_M = 0.4
 
 SKY, FLOOR, WALL = (191, 209, 230), (217, 217, 209), (153, 140, 128)
 POLE, CYLINDER = (217, 26, 26), (51, 89, 179)

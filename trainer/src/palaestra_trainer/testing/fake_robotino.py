@@ -16,29 +16,25 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.environments.arena import (
-    CYLINDER_NAMES,
+from palaestra_trainer.errors import NoSuchSensor, SimulatorDead
+from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, SENSORS, RobotinoAbc
+from palaestra_trainer.robots.capabilities import Cameras
+from palaestra_trainer.robots.geometry import Point, Pose, Twist
+from palaestra_trainer.robots.layout import Layout
+from palaestra_trainer.testing.fake_camera import look
+from palaestra_trainer.testing.fake_scene import (
     CYLINDER_RADIUS_M,
     CYLINDERS,
     HALF_SIDE_M,
-    Point,
+    STORED_M,
+    FakeScene,
+    arena,
 )
-from palaestra_trainer.errors import NoSuchSensor, SimulatorDead, WrongData
-from palaestra_trainer.robots.base import (
-    RADIUS_M,
-    SENSOR_RANGE_M,
-    SENSORS,
-    Pose,
-    RobotinoAbc,
-    Twist,
-)
-from palaestra_trainer.testing.fake_camera import look
 
 BASIC_STEP_S = 0.032
 BASIC_STEPS = 6  # in one control period
 ACCELERATIONS = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2. Source: Webots, robotino3/base.c
 NOISE = 0.005  # of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
-BEARINGS_RAD = tuple(2.0 * math.pi * sensor / SENSORS for sensor in range(SENSORS))
 
 
 class FakeRobotino(RobotinoAbc):
@@ -48,19 +44,17 @@ class FakeRobotino(RobotinoAbc):
         deaths: numbers of the `advance` calls, counted from 1 over its whole life, at
             which it dies; every call raises `SimulatorDead` from then until `restart`.
         name: its name in faults.
-        cameras: whether it has a color and a depth camera.
 
     Attributes:
-        cylinders: x, y in meters of those on the floor.
-        target: x, y in meters of the pole that cameras see.
+        cylinders: x, y in meters of those that stand on the floor.
+        target: x, y in meters of the mark, a pole that cameras see.
     """
 
-    def __init__(self, deaths: Collection[int] = (), name: str = "fake", *, cameras: bool = False) -> None:
+    def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
         self._deaths = frozenset(deaths)
         self._name = name
-        self._cameras = cameras
-        self._in_use: set[str] = set()
-        self.cylinders: Sequence[Point] = CYLINDERS
+        self.cylinders: Sequence[Point] = ()
+        self.layout = arena()
         self.target: Point = (0.0, 0.0)
         self._steps = 0
         self._dead = False
@@ -72,6 +66,16 @@ class FakeRobotino(RobotinoAbc):
     def period_s(self) -> float:
         """Six basic steps of 32 ms, as in the shipped example."""
         return BASIC_STEP_S * BASIC_STEPS
+
+    @property
+    def layout(self) -> Layout:
+        """The arena with what stands in it; only its cylinders are simulated."""
+        return self._layout
+
+    @layout.setter
+    def layout(self, layout: Layout) -> None:
+        self._layout = layout
+        self.cylinders = tuple((thing.x_m, thing.y_m) for thing in layout.obstacles if thing.standing)
 
     def distances(self) -> NDArray[np.float32]:
         """Return the nine distances after the last step."""
@@ -87,21 +91,6 @@ class FakeRobotino(RobotinoAbc):
         """Return the pose after the last step."""
         self._live()
         return Pose(self._x_m, self._y_m, self._heading_rad)
-
-    def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
-        """Let the chosen cameras have an image from the next `advance` on."""
-        self._live()
-        if not self._cameras:
-            super().use_cameras(color=color, depth=depth)
-        self._in_use |= {name for name, wanted in (("color", color), ("depth", depth)) if wanted}
-
-    def color_image(self) -> NDArray[np.uint8]:
-        """Return what the camera sees from the pose after the last step, a new array; see `fake_camera`."""
-        return self._look("color")[0]
-
-    def depth_image(self) -> NDArray[np.float32]:
-        """Return meters for each pixel from the pose after the last step, a new array."""
-        return self._look("depth")[1]
 
     def drive(self, vx: float, vy: float, omega: float) -> None:
         """Set the wanted velocity."""
@@ -134,17 +123,6 @@ class FakeRobotino(RobotinoAbc):
     def restart(self) -> None:
         """Bring the robot back to life."""
         self._dead = False
-
-    def _look(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        self._live()
-        if not self._cameras:
-            raise self._no_camera(camera)
-        if camera not in self._in_use:
-            raise NoSuchSensor(
-                f"{self._name}: its {camera} camera is not in use; call use_cameras({camera}=True), "
-                "then advance()"
-            )
-        return look(self.pose(), self.target, self.cylinders)
 
     def _live(self) -> None:
         if self._dead:
@@ -180,7 +158,7 @@ class FakeRobotino(RobotinoAbc):
             self._bumped = True
 
     def _sense(self) -> None:
-        seen = [self._ray(self._heading_rad + bearing) for bearing in BEARINGS_RAD]
+        seen = [self._ray(self._heading_rad + bearing) for bearing in self.bearings_rad]
         noise = 1.0 + NOISE * self._random.standard_normal(SENSORS)
         self._distances = np.clip(seen * noise, *SENSOR_RANGE_M).astype(np.float32)
 
@@ -196,38 +174,34 @@ class FakeRobotino(RobotinoAbc):
         return nearest - RADIUS_M
 
 
-class FakeScene:
-    """The scene of a `FakeRobotino`.
+class FakeSeeingRobotino(FakeRobotino, Cameras):
+    """A `FakeRobotino` with a color and a depth camera; see `fake_camera`."""
 
-    Args:
-        robot: the robot.
-        cylinders: x, y in meters of those that stand on the floor after a reset.
-    """
+    def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
+        super().__init__(deaths, name)
+        self._in_use: set[str] = set()
 
-    def __init__(self, robot: FakeRobotino, cylinders: Sequence[Point] = CYLINDERS) -> None:
-        self._robot = robot
-        self._first = dict(zip(CYLINDER_NAMES, cylinders, strict=False))
-        self._standing = dict(self._first)
-        self.target: Point = (0.0, 0.0)
-        robot.cylinders = tuple(cylinders)
+    def use_cameras(self, *, color: bool = False, depth: bool = False) -> None:
+        """Let the chosen cameras have an image from the next `advance` on."""
+        self._live()
+        self._in_use |= {name for name, wanted in (("color", color), ("depth", depth)) if wanted}
 
-    def reset(self, seed: int, start: Pose, target: Point) -> None:
-        """Put the robot at rest at `start`, and the cylinders to their places."""
-        self._standing = dict(self._first)
-        self._robot.cylinders = tuple(self._standing.values())
-        self._robot.target = self.target = target
-        self._robot.place(start, seed)
+    def color_image(self) -> NDArray[np.uint8]:
+        """Return what the camera sees from the pose after the last step, a new array."""
+        return self._look("color")[0]
 
-    def put(self, name: str, place: tuple[float, float, float]) -> None:
-        """Let a cylinder stand at x, y (meters) until the next reset.
+    def depth_image(self) -> NDArray[np.float32]:
+        """Return meters for each pixel from the pose after the last step, a new array."""
+        return self._look("depth")[1]
 
-        Raises:
-            WrongData: it has another name than those in `CYLINDER_NAMES`.
-        """
-        if name not in CYLINDER_NAMES:
-            raise WrongData("fake", f"the world has no node DEF {name}")
-        self._standing[name] = place[:2]
-        self._robot.cylinders = tuple(self._standing.values())
+    def _look(self, camera: str) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        self._live()
+        if camera not in self._in_use:
+            raise NoSuchSensor(
+                f"{self._name}: its {camera} camera is not in use; call use_cameras({camera}=True), "
+                "then advance()"
+            )
+        return look(self.pose(), self.target, self.cylinders)
 
 
 def fake_arena(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
@@ -236,10 +210,13 @@ def fake_arena(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
     return robot, FakeScene(robot)
 
 
-def fake_seeing(deaths: Collection[int] = ()) -> tuple[FakeRobotino, FakeScene]:
-    """Return a robot with cameras and its scene, without cylinders; see `FakeRobotino` for `deaths`."""
-    robot = FakeRobotino(deaths, cameras=True)
-    return robot, FakeScene(robot, cylinders=())
+def fake_seeing(deaths: Collection[int] = ()) -> tuple[FakeSeeingRobotino, FakeScene]:
+    """Return a robot with cameras and its scene, without cylinders; see `FakeRobotino` for `deaths`.
+
+    The cylinders are stored under the floor, as in the world `seeing`.
+    """
+    robot = FakeSeeingRobotino(deaths)
+    return robot, FakeScene(robot, arena(CYLINDERS, STORED_M))
 
 
 def wrapped(angle_rad: float) -> float:

@@ -1,0 +1,58 @@
+"""The task: drive to three targets in turn, and stand on each.
+
+World, robot, observations and rewards are those of `MoveToTargetEnv`: one world serves tasks of different
+difficulty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
+from palaestra_trainer.environments.options import DeliverOptions
+from palaestra_trainer.environments.tasks import Places
+from palaestra_trainer.robots.base import RobotinoAbc, Scene
+from palaestra_trainer.robots.geometry import Point
+
+
+class DeliverEnv(MoveToTargetEnv):
+    """Drive to three targets in turn and stand on each: within 0.20 m, slower than 0.05 m/s.
+
+    As `MoveToTargetEnv`, except for this:
+
+    - The mark shows one target. When the robot stands on it, the mark moves to the next one, at least 1 m
+      away, and the episode goes on. `options.targets` is how many there are.
+    - `target` of an observation is the target of the moment; `to_reach` is the share of the targets that are
+      left: 1, 2/3, 1/3. It is observed by default.
+    - `success` is paid for each target. `info["outcome"]` of such a step is `delivered`, of the last one
+      `reached`; `info["is_success"]` is true for the last one only.
+    - Time is up after 300 steps.
+
+    `reset(options={"start": (x, y, heading), "target": (x, y)})` sets the start and the first target.
+
+    Args:
+        robot: the robot to drive.
+        scene: arranges episodes.
+        options: observation, actions and rewards.
+        on_close: called by `close`.
+
+    Raises:
+        MissingCapability: the robot is no Robotino.
+    """
+
+    def __init__(
+        self,
+        robot: RobotinoAbc,
+        scene: Scene,
+        options: DeliverOptions | None = None,
+        on_close: Callable[[], None] | None = None,
+    ) -> None:
+        chosen = options or DeliverOptions()
+        self._count = chosen.targets
+        super().__init__(robot, scene, chosen, on_close)
+
+    def _more_targets(self, places: Places, first: Point) -> Iterable[Point]:
+        target = first
+        for _ in range(self._count - 1):
+            target = places.draw_from(self.np_random, target)
+            yield target

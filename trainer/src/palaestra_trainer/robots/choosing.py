@@ -1,0 +1,50 @@
+"""The class that `trainer.robot` of a job names."""
+
+from __future__ import annotations
+
+import importlib
+
+from palaestra_trainer.configuration import nearest
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import RobotAbc
+from palaestra_trainer.robots.simulated import SimulatedRobot
+
+SHIPPED: dict[str, str] = {
+    "Robotino": "palaestra_trainer.robots.robotino:Robotino",
+    "TurtleBot3Burger": "palaestra_trainer.robots.differential:TurtleBot3Burger",
+    "EPuck": "palaestra_trainer.robots.differential:EPuck",
+}
+
+
+def robot_class(name: str) -> type[SimulatedRobot]:
+    """Return the class of a robot: one in `SHIPPED`, or a class of your own as `module:Class`.
+
+    Raises:
+        ConfigurationError: there is no such class, or it is no robot that a simulator could have.
+    """
+    if ":" not in name and name not in SHIPPED:
+        raise ConfigurationError(
+            f"trainer.robot: {name} is not known; {nearest(name, list(SHIPPED))}, "
+            "or name a class of your own as module:Class"
+        )
+    module, _, attribute = SHIPPED.get(name, name).partition(":")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except (AttributeError, ImportError, ValueError) as error:
+        raise ConfigurationError(
+            f"trainer.robot: {name} cannot be imported ({error}); "
+            "correct the name, or put the module on PYTHONPATH"
+        ) from error
+    if not (isinstance(found, type) and issubclass(found, SimulatedRobot)):
+        kind = "a RobotAbc that no simulator has" if _is_robot(found) else "not a RobotAbc"
+        raise ConfigurationError(
+            f"trainer.robot: {name} is {kind}; derive the class from "
+            "palaestra_trainer.robots.simulated.SimulatedRobot or one of its subclasses"
+        )
+    if missing := sorted(getattr(found, "__abstractmethods__", ())):
+        raise ConfigurationError(f"trainer.robot: {name} lacks the method {missing[0]}; implement it")
+    return found
+
+
+def _is_robot(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, RobotAbc)

@@ -1,0 +1,49 @@
+"""Poses and movements on a floor: meters in the world's frame, radians counter-clockwise from x."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+SPEED_M_S = 0.5  # Source: ~max_linear_vel as launched by robotino_node
+TURN_RAD_S = 1.0  # Source: default of ~max_angular_vel in robotino_node
+
+Twist = tuple[float, float, float]
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a robot is: meters in the world's frame, heading in (-pi, pi], 0 along x."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+class Movement(IntEnum):
+    """The movements of a Robotino for one control period."""
+
+    STOP = 0
+    FORWARD = 1
+    BACKWARD = 2
+    LEFT = 3
+    RIGHT = 4
+    TURN_LEFT = 5
+    TURN_RIGHT = 6
+
+    @property
+    def twist(self) -> Twist:
+        """Forward and left in m/s, counter-clockwise in rad/s, as `Omnidrive.drive` takes it."""
+        return _TWISTS[self]
+
+
+_TWISTS: dict[Movement, Twist] = {
+    Movement.STOP: (0.0, 0.0, 0.0),
+    Movement.FORWARD: (SPEED_M_S, 0.0, 0.0),
+    Movement.BACKWARD: (-SPEED_M_S, 0.0, 0.0),
+    Movement.LEFT: (0.0, SPEED_M_S, 0.0),
+    Movement.RIGHT: (0.0, -SPEED_M_S, 0.0),
+    Movement.TURN_LEFT: (0.0, 0.0, TURN_RAD_S),
+    Movement.TURN_RIGHT: (0.0, 0.0, -TURN_RAD_S),
+}

@@ -1,0 +1,72 @@
+"""Simulated robots of joints: arms, cart-poles, models of MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.capabilities import Joints
+from palaestra_trainer.robots.simulated import SimulatedRobot
+from palaestra_trainer.ros import call_together
+from palaestra_trainer.waiting.turns import let_others
+from palaestra_trainer.webots import Command, Lever, PositionSensor, Webots
+
+
+class JointRobot(SimulatedRobot, Joints):
+    """A robot that is moved by its joints. The arguments are those of `SimulatedRobot`.
+
+    A subclass names the motors and sensors of its robot. In a model of MuJoCo every sensor of one number is
+    a PositionSensor, so a sensor may measure a rate too.
+
+    Attributes:
+        motors: names of its motors.
+        sensors: names of its PositionSensors.
+        greatest: the greatest command of each motor.
+        commanded: what `command` sets: position (rad, m), velocity, force (N) or torque (N m).
+
+    Raises:
+        ConfigurationError: the class names no motors, or not one greatest command for each.
+    """
+
+    target = None
+    motors: ClassVar[tuple[str, ...]] = ()
+    sensors: ClassVar[tuple[str, ...]] = ()
+    greatest: ClassVar[tuple[float, ...]] = ()
+    commanded: ClassVar[Command] = "force"
+
+    def __init__(
+        self,
+        webots: Webots,
+        node_name: str | None = None,
+        definition: str | None = None,
+        period_ms: int | None = None,
+        robots: Iterable[str] = (),
+    ) -> None:
+        if not self.motors or len(self.motors) != len(self.greatest):
+            raise ConfigurationError(
+                f"trainer.robot: {type(self).__name__} has {len(self.motors)} motors and "
+                f"{len(self.greatest)} numbers in greatest; name motors in a subclass, with a number for each"
+            )
+        super().__init__(webots, node_name, definition, period_ms, robots)
+        self._motors = tuple(Lever(self.node_name, motor, self.commanded) for motor in self.motors)
+        self._sensors = tuple(PositionSensor(self.node_name, sensor) for sensor in self.sensors)
+        self.simulation.add(self._sensors, self._motors)
+
+    def joints(self) -> NDArray[np.float64]:
+        """Return the readings of `sensors`, shape (sensors,); a new array."""
+        values = [sensor.value for sensor in self._sensors]
+        if None in values:
+            raise self._no_reading()
+        return np.array(values, np.float64)
+
+    def command(self, values: Iterable[float]) -> None:
+        """Set the command of each motor, within `greatest`, until changed."""
+        calls = [
+            (motor.service, {"value": min(max(float(value), -most), most)})
+            for motor, value, most in zip(self._motors, values, self.greatest, strict=True)
+        ]
+        call_together(calls, meanwhile=let_others)

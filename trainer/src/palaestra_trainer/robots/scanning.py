@@ -1,0 +1,15 @@
+"""Ranges of a Lidar as a scan."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def scan_of(ranges: NDArray[np.float32], within: tuple[float, float]) -> NDArray[np.float32]:
+    """Return the first layer of a Lidar's ranges in meters, within bounds, from the right counter-clockwise.
+
+    A Lidar's rays go from left to right, and what it does not see is infinite.
+    """
+    scan: NDArray[np.float32] = np.clip(ranges[0, ::-1], *within).astype(np.float32)
+    return scan

@@ -1,0 +1,265 @@
+"""A robot in Webots, or in any simulator that speaks its interface, and the scene around it.
+
+A class of `SimulatedRobot` names the devices and DEF names of its robot as class attributes, so a robot with
+other names is a subclass of a few lines, and `trainer.robot` of a job names that class.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import ClassVar
+
+from palaestra_trainer.errors import MissingCapability, NoReading, NoSuchSensor, WorldMisfit
+from palaestra_trainer.robots.base import JointScene, RobotAbc, Scene
+from palaestra_trainer.robots.capabilities import Localization
+from palaestra_trainer.robots.geometry import Point, Pose
+from palaestra_trainer.robots.layout import Layout, Obstacle
+from palaestra_trainer.webots import (
+    FLOOR,
+    Actuator,
+    Sensor,
+    Simulation,
+    Surroundings,
+    Thing,
+    Webots,
+    require_node,
+)
+
+PERIOD_MS = 192  # six basic steps of 32 ms
+
+
+class SimulatedRobot(RobotAbc):
+    """A robot whose devices a simulator offers; `trainer.robot` names a subclass.
+
+    Args:
+        webots: the simulator. Each of its starts connects this robot, the newest of its name; if it runs
+            already, `connect` must be called.
+        node_name: the ROS name that the world gives the robot; by default the robot is its own supervisor.
+        definition: the DEF name of the robot in the world; by default that of its class.
+        period_ms: simulated milliseconds in one `advance`; by default that of its class.
+        robots: the ROS names of all robots in the world; they step together. By default robot and supervisor.
+
+    Attributes:
+        definition: see above; "": no pose of it is read.
+        period_ms: see above; a multiple of the world's basicTimeStep.
+        target: the DEF name of the mark that its scene moves to the target; None: the world needs none.
+        node_name: the ROS name of the robot's controller, as it runs; for sensors and motors of your own.
+    """
+
+    definition: str = ""
+    period_ms: int = PERIOD_MS
+    target: ClassVar[str | None] = "TARGET"
+
+    def __init__(
+        self,
+        webots: Webots,
+        node_name: str | None = None,
+        definition: str | None = None,
+        period_ms: int | None = None,
+        robots: Iterable[str] = (),
+    ) -> None:
+        name = webots.name_of(node_name) if node_name else webots.robot_name
+        self.node_name = name
+        self.definition = type(self).definition if definition is None else definition
+        self.period_ms = type(self).period_ms if period_ms is None else period_ms
+        self._observer = webots.observer
+        self._in_use: set[str] = set()  # optional devices
+        others = map(webots.name_of, robots)
+        together = dict.fromkeys((name, webots.robot_name, *others))
+        self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, self.period_ms)
+        if self.definition:
+            self.simulation.track(self.definition)
+        webots.at_start(name, self.connect)
+
+    @property
+    def period_s(self) -> float:
+        """Seconds of simulated time in one `advance`."""
+        return self.simulation.period_ms / 1000.0
+
+    def connect(self) -> None:
+        """Enable the sensors and take hold of the motors; each start of the simulator does it by itself.
+
+        To be called when it runs already as the robot is made, and after its world was loaded anew.
+
+        Raises:
+            WorldMisfit: the world lacks the robot's node, or the robot a device of its class.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        self.close()  # connections to the simulator before this one
+        self._observer.forget_handles()
+        self.simulation.connect()
+
+    def advance(self) -> int:
+        """Simulate one control period; return how many extra ones it took, normally 0.
+
+        Raises:
+            Paused: time stands; nothing was sent.
+            SimulatorDead, SimulatorHung, WrongData: as `Simulation.step`.
+        """
+        return self.simulation.step()
+
+    def close(self) -> None:
+        """Drop all connections."""
+        self.simulation.close()
+
+    def _use(self, *parts: Sensor | Actuator) -> None:
+        """Take optional devices into use.
+
+        Raises:
+            NoSuchSensor: the robot is connected and lacks one of them, or cannot enable it.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        for part in parts:
+            try:
+                if isinstance(part, Sensor):
+                    self.simulation.use(part)
+                else:
+                    self.simulation.use_motor(part)
+            except WorldMisfit as misfit:
+                raise NoSuchSensor(str(misfit)) from misfit
+            self._in_use.add(part.device)
+
+    def _require_use(self, part: Sensor | Actuator, thing: str, call: str) -> None:
+        if part.device not in self._in_use:
+            raise NoSuchSensor(f"{self._title}: its {thing} is not in use; call {call}, then advance()")
+
+    def _no_reading(self) -> NoReading:
+        return NoReading(f"{self._title}: its sensors have sent nothing yet; let a period pass by advance()")
+
+    @property
+    def _title(self) -> str:
+        return self.definition or self.node_name
+
+
+class MobileRobot(SimulatedRobot, Localization):
+    """A simulated robot that drives over a floor."""
+
+    def pose(self) -> Pose:
+        """Return the true pose after the last step."""
+        return Pose(*self.simulation.pose(self.definition))
+
+
+class SimulatedScene(Scene, JointScene):
+    """The scene around a simulated robot. Each start of the simulator looks for the mark.
+
+    Args:
+        webots: the simulator.
+        robot: the robot that is placed.
+        target: the DEF name of the mark on the floor; by default that of the robot's class.
+
+    Attributes:
+        supervisor: changes what else there is in the world, such as fields of nodes.
+        observer: answers what the world is like.
+        resets: since the simulator was last started.
+    """
+
+    def __init__(self, webots: Webots, robot: SimulatedRobot, target: str | None = None) -> None:
+        self.supervisor = webots.supervisor
+        self.observer = webots.observer
+        self._robot = robot
+        self._target = target or robot.target
+        self._surroundings = Surroundings(webots.supervisor.node_name)
+        self._put: dict[str, tuple[float, float, float]] = {}  # since the last begin
+        self.resets = 0
+        webots.at_start(f"scene of {robot.node_name}", self._connect)
+
+    def begin(self, seed: int) -> None:
+        """Reset the simulation: everything is at its first place and at rest.
+
+        Raises:
+            Paused: time stands; nothing was changed.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        self.resets += 1
+        self._put.clear()
+        self._robot.simulation.reset(seed)
+
+    def layout(self) -> Layout:
+        """Return the floor, and what stands on it now; see `webots.surroundings` for what is seen.
+
+        Raises:
+            WorldMisfit: the world has no floor.
+            SimulatorDead, SimulatorHung, WrongData
+        """
+        low, high, obstacles = (0.0, 0.0), (0.0, 0.0), list[Obstacle]()
+        for thing in self._surroundings.read():
+            if thing.name == FLOOR:
+                (x, y, _), half = thing.place, thing.shapes[0].half
+                low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
+            else:
+                obstacles += _obstacles(thing._replace(place=self._put.get(thing.name, thing.place)))
+        return Layout(low=low, high=high, obstacles=tuple(obstacles))
+
+    def place(self, start: Pose, target: Point) -> None:
+        """Put the robot at rest at `start` and the mark at `target` (x, y in meters); fresh readings.
+
+        Raises:
+            MissingCapability: the robot's class has no DEF name.
+            Paused: time stands.
+            SimulatorDead, SimulatorHung
+            WrongData: also when the world lacks the robot's node or the mark's.
+        """
+        name = self._robot.definition
+        if not name:
+            raise MissingCapability(f"{type(self._robot).__name__} has no definition; set its DEF name")
+        self.supervisor.place(name, start.x_m, start.y_m, start.heading_rad)
+        self.mark(target)
+        self.supervisor.stop_inertia(name)
+        self._robot.advance()
+
+    def mark(self, target: Point) -> None:
+        """Put the mark, if there is one, at `target` (x, y in meters) with the next period.
+
+        Raises:
+            SimulatorDead, SimulatorHung
+            WrongData: also when the world lacks the mark's node.
+        """
+        if self._target:
+            self.supervisor.place(self._target, *target)
+
+    def put(self, name: str, place: tuple[float, float, float]) -> None:
+        """Put the node with DEF `name` to x, y, z (meters) with the next period; `begin` undoes it.
+
+        Raises:
+            SimulatorDead, SimulatorHung
+            WrongData: the world lacks the node, or the simulator refuses to move it.
+        """
+        self.supervisor.set_field(name, "translation", place)
+        self._put[name] = place
+
+    def set_joint(self, name: str, position: float) -> None:
+        """Put the joint with DEF `name` to radians or meters, at rest; `begin` undoes it.
+
+        Raises:
+            SimulatorDead, SimulatorHung
+            WrongData: the world lacks the joint, or the simulator refuses to move it.
+        """
+        self.supervisor.set_joint(name, position)
+
+    def _connect(self) -> None:
+        self._surroundings.forget()
+        if self._target:
+            require_node(self.observer, self._target)
+
+
+def _obstacles(thing: Thing) -> list[Obstacle]:
+    """Return the shapes of a thing as obstacles."""
+    c, s = math.cos(thing.heading_rad), math.sin(thing.heading_rad)
+    found = []
+    for shape in thing.shapes:
+        x, y, z = shape.center
+        z_m = thing.place[2] + z
+        found.append(
+            Obstacle(
+                name=thing.name,
+                x_m=thing.place[0] + x * c - y * s,
+                y_m=thing.place[1] + x * s + y * c,
+                bottom_m=z_m - shape.half[2],
+                top_m=z_m + shape.half[2],
+                half_m=shape.half[:2],
+                radius_m=shape.radius_m,
+                heading_rad=thing.heading_rad,
+            )
+        )
+    return found

@@ -1,0 +1,100 @@
+"""The floors of the fakes, and the scene that arranges episodes on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from palaestra_trainer.errors import WrongData
+from palaestra_trainer.robots.base import Scene
+from palaestra_trainer.robots.geometry import Point, Pose
+from palaestra_trainer.robots.layout import Layout, Obstacle
+
+HALF_SIDE_M = 2.0  # of the arena, from the center to the inner faces of the walls
+CYLINDERS = ((0.8, 0.8), (-0.8, 0.8), (-0.8, -0.8), (0.8, -0.8))
+CYLINDER_RADIUS_M = 0.25  # wide enough not to fit between two of the robot's infrared rays
+CYLINDER_HEIGHT_M = 0.4
+STORED_M = -0.7  # height of a cylinder that waits under the floor of the world `seeing`
+
+
+def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLINDER_HEIGHT_M) -> Layout:
+    """Return the arena of the shipped world with cylinders at these places, their centers at `height_m`."""
+    half = 0.5 * CYLINDER_HEIGHT_M
+    return Layout(
+        low=(-HALF_SIDE_M, -HALF_SIDE_M),
+        high=(HALF_SIDE_M, HALF_SIDE_M),
+        obstacles=tuple(
+            Obstacle(
+                name=f"CYLINDER_{number}",
+                x_m=x_m,
+                y_m=y_m,
+                bottom_m=height_m - half,
+                top_m=height_m + half,
+                radius_m=CYLINDER_RADIUS_M,
+            )
+            for number, (x_m, y_m) in enumerate(cylinders)
+        ),
+    )
+
+
+class Placed(Protocol):
+    """A fake robot, as far as its scene knows it."""
+
+    layout: Layout
+    target: Point
+
+    def place(self, pose: Pose, seed: int) -> None:
+        """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
+        ...
+
+
+class FakeScene(Scene):
+    """The scene of a fake robot on a floor.
+
+    Args:
+        robot: the robot.
+        layout: what stands on the floor when an episode begins.
+    """
+
+    def __init__(self, robot: Placed, layout: Layout | None = None) -> None:
+        self._robot = robot
+        self._first = layout or arena()
+        self._seed = 0
+        self._things = {thing.name: thing for thing in self._first.obstacles}
+        robot.layout = self._first
+
+    @property
+    def target(self) -> Point:
+        """Where the mark is: x, y in meters."""
+        return self._robot.target
+
+    def begin(self, seed: int) -> None:
+        """Put everything back to its place."""
+        self._seed = seed
+        self._things = {thing.name: thing for thing in self._first.obstacles}
+        self._robot.layout = self._first
+
+    def layout(self) -> Layout:
+        """Return the floor, and what stands on it now."""
+        return self._robot.layout
+
+    def place(self, start: Pose, target: Point) -> None:
+        """Put the robot at rest at `start`, and the mark at `target`."""
+        self.mark(target)
+        self._robot.place(start, self._seed)
+
+    def mark(self, target: Point) -> None:
+        """Put the mark at `target`."""
+        self._robot.target = target
+
+    def put(self, name: str, place: tuple[float, float, float]) -> None:
+        """Let an obstacle stand at x, y, z (meters) until the next `begin`.
+
+        Raises:
+            WrongData: there is none of that name.
+        """
+        if name not in self._things:
+            raise WrongData("fake", f"the world has no node DEF {name}")
+        self._things[name] = self._things[name].moved(*place)
+        low, high = self._first.low, self._first.high
+        self._robot.layout = Layout(low=low, high=high, obstacles=tuple(self._things.values()))
