@@ -54,6 +54,7 @@ CLASS = "[A-Za-z_][A-Za-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*"
 ALGORITHM = f"^({'|'.join(ALGORITHMS)}|{CLASS})$"
 POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
 CLASS_NAME = f"^{CLASS}$"
+ROBOT_CLASS = "^[A-Za-z_][A-Za-z0-9_.]*(:[A-Za-z_][A-Za-z0-9_]*)?$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
 # The message for a value that does not match: <value> is not <first text>; <second text>
@@ -77,6 +78,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
         "the id of an environment",
         "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",
     ),
+    ROBOT_CLASS: ("the class of a robot", "name one that ships, such as Robotino, or write module:Class"),
 }
 
 # The pods' names, hash included, have to be DNS labels of at most 63 characters.

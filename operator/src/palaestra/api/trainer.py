@@ -11,6 +11,7 @@ from palaestra.api.fields import (
     CLASS_NAME,
     ENVIRONMENT_ID,
     POLICY,
+    ROBOT_CLASS,
     Count,
     FreeObject,
     Image,
@@ -19,7 +20,9 @@ from palaestra.api.fields import (
 )
 from palaestra.api.model import ApiModel, Rule
 
-OWN_TASKS = frozenset({"MoveToTargetEnv-v0", "MoveToTargetGoalEnv-v0", "SeeTarget-v0"})
+OWN_TASKS = frozenset(
+    {"MoveToTargetEnv-v0", "MoveToTargetGoalEnv-v0", "SeeTarget-v0", "Deliver-v0", "Navigate-v0"}
+)
 
 
 class Reward(StrEnum):
@@ -210,6 +213,10 @@ class Trainer(ApiModel):
 
     environment: Task = Task()
     """The task, a gymnasium environment."""
+
+    robot: Annotated[str, Field(min_length=1, max_length=128, pattern=ROBOT_CLASS)] | None = None
+    """Class of the robot in the world: `Robotino`, `TurtleBot3Burger`, `EPuck`, or `module:Class`, a
+    `SimulatedRobot` that the trainer can import; absent: `Robotino`."""
 
     algorithm: Algorithm = Algorithm()
     """The learning algorithm and its hyperparameters."""

@@ -39,6 +39,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "replica": replica.index,
         "seed": spec.seed + replica.index,
         "environment": trainer["environment"],
+        "robot": spec.trainer.robot,
         "algorithm": trainer["algorithm"],
         "device": "cuda" if asks_for_gpu(spec.trainer.resources) else None,
         "steps": spec.trainer.steps,
