@@ -63,7 +63,7 @@ def test_a_term_about_the_end_is_one_for_its_own_outcome_only(term, outcome):
     """No two ends are mixed up, and none is paid twice."""
     paid = {it: term(transition(outcome=it)) for it in SINGLE}
 
-    assert paid == {it: float(it is outcome) for it in Outcome}
+    assert paid == {it: float(it is outcome) for it in SINGLE}
 
 
 def test_every_step_has_the_same_duration():

@@ -1,6 +1,6 @@
 """Robots as an environment sees them: what they sense, how they drive, when time passes."""
 
-from palaestra_trainer.robots.base import RobotAbc, RobotinoAbc, Scene
+from palaestra_trainer.robots.base import RobotAbc, RobotinoAbc, Scene, SceneWrapper
 from palaestra_trainer.robots.capabilities import (
     Bumper,
     Cameras,
@@ -34,6 +34,7 @@ __all__ = [
     "RobotinoAbc",
     "Scanner",
     "Scene",
+    "SceneWrapper",
     "Steering",
     "require",
 ]

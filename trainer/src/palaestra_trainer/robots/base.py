@@ -106,6 +106,37 @@ class Scene(ABC):
         return self
 
 
+class SceneWrapper(Scene):
+    """A scene around another one; override the methods that should do something else.
+
+    Args:
+        scene: the scene inside.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def begin(self, seed: int) -> None:
+        """Begin anew; override it to change the world in every episode."""
+        self.scene.begin(seed)
+
+    def layout(self) -> Layout:
+        """Return the layout of the scene inside."""
+        return self.scene.layout()
+
+    def place(self, start: Pose, target: Point) -> None:
+        """Put the robot and the mark."""
+        self.scene.place(start, target)
+
+    def mark(self, target: Point) -> None:
+        """Put the mark."""
+        self.scene.mark(target)
+
+    def put(self, name: str, place: tuple[float, float, float]) -> None:
+        """Put a node."""
+        self.scene.put(name, place)
+
+
 class JointScene(ABC):
     """What can be arranged in the simulation of a robot with joints."""
 

@@ -92,7 +92,7 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     def scan(self) -> NDArray[np.float32]:
         """Return meters, shape (360,), from behind counter-clockwise; a new array.
 
-        What is nearer than 0.12 m is not seen: its ray measures the greatest distance.
+        A thing nearer than 0.12 m is not seen: its ray measures the greatest distance.
         """
         self._require_use(self._laser, "scanner", "use_scanner()")
         if self._laser.value is None:

@@ -1,7 +1,7 @@
 """A robot in Webots, or in any simulator that speaks its interface, and the scene around it.
 
-A class of `SimulatedRobot` names the devices and DEF names of its robot as class attributes, so a robot with
-other names is a subclass of a few lines, and `trainer.robot` of a job names that class.
+The names of a robot's devices and nodes are attributes of its class. So a robot with other names is a
+subclass of a few lines, and `trainer.robot` of a job names that class.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from palaestra_trainer.webots import (
     Actuator,
     Sensor,
     Simulation,
-    Surroundings,
     Thing,
     Webots,
     require_node,
@@ -159,10 +158,11 @@ class SimulatedScene(Scene, JointScene):
         self.observer = webots.observer
         self._robot = robot
         self._target = target or robot.target
-        self._surroundings = Surroundings(webots.supervisor.node_name)
         self._put: dict[str, tuple[float, float, float]] = {}  # since the last begin
         self.resets = 0
-        webots.at_start(f"scene of {robot.node_name}", self._connect)
+        if self._target:
+            mark = self._target
+            webots.at_start(f"mark {mark}", lambda: require_node(webots.observer, mark))
 
     def begin(self, seed: int) -> None:
         """Reset the simulation: everything is at its first place and at rest.
@@ -183,7 +183,7 @@ class SimulatedScene(Scene, JointScene):
             SimulatorDead, SimulatorHung, WrongData
         """
         low, high, obstacles = (0.0, 0.0), (0.0, 0.0), list[Obstacle]()
-        for thing in self._surroundings.read():
+        for thing in self.observer.things():
             if thing.name == FLOOR:
                 (x, y, _), half = thing.place, thing.shapes[0].half
                 low, high = (x - half[0], y - half[1]), (x + half[0], y + half[1])
@@ -236,11 +236,6 @@ class SimulatedScene(Scene, JointScene):
             WrongData: the world lacks the joint, or the simulator refuses to move it.
         """
         self.supervisor.set_joint(name, position)
-
-    def _connect(self) -> None:
-        self._surroundings.forget()
-        if self._target:
-            require_node(self.observer, self._target)
 
 
 def _obstacles(thing: Thing) -> list[Obstacle]:

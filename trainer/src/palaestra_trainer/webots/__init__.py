@@ -20,7 +20,7 @@ from palaestra_trainer.webots.observer import Mode, Observer
 from palaestra_trainer.webots.requirements import require_node
 from palaestra_trainer.webots.simulation import Actuator, Simulation
 from palaestra_trainer.webots.supervisor import Supervisor
-from palaestra_trainer.webots.surroundings import FLOOR, Surroundings, Thing
+from palaestra_trainer.webots.surroundings import FLOOR, Thing
 
 __all__ = [
     "FLOOR",
@@ -41,7 +41,6 @@ __all__ = [
     "Sensor",
     "Simulation",
     "Supervisor",
-    "Surroundings",
     "Thing",
     "TouchSensor",
     "Webots",

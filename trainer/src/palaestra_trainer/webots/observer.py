@@ -9,6 +9,7 @@ from typing import Any
 from palaestra_trainer.errors import WrongData
 from palaestra_trainer.ros import RosService
 from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.surroundings import Surroundings, Thing
 
 
 class Mode(enum.IntEnum):
@@ -34,6 +35,7 @@ class Observer:
         self._nodes: dict[str, int] = {}
         self._fields: dict[tuple[str, str], int] = {}
         self._types: dict[tuple[str, str], int] = {}
+        self._surroundings = Surroundings(self._services)
 
     def time(self) -> float:
         """Return the simulated time in seconds."""
@@ -95,6 +97,14 @@ class Observer:
         value = self._services.get("supervisor/field/get_vec3f", "field_get_vec3f")(field=field).value
         return (value.x, value.y, value.z)
 
+    def things(self) -> list[Thing]:
+        """Return what stands in the world, where it is now; the floor has the name `FLOOR`.
+
+        Raises:
+            WorldMisfit: the world has no floor.
+        """
+        return self._surroundings.read()
+
     def node(self, name: str) -> int:
         """Return the handle of the node with DEF `name`; it is valid until the world is reloaded.
 
@@ -130,6 +140,7 @@ class Observer:
         self._nodes.clear()
         self._fields.clear()
         self._types.clear()
+        self._surroundings.forget()
 
     def close(self) -> None:
         """Drop handles and connections."""

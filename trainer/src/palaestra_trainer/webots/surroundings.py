@@ -1,9 +1,9 @@
 """The things that stand in a world, as a supervisor reads them from its nodes.
 
 A thing is a Solid at the top of the scene tree whose boundingObject is made of boxes, cylinders, capsules and
-spheres. Its shapes are read once after each start, its place at every `read`, so what was moved is where
-it is. The floor is the Solid with DEF `FLOOR` and a box, or a RectangleArena or Floor of Webots. What is
-inside other nodes, and what a program adds while the simulation runs, is not seen.
+spheres. Its shapes are read once after each start, its place at every `read`, so a thing that was moved is
+where it is now. The floor is the Solid with DEF `FLOOR` and a box, or a RectangleArena or Floor of Webots.
+Solids inside other nodes, and those that a program adds while the simulation runs, are not read.
 """
 
 from __future__ import annotations
@@ -53,18 +53,16 @@ class Surroundings:
     """Reads the things of a world.
 
     Args:
-        node_name: the ROS name of the supervisor.
+        services: those of the supervisor.
     """
 
-    def __init__(self, node_name: str) -> None:
-        self._name = node_name
-        self._services = Services(node_name)
+    def __init__(self, services: Services) -> None:
+        self._services = services
         self._things: list[_Known] | None = None
 
     def forget(self) -> None:
         """Forget the nodes, whose handles become invalid when the world is loaded anew."""
         self._things = None
-        self._services.close()
 
     def read(self) -> list[Thing]:
         """Return all things where they are now; the floor has the name `FLOOR`.
@@ -77,7 +75,7 @@ class Surroundings:
             self._things = list(self._find())
         if not any(known.name == FLOOR for known in self._things):
             raise WorldMisfit(
-                self._name,
+                self._services.node_name,
                 "the world has no floor; give a Solid with a Box as its boundingObject the DEF name FLOOR,"
                 " or use a RectangleArena",
             )

@@ -1,0 +1,195 @@
+"""Robots and scenes in simulators: what the classes name is there, and the layout is that of the world."""
+
+import pytest
+
+from palaestra_sim.world import builtin
+from palaestra_trainer.environments import MoveToTargetEnv
+from palaestra_trainer.errors import NoSuchSensor, WorldMisfit
+from palaestra_trainer.robots import Pose
+from palaestra_trainer.robots.differential import EPuck, TurtleBot3Burger
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
+from palaestra_trainer.testing import check_robot, check_scene
+from palaestra_trainer.testing.fake_burger import COURT
+from palaestra_trainer.testing.fake_scene import arena as fake_floor
+from palaestra_trainer.webots import Webots
+
+START, TARGET = Pose(0.0, 0.0, 1.0), (1.0, 0.0)
+FITTED = b"""
+    Lidar {
+      translation 0.1 0 0.25
+      name "laser"
+      numberOfLayers 1
+      horizontalResolution 44
+      fieldOfView 3.84
+      maxRange 20
+    }
+    SliderJoint {
+      jointParameters JointParameters { axis 0 0 1 }
+      device [ LinearMotor { name "fork" maxPosition 0.15 } PositionSensor { name "fork height" } ]
+      endPoint Solid { name "tines" }
+    }
+    SliderJoint {
+      jointParameters JointParameters { axis 0 1 0 }
+      device [ LinearMotor { name "gripper left" maxPosition 0.03 } ]
+      endPoint Solid { name "left finger" }
+    }
+    SliderJoint {
+      jointParameters JointParameters { axis 0 -1 0 }
+      device [ LinearMotor { name "gripper right" maxPosition 0.03 } ]
+      endPoint Solid { name "right finger" }
+    }
+"""
+
+
+@pytest.fixture
+def running(master, tmp_path):
+    """`running(robot class, world, supervisor)`: a robot and its scene in a started stub."""
+    del master
+    started = []
+
+    def start(kind, source, supervisor, options=()):
+        world = tmp_path / "changed.wbt"
+        world.write_bytes(source)
+        webots = Webots(supervisor, world, options=options, start_deadline_s=20.0)
+        robot = kind(webots)
+        started.append((webots, robot))
+        scene = SimulatedScene(webots, robot)
+        webots.__enter__()
+        return robot, scene
+
+    yield start
+    for webots, robot in started:
+        robot.close()
+        webots.stop()
+        webots.close()
+
+
+@pytest.mark.parametrize("kind", [TurtleBot3Burger, EPuck])
+def test_a_robot_on_two_wheels_passes_the_checks(running, kind):
+    """It drives as it is told, in the curve that its wheels allow."""
+    world = builtin("court")
+    if kind is EPuck:
+        world = world.replace(b"turtlebot/protos/TurtleBot3Burger.proto", b"e-puck/protos/E-puck.proto")
+        world = world.replace(b"robotis", b"gctronic").replace(
+            b"DEF BURGER TurtleBot3Burger", b"DEF EPUCK E-puck"
+        )
+
+    robot, scene = running(kind, world, "burger", ["--leave-out", "LightSensor"] if kind is EPuck else [])
+
+    scene.reset(1, START, TARGET)
+    check_robot(robot)
+    check_scene(robot, scene, START, TARGET)
+
+
+def test_a_robotino_uses_what_its_world_fits_it_with(running):
+    """Laser scanner, forklift and gripper; each costs nothing before."""
+    world = builtin("arena").replace(
+        b"  supervisor TRUE\n  children [", b"  supervisor TRUE\n  children [" + FITTED
+    )
+    robot, scene = running(Robotino, world, "robotino")
+    scene.reset(1, START, TARGET)
+
+    check_robot(robot)
+    robot.lift(0.1)
+    robot.grip(1.0)
+    for _ in range(10):
+        robot.advance()
+
+    assert robot.scan().shape == (44,)
+    assert robot.scan().max() < 4.0
+
+
+@pytest.mark.parametrize("use", ["use_scanner", "use_gripper", "use_forklift"])
+def test_what_a_world_lacks_is_refused_by_name(arena, use):
+    """The robot is connected, so the answer is known."""
+    with pytest.raises(NoSuchSensor, match="the robot has no device"):
+        getattr(arena.robot, use)()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [lambda it: it.scan(), lambda it: it.grip(1.0), lambda it: it.lift(0.1)],
+    ids=["scan", "grip", "lift"],
+)
+def test_what_is_not_in_use_says_how_to_use_it(arena, call):
+    """Before anything is sent."""
+    with pytest.raises(NoSuchSensor, match="is not in use; call use_"):
+        call(arena.robot)
+
+
+def test_a_subclass_names_other_nodes_and_devices(running):
+    """As its world has them."""
+
+    class MyBot(Robotino):
+        definition = "MYBOT"
+        bumper = "front bumper"
+
+    world = (
+        builtin("arena").replace(b"DEF ROBOTINO", b"DEF MYBOT").replace(b'"touch sensor"', b'"front bumper"')
+    )
+
+    robot, scene = running(MyBot, world, "robotino")
+
+    check_scene(robot, scene, START, TARGET)
+
+
+def things(layout):
+    """Return what stands on a floor without its walls, by name."""
+    return {thing.name: thing for thing in layout.obstacles if not thing.name.startswith("WALL")}
+
+
+def test_the_layout_is_that_of_the_world(arena, running):
+    """The fakes have the same floors."""
+    court = running(TurtleBot3Burger, builtin("court"), "burger")[1].layout()
+    floor = arena.scene.layout()
+
+    assert (floor.low, floor.high) == (fake_floor().low, fake_floor().high)
+    assert (court.low, court.high) == (COURT.low, COURT.high)
+    for layout, fake in ((floor, fake_floor()), (court, COURT)):
+        assert set(things(layout)) == set(things(fake))
+        for name, thing in things(fake).items():
+            seen = things(layout)[name]
+            assert (seen.x_m, seen.y_m, seen.heading_rad) == pytest.approx(
+                (thing.x_m, thing.y_m, thing.heading_rad)
+            )
+            assert (*seen.half_m, seen.radius_m, seen.top_m) == pytest.approx(
+                (*thing.half_m, thing.radius_m, thing.top_m)
+            )
+
+
+def test_the_layout_follows_a_thing_that_somebody_moved(arena):
+    """Through the supervisor or by `put`; a new episode puts it back."""
+    arena.scene.supervisor.set_field("CYLINDER_0", "translation", (1.5, 0.0, 0.2))
+    arena.scene.put("CYLINDER_1", (0.0, 1.5, 0.2))
+    arena.robot.advance()
+
+    moved = things(arena.scene.layout())
+    arena.scene.begin(1)
+    back = things(arena.scene.layout())
+
+    assert (moved["CYLINDER_0"].x_m, moved["CYLINDER_1"].y_m) == (1.5, 1.5)
+    assert (back["CYLINDER_0"].x_m, back["CYLINDER_1"].y_m) == (0.8, 0.8)
+
+
+def test_a_start_is_never_drawn_inside_a_thing_that_the_world_has_elsewhere(running):
+    """The file has moved it; no constant knows where."""
+    world = builtin("arena").replace(b"translation 0.8 0.8 0.2", b"translation 0.3 -0.1 0.2")
+    robot, scene = running(Robotino, world, "robotino")
+    env = MoveToTargetEnv(robot, scene)
+    cylinder = things(scene.layout())["CYLINDER_0"]
+
+    for seed in range(20):
+        _, info = env.reset(seed=seed)
+        assert cylinder.gap(info["start"].x_m, info["start"].y_m) >= robot.radius_m
+        assert not robot.bumped()
+
+
+def test_a_world_without_a_floor_is_refused(running):
+    """With the remedy."""
+    _, scene = running(
+        Robotino, builtin("arena").replace(b"DEF FLOOR Solid", b"DEF GROUND Solid"), "robotino"
+    )
+
+    with pytest.raises(WorldMisfit, match="the world has no floor; give a Solid"):
+        scene.layout()
