@@ -17,6 +17,7 @@ from tests.soak.jobs import example
 
 SEEDS = (1, 2, 3, 4, 5)
 SPARSE_SEEDS = (1, 2, 3)
+NAVIGATE_SEEDS = (1, 2, 3)
 EPISODES = 100
 STREAM = "bench"
 MOVEMENTS = example("move-to-target")["spec"]["trainer"]["environment"]["options"]["movements"]
@@ -24,11 +25,14 @@ EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
 def measure():
-    """Return what move-to-target learns with each training seed, and two policies that learn nothing."""
+    """Return what move-to-target and navigate learn, by seed, and two policies that learn nothing."""
     trained = {str(seed): train_and_measure("move-to-target", seed) for seed in SEEDS}
+    navigating = {str(seed): train_and_measure("navigate", seed) for seed in NAVIGATE_SEEDS}
     return {
         "success": trained,
         "seeds_at_95": sum(rate >= 0.95 for rate in trained.values()),
+        "navigate": navigating,
+        "navigate_seeds_at_90": sum(rate >= 0.9 for rate in navigating.values()),
         **measure_baselines(),
     }
 

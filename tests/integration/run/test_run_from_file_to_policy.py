@@ -18,7 +18,6 @@ from tests.local_run import EXAMPLES, LocalRun, left_of
 from tests.soak.jobs import example
 
 EVAL = Path(sys.executable).with_name("palaestra-eval")
-OWN_PROGRAM = {"cartpole-mjcf"}
 FEW = {
     "steps": 600,
     "evaluation": {"everySteps": 300, "episodes": 2},
@@ -94,20 +93,13 @@ def registered(run):
     return {name for name in master.node_names() if "robotino" in name}
 
 
-@pytest.mark.parametrize("name", sorted({path.stem for path in EXAMPLES.glob("*.yaml")} - OWN_PROGRAM))
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.yaml")))
 def test_every_example_runs(run, name):
     """With few steps here; what people copy must work."""
     code, output = run(name, **FEW).start().end()
 
     assert code == 0, output
     assert "success rate" in output
-
-
-def test_an_example_with_a_program_of_its_own_runs(run):
-    """It has no policy of ours, but a result of its own."""
-    code, output = run("cartpole-mjcf", steps=500).start().end()
-
-    assert code == 0, output
 
 
 def test_each_simulator_has_a_legal_name_of_its_own(unplugged):

@@ -46,7 +46,7 @@ def test_the_same_seed_places_the_same_cylinders(master, module):
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)
     scene = SimulatedScene(webots, robot)
-    moving = scattered.ScatteredScene(robot, scene)
+    moving = scattered.ScatteredScene(scene)
     try:
         with webots:
             seen = []

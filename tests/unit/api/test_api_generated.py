@@ -18,6 +18,7 @@ EXAMPLES = [
     "minimal",
     "move-to-target",
     "move-to-target-mujoco",
+    "navigate",
     "reinforce",
     "see-target",
     "sparse-reward",
