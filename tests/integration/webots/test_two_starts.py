@@ -6,7 +6,8 @@ import pytest
 
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.robots import Pose
-from palaestra_trainer.robots.robotino import PERIOD_MS, Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import PERIOD_MS, SimulatedScene
 from palaestra_trainer.ros import RosService, RosSubscriber
 from palaestra_trainer.webots import Mode, Webots
 
@@ -37,7 +38,7 @@ def messages(master):
         try:
             webots.start()
             webots.supervisor.set_mode(Mode.FAST)
-            return listen(RobotinoScene(webots, robot), robot, seed)
+            return listen(SimulatedScene(webots, robot), robot, seed)
         finally:
             robot.close()
             webots.stop()
