@@ -252,8 +252,7 @@ def _drive_after_reset(
     """Return the readings of a short drive that begins with a reset."""
     scene.reset(7, start, target)
     off = moved(start, robot.pose())
-    bumped = isinstance(robot, Bumper) and robot.bumped()
-    _require(max(map(abs, off)) <= RESET_M and not bumped, RESET_PLACES, robot.pose())
+    _require(max(map(abs, off)) <= RESET_M and not _feels_contact(robot), RESET_PLACES, robot.pose())
     readings = [_numbers(robot)]
     robot.steer(0.5 * robot.speed_m_s, 0.5 * robot.turn_rad_s)
     for _ in range(PERIODS):
@@ -261,6 +260,10 @@ def _drive_after_reset(
         readings.append(_numbers(robot))
     robot.steer(0.0, 0.0)
     return readings
+
+
+def _feels_contact(robot: object) -> bool:
+    return isinstance(robot, Bumper) and robot.bumped()
 
 
 def _numbers(robot: Any) -> NDArray[np.float64]:

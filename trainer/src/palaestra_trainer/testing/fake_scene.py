@@ -40,8 +40,15 @@ def arena(cylinders: Iterable[Point] = CYLINDERS, height_m: float = 0.5 * CYLIND
 class Placed(Protocol):
     """A fake robot, as far as its scene knows it."""
 
-    layout: Layout
     target: Point
+
+    @property
+    def layout(self) -> Layout:
+        """The floor, and what stands on it."""
+        ...
+
+    @layout.setter
+    def layout(self, layout: Layout) -> None: ...
 
     def place(self, pose: Pose, seed: int) -> None:
         """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
