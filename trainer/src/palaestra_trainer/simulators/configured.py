@@ -63,8 +63,8 @@ def own_simulator(world: str = "arena", driver: str = "stub") -> Configured:
         SimulatorFault: it does not start.
     """
     require_driver(driver)
-    arena = Arena(world, driver)
-    return Configured(name=arena.webots.robot_name, robot=arena.robot, scene=arena.scene, release=arena.close)
+    own = OwnSimulator(world, driver)
+    return Configured(name=own.webots.robot_name, robot=own.robot, scene=own.scene, release=own.close)
 
 
 def require_driver(driver: str) -> None:

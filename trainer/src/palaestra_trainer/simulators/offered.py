@@ -12,7 +12,8 @@ import gymnasium
 from palaestra_trainer.configuration import Environment as Wanted
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.simulators.member import Environment, Step
 from palaestra_trainer.webots import Webots
 from palaestra_trainer.webots.offers import give_back, offered, take
@@ -30,7 +31,7 @@ class Offered:
     def __init__(self, webots: Webots) -> None:
         self.webots = webots
         self.robot = Robotino(webots)
-        self.scene = RobotinoScene(webots, self.robot)
+        self.scene = SimulatedScene(webots, self.robot)
         if webots.available():
             self.robot.connect()
         take(webots)
