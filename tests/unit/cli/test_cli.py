@@ -318,3 +318,21 @@ def test_help_and_version_say_what_they_are(arguments, capsys):
     assert ended.value.code == 0
     out = capsys.readouterr().out
     assert out.startswith("palaestra 0.") or "75   interrupted after a checkpoint" in out
+
+
+def test_export_is_the_trainers_program_with_its_exit_code(tmp_path, capfd):
+    """The command has no PyTorch of its own; the program's refusal is the command's."""
+    assert main(["export", str(tmp_path / "none"), "--to", "onnx"]) == 2
+
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert "none: does not exist; train first" in err
+
+
+def test_export_without_the_trainer_is_refused(tmp_path, monkeypatch, capsys):
+    """An operator's image has the command and no trainer."""
+    monkeypatch.setattr("palaestra.local.exporting.PROGRAM", "palaestra-none")
+
+    assert main(["export", str(tmp_path), "--to", "onnx"]) == 2
+
+    assert "palaestra-none is not a program on this machine; install it" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`palaestra-train` and `palaestra-eval`."""
+"""`palaestra-train`, `palaestra-eval` and `palaestra-export`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,24 @@ reads:
 writes:
   one JSON object to standard output
 """
+EXPORT = """\
+Write the best policy of a run as one file for other programs.
 
+reads:
+  RUN_DIR/model.zip, RUN_DIR/training.yaml
+writes:
+  the file, once it has acted as the policy on 1,000 observations: discrete actions are equal, continuous
+  ones within 1e-5; its path and its largest difference as one JSON object to standard output
+
+The extra `export` of palaestra-trainer has the libraries. Stable-Baselines3 unpickles model.zip, so export
+only runs that you trust.
+"""
+EXPORT_EXIT_CODES = """\
+exit codes:
+  0   done
+  2   the run directory or the file name is wrong, or a library is missing
+  1   any other error, such as a policy whose file would act differently; nothing is written
+"""
 
 EVAL_EXIT_CODES = """\
 exit codes:
@@ -118,10 +136,32 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
         log.error("ended by Ctrl-C")
         return KEYBOARD_INTERRUPT
     except (TrainerError, OSError) as error:
-        code = _refuse(error)
-        return code if code in {ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET} else UNEXPECTED
+        return _code_of_refusal(error)
     sys.stdout.write(json.dumps(result) + "\n")
     return ExitCode.DONE
+
+
+def export(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-export`; return its exit code."""
+    parser = _parser("palaestra-export", EXPORT, EXPORT_EXIT_CODES)
+    parser.add_argument("run", type=Path, metavar="RUN_DIR", help="run directory with a model.zip")
+    parser.add_argument("--to", choices=("onnx", "safetensors"), required=True, help="format of the file")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="default: RUN_DIR/policy.FORMAT")
+    chosen = parser.parse_args(arguments)
+    configure_logs()
+    from palaestra_trainer import exporting
+
+    try:
+        written = exporting.export(chosen.run, chosen.to, chosen.output)
+    except (TrainerError, OSError) as error:
+        return _code_of_refusal(error)
+    sys.stdout.write(json.dumps(asdict(written), default=str) + "\n")
+    return ExitCode.DONE
+
+
+def _code_of_refusal(error: Exception) -> int:
+    code = _refuse(error)
+    return code if code in {ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET} else UNEXPECTED
 
 
 def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:

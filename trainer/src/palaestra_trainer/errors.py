@@ -9,6 +9,7 @@ TrainerError
 ├── CallbackFailed       a callback of the job raised an error               exit 1
 ├── FaultBudgetSpent     a simulator failed too often; don't retry            exit 80
 ├── Diverged             a loss, weight or reward is not finite; don't retry  exit 81
+├── ExportError          an exported policy would act differently; nothing is written
 ├── NoSuchSensor         this robot does not have it
 │   └── MissingCapability  a ConfigurationError too: the task needs it        exit 2
 ├── NoReading            a sensor was read before its first message arrived
@@ -57,6 +58,10 @@ class FaultBudgetSpent(TrainerError, RuntimeError):
 
 class Diverged(TrainerError, ArithmeticError):
     """A number of the environment, a loss or a weight is NaN or infinite; retrying from here cannot help."""
+
+
+class ExportError(TrainerError, RuntimeError):
+    """An exported policy acts differently from the one it was made from; nothing was written."""
 
 
 class NoSuchSensor(TrainerError, NotImplementedError):

@@ -61,6 +61,15 @@ def keywords(wanted: Environment) -> dict[str, Any]:
     return {name: value for name, value in given.items() if name not in {"robot", "scene"}}
 
 
+def creator_of(name: str) -> Callable[..., Any]:
+    """Return the class or function that creates the environments of a registered name.
+
+    Raises:
+        ConfigurationError: it is not registered, or its entry point does not exist.
+    """
+    return _creator(name, _spec(name))
+
+
 def _checked(wanted: Environment, simulated: Mapping[str, Any]) -> dict[str, Any]:
     spec = _spec(wanted.id)
     signature = inspect.signature(_creator(wanted.id, spec))

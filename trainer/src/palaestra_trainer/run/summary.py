@@ -24,16 +24,16 @@ def summarise(directory: RunDirectory, progress: Progress) -> dict[str, Any]:
     it, and `goodput`, its seconds by cause; `trained_share` is the share of
     these that trained.
     """
-    measured = _measured(directory)
+    best = measured(directory)
     counters = progress.counted()
     return {
         "target": progress.target,
         "steps": progress.step,
         "episodes": counters.episodes,
-        "success_rate": measured.get("success_rate"),
-        "success_interval": measured.get("success_interval"),
-        "mean_return": measured.get("mean_return"),
-        "best_step": measured.get("step"),
+        "success_rate": best.get("success_rate"),
+        "success_interval": best.get("success_interval"),
+        "mean_return": best.get("mean_return"),
+        "best_step": best.get("step"),
         "steps_per_second": round(progress.step / max(counters.seconds, 1e-9), 1),
         "duration_s": round(counters.seconds, 1),
         "faults": counters.broken,
@@ -69,7 +69,7 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
     return content
 
 
-def _measured(directory: RunDirectory) -> dict[str, Any]:
+def measured(directory: RunDirectory) -> dict[str, Any]:
     """Return the most reliable measurement of model.zip; empty: it was never evaluated."""
     best = best_of(directory)
     if best is None:

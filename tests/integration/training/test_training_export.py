@@ -1,0 +1,166 @@
+"""A policy leaves its run as one file, which acts as it did."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+from safetensors import safe_open
+
+from palaestra_trainer import cli, exporting, load_policy
+from palaestra_trainer.errors import ExportError
+from palaestra_trainer.exporting import onnx_file
+from palaestra_trainer.testing import fake_arena, fake_seeing
+
+PPO = {"name": "PPO", "hyperparameters": {"n_steps": 64, "batch_size": 32, "n_epochs": 2}}
+OFF_POLICY = {"learning_starts": 20, "batch_size": 16, "policy_kwargs": {"net_arch": [32]}}
+CONTINUOUS = {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 30, "actions": "continuous"}}
+SEEING = {"id": "SeeTarget-v0", "options": {"max_steps": 20}}
+EXAMPLE = Path(__file__).parents[3] / "examples" / "exported_policy.py"
+CASES = {
+    "PPO": {"algorithm": PPO | {"normalize": {}}},
+    "PPO-continuous": {"algorithm": PPO | {"normalize": {"rewards": False}}, "environment": CONTINUOUS},
+    "A2C": {"algorithm": {"name": "A2C"}},
+    "DQN": {"algorithm": {"name": "DQN", "hyperparameters": OFF_POLICY}},
+    "SAC": {"algorithm": {"name": "SAC", "hyperparameters": OFF_POLICY}, "environment": CONTINUOUS},
+    "REINFORCE": {"algorithm": {"name": "REINFORCE", "hyperparameters": {"episodes_per_update": 1}}},
+    "images": {"algorithm": PPO | {"cnn": "small"}, "environment": SEEING},
+}
+
+
+@pytest.fixture
+def trained(write_job, play, tmp_path):
+    """Return the run directory of a short run; its job is that of the others but for what is given."""
+
+    def run(**changes):
+        wanted = {"steps": 128, "evaluation": {"everySteps": 64, "episodes": 2, "confirmEpisodes": 3}}
+        assert play(write_job(**wanted | changes))[0] == 0
+        return tmp_path / "run"
+
+    return run
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_onnxruntime_acts_as_the_policy_in_the_environment(trained, case):
+    """With the environment's own observations; the export compares a thousand that it draws."""
+    run = trained(**CASES[case])
+
+    written = exporting.export(run, "onnx")
+
+    policy, session = load_policy(run), onnxruntime.InferenceSession(written.path)
+    fake = fake_seeing if case == "images" else fake_arena
+    env = gymnasium.make(policy.environment_id, simulator=fake, **policy.environment_options)
+    observation, _ = env.reset(seed=1)
+    for _ in range(20):
+        (actions,) = session.run(["action"], {"observation": observation[None]})
+        expected, _ = policy.predict(observation)
+        assert np.allclose(actions[0], expected, atol=1e-5)
+        observation, *_ = env.step(actions[0])
+    assert written.observations == 1000
+    assert written.largest_difference <= (1e-5 if "Box" in str(env.action_space) else 0)
+
+
+def test_the_data_sheet_explains_numbers_actions_and_origin(trained):
+    """The file alone says what the policy takes, in which units, and how good it is."""
+    run = trained(**CASES["PPO"])
+
+    written = exporting.export(run, "onnx")
+
+    (prop,) = onnx.load(written.path).metadata_props
+    sheet = json.loads(prop.value)
+    assert prop.key == "palaestra"
+    assert sheet["environment"]["id"] == "MoveToTargetEnv-v0"
+    assert sheet["environment"]["options"] == {"max_steps": 30}
+    assert sheet["observations"]["spaces"]["observation"]["shape"] == [16]
+    assert sheet["observations"]["tables"][0][0]["unit"] == "0.37 m"
+    assert sheet["actions"]["space"] == {
+        "kind": "Discrete",
+        "shape": [],
+        "dtype": "int64",
+        "n": 7,
+        "start": 0,
+    }
+    assert sheet["actions"]["tables"][0][1]["movement"] == "FORWARD"
+    assert sheet["normalized"]
+    assert sheet["steps"] in (64, 128)
+    assert sheet["success_interval"]["episodes"] == 3
+
+
+def test_safetensors_have_the_names_of_the_policy_and_its_normalizer(trained):
+    """So a person can load them into the same network, elsewhere."""
+    run = trained(**CASES["PPO"])
+
+    written = exporting.export(run, "safetensors", run / "of my own.safetensors")
+
+    with safe_open(written.path, "numpy") as file:
+        names, sheet = set(file.keys()), json.loads(file.metadata()["palaestra"])
+        weights = file.get_tensor("policy.action_net.weight")
+    assert {"mean", "variance", "policy.value_net.weight"} <= names
+    assert np.array_equal(weights, load_policy(run).model.policy.action_net.weight.detach().numpy())
+    assert sheet["algorithm"] == "PPO"
+
+
+def test_a_file_that_acts_differently_is_not_written(trained, monkeypatch):
+    """A converter with a bug ends here, not on a robot; the file of before stays."""
+    run = trained(**CASES["A2C"])
+    (run / "policy.onnx").write_bytes(b"before")
+    right = onnx_file.runner
+
+    def wrong(file, acting):
+        return lambda *inputs: tuple((actions + 1) % 7 for actions in right(file, acting)(*inputs))
+
+    monkeypatch.setattr(onnx_file, "runner", wrong)
+
+    with pytest.raises(ExportError, match="acts differently on 1000 of 1000 numbers"):
+        exporting.export(run, "onnx")
+
+    assert (run / "policy.onnx").read_bytes() == b"before"
+    assert [path.name for path in run.iterdir() if "policy" in path.name] == ["policy.onnx"]
+
+
+def test_the_program_prints_where_the_file_is(trained, capsys):
+    """As JSON, for scripts."""
+    run = trained(**CASES["A2C"])
+
+    assert cli.export([str(run), "--to", "safetensors"]) == 0
+
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["path"] == str(run / "policy.safetensors")
+    assert printed["largest_difference"] == 0
+
+
+def test_a_folder_without_a_model_is_refused(tmp_path, capsys):
+    """With the remedy, and the exit code of wrong input."""
+    assert cli.export([str(tmp_path), "--to", "onnx"]) == 2
+
+    assert "model.zip: does not exist; train first" in capsys.readouterr().err
+
+
+def test_the_example_drives_a_simulated_robot_without_pytorch(trained):
+    """With onnxruntime and the robot's facades; the process never imports the library that trained."""
+    written = exporting.export(trained(**CASES["PPO"]), "onnx")
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
+    alone = (
+        f"import runpy, sys; sys.argv = ['', {str(written.path)!r}]; runpy.run_path({str(EXAMPLE)!r}); "
+        "print(sorted({'torch', 'stable_baselines3'} & sys.modules.keys()))"
+    )
+
+    result = subprocess.run(
+        [sys.executable, "-c", alone],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        env=environment,
+    )
+
+    assert result.returncode == 0, result.stderr
+    outcome, rest = result.stdout.splitlines()
+    assert outcome.split()[0] in {"reached", "collided", "time_up"}
+    assert rest == "[]"

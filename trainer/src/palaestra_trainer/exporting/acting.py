@@ -1,0 +1,115 @@
+"""A policy as one PyTorch module, from the environment's observation to an action without chance.
+
+It does everything that `Policy.predict` does around the network: channels of images, normalization, and the
+bounds of actions. A recurrent policy takes its state as inputs and returns the next; zeros begin an episode.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
+from torch import nn
+
+from palaestra_trainer.run.policies import Policy
+
+OBSERVATION = "observation"
+STATE = ("hidden", "cell")  # of a recurrent policy; shape (layers, observations, units)
+
+
+class Acting(nn.Module):
+    """The deterministic policy, with its normalizer.
+
+    Args:
+        loaded: the policy; it is left in evaluation mode on the CPU.
+
+    Attributes:
+        spaces: the space of each input, as the environment returns it.
+        action_space: the space of an action.
+        state_shape: layers and units of the state; None: the policy has no state.
+    """
+
+    mean: torch.Tensor
+    variance: torch.Tensor
+
+    def __init__(self, loaded: Policy) -> None:
+        super().__init__()
+        policy: Any = loaded.model.policy
+        policy.set_training_mode(False)
+        self.policy = policy
+        self.action_space: spaces.Space[Any] = loaded.model.action_space
+        self._seen = parts_of(loaded.model.observation_space)
+        self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
+        lstm = getattr(policy, "lstm_actor", None)
+        self.state_shape = None if lstm is None else (int(lstm.num_layers), int(lstm.hidden_size))
+        self._limits: tuple[float, float] | None = None
+        if loaded.scale is not None:
+            mean, variance, clip, self._epsilon = loaded.scale
+            self.register_buffer("mean", torch.from_numpy(np.asarray(mean, np.float64)))
+            self.register_buffer("variance", torch.from_numpy(np.asarray(variance, np.float64)))
+            self._limits = (-clip, clip)
+
+    @property
+    def inputs(self) -> list[str]:
+        """The names of the inputs in their order."""
+        return [*self.spaces, *(STATE if self.state_shape else ())]
+
+    @property
+    def outputs(self) -> list[str]:
+        """The names of the outputs in their order."""
+        return ["action", *(f"next_{name}" for name in STATE if self.state_shape)]
+
+    def begin(self, observations: int) -> tuple[torch.Tensor, ...]:
+        """Return the state at the start of an episode for a batch; empty if the policy has none."""
+        if self.state_shape is None:
+            return ()
+        layers, units = self.state_shape
+        return tuple(torch.zeros(layers, observations, units) for _ in STATE)
+
+    def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Return the actions for a batch, and the next state of a recurrent policy."""
+        parts = dict(zip(self.spaces, inputs, strict=False))
+        seen = {name: self._prepared(name, part) for name, part in parts.items()}
+        observation = seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
+        if self.state_shape is None:
+            return (self._bounded(self.policy._predict(observation, deterministic=True)),)
+        hidden, cell = inputs[len(self.spaces) :]
+        running = torch.zeros_like(hidden[0, :, 0])  # no episode begins: its state would be zeros
+        action, state = self.policy._predict(observation, (hidden, cell), running, deterministic=True)
+        return (self._bounded(action), *state)
+
+    def _prepared(self, name: str, part: torch.Tensor) -> torch.Tensor:
+        if self.spaces[name].shape != self._seen[name].shape:
+            part = part.permute(0, 3, 1, 2)
+        if self._limits is None:
+            return part
+        # In the precision in which `Policy.predict` normalizes.
+        scaled = (part.double() - self.mean) / torch.sqrt(self.variance + self._epsilon)
+        return torch.clamp(scaled, *self._limits).float()
+
+    def _bounded(self, action: torch.Tensor) -> torch.Tensor:
+        """Return actions as the environment takes them."""
+        space = self.action_space
+        if not isinstance(space, spaces.Box):
+            return action
+        low, high = torch.from_numpy(space.low), torch.from_numpy(space.high)
+        action = action.reshape(-1, *space.shape)
+        if self.policy.squash_output:
+            return low + 0.5 * (action + 1.0) * (high - low)
+        return torch.minimum(torch.maximum(action, low), high)
+
+
+def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:
+    """Return the space of each key of a Dict, in its order; any other space is one part."""
+    return dict(space.spaces) if isinstance(space, spaces.Dict) else {OBSERVATION: space}
+
+
+def as_returned(space: spaces.Space[Any]) -> spaces.Space[Any]:
+    """Return the space of images with channels last, as environments return them; any other unchanged."""
+    if not (isinstance(space, spaces.Box) and is_image_space(space) and is_image_space_channels_first(space)):
+        return space
+    low, high = (np.moveaxis(bound, 0, -1) for bound in (space.low, space.high))
+    return spaces.Box(low, high, dtype=np.uint8)

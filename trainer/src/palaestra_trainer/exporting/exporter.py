@@ -1,0 +1,78 @@
+"""Export the best policy of a run: read, convert, compare, write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol
+
+from palaestra_trainer.configuration import load
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.exporting.acting import Acting
+from palaestra_trainer.exporting.comparing import OBSERVATIONS, Run, compare
+from palaestra_trainer.exporting.data_sheet import data_sheet
+from palaestra_trainer.run.policies import load_policy
+from palaestra_trainer.run_directory import RunDirectory, replace_file
+
+FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_file"}
+
+
+class Format(Protocol):
+    """A module of this package that knows one format."""
+
+    def content(self, acting: Acting, sheet: str) -> bytes:
+        """Return the bytes of a file."""
+        ...
+
+    def runner(self, file: bytes, acting: Acting) -> Run:
+        """Return a function that acts as the file says."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Exported:
+    """A file that was written.
+
+    Attributes:
+        path: the file.
+        observations: on which it was compared with the policy.
+        largest_difference: of an action's number there.
+    """
+
+    path: Path
+    observations: int
+    largest_difference: float
+
+
+def export(run: Path, to: str, file: Path | None = None) -> Exported:
+    """Write the best policy of a run directory in the format `to`; by default to `policy.<to>` in it.
+
+    Raises:
+        ConfigurationError: there is no model, or a library of the extra `export` is missing.
+        ExportError: the file would act differently; nothing was written.
+        OSError: it could not be written.
+    """
+    known = _format(to)
+    directory = RunDirectory(run)
+    loaded = load_policy(run)
+    acting = Acting(loaded)
+    sheet = data_sheet(acting, load(directory.configuration), directory)
+    content = known.content(acting, json.dumps(sheet))
+    difference = compare(known.runner(content, acting), acting, loaded)
+    path = file or run / f"policy.{to}"
+    replace_file(path, lambda name: name.write_bytes(content))
+    return Exported(path=path, observations=OBSERVATIONS, largest_difference=difference)
+
+
+def _format(name: str) -> Format:
+    try:
+        known: Any = import_module(f"{__package__}.{FORMATS[name]}")
+    except ImportError as error:
+        raise ConfigurationError(
+            f"--to {name}: cannot be written ({error}); install palaestra-trainer[export]"
+        ) from error
+    module: Format = known
+    return module

@@ -1,0 +1,39 @@
+"""A policy's tensors as a safetensors file, for a network that a person builds.
+
+The names are those of Stable-Baselines3's policy below `policy.`. The statistics of a normalizer are `mean`
+and `variance`; the data sheet says where it clips.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+
+import numpy as np
+import safetensors.torch
+import torch
+
+from palaestra_trainer.exporting.acting import Acting
+from palaestra_trainer.exporting.comparing import Arrays, Run
+from palaestra_trainer.exporting.data_sheet import KEY
+
+
+def content(acting: Acting, sheet: str) -> bytes:
+    """Return the file with the data sheet in its metadata."""
+    # Some policies have one network under two names, and the format refuses shared memory.
+    tensors = {name: tensor.detach().clone().contiguous() for name, tensor in acting.state_dict().items()}
+    return safetensors.torch.save(tensors, {KEY: sheet})
+
+
+def runner(file: bytes, acting: Acting) -> Run:
+    """Return a function that runs a copy of the policy, all of whose tensors are the file's."""
+    copy = deepcopy(acting)
+    with torch.no_grad():
+        for tensor in copy.state_dict().values():
+            tensor.zero_()
+    copy.load_state_dict(safetensors.torch.load(file), strict=True)
+
+    def run(*inputs: np.ndarray) -> Arrays:
+        with torch.no_grad():
+            return tuple(output.numpy() for output in copy(*map(torch.from_numpy, inputs)))
+
+    return run
