@@ -146,6 +146,12 @@ WRONG = [
         {"ephemeral": True, "existingClaim": "c"},
         "ephemeral.*cannot be combined with existing",
     ),
+    (
+        "spec.trainer",
+        {"initialPolicy": {"claim": "c", "path": "/a/model.zip"}},
+        "initialPolicy.path.*must be relative with a claim and absolute without one",
+    ),
+    ("spec.trainer", {"initialPolicy": {"claim": "c", "path": "../a.zip"}}, "initialPolicy.path"),
     ("spec.storage", {"resumeFrom": "uid"}, "resumeFrom.*needs existingClaim; name the claim"),
     (
         "spec.storage",

@@ -191,6 +191,17 @@ BROKEN = {
         {"storage.resumeFrom": "5a0c"},
         "spec.storage.resumeFrom: needs existingClaim; name the claim that contains the run",
     ),
+    "a path on a claim from its root": (
+        {"trainer.initialPolicy": {"claim": "runs", "path": "/a/model.zip"}},
+        "spec.trainer.initialPolicy.path: must be relative with a claim and absolute without one; change it",
+    ),
+    "a policy for a run that is resumed": (
+        {
+            "trainer.initialPolicy": {"path": "/a/model.zip"},
+            "storage": {"existingClaim": "runs", "resumeFrom": "5a0c"},
+        },
+        "spec.trainer.initialPolicy: cannot be combined with storage.resumeFrom; remove one of them",
+    ),
     "a label that is ours": (
         {"scheduling.podLabels": {"palaestra.dev/job": "other"}},
         (
@@ -296,6 +307,8 @@ KEPT = {
     },
     "kept nowhere": {"storage.ephemeral": True},
     "another job's run": {"storage": {"existingClaim": "runs", "resumeFrom": "5a0c"}},
+    "a policy of a claim": {"trainer.initialPolicy": {"claim": "runs", "path": "5a0c/0/model.zip"}},
+    "a policy in the image": {"trainer.initialPolicy": {"path": "/opt/my policy.zip"}},
     "a class of one's own": {"scheduling.priorityClassName": "urgent"},
     "a label under a domain": {"scheduling.podLabels": {"example.com/team": "robots"}},
     "a note, and word to an autoscaler": {

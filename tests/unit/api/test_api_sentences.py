@@ -97,6 +97,9 @@ SENTENCES = [
     ({"storage": {"existingClaim": "runs", "resumeFrom": "../other"}},
      ('spec.storage.resumeFrom: "../other" is not the name of a folder; '
      "use letters, digits, '-', '_' and '.', no '/'")),
+    ({"trainer.initialPolicy": {"claim": "a", "path": "../b/model.zip"}},
+     ('spec.trainer.initialPolicy.path: "../b/model.zip" is not the path of a model.zip; give an absolute '
+     "path, or with a claim a path on it, without hidden folders and `..`")),
     ({"trainer.image": "my image"},
      'spec.trainer.image: "my image" is not an image; write it as registry/name:tag'),
     ({"managedBy": "me"},

@@ -10,6 +10,7 @@ from palaestra.decide import Create, accept, wants_whole
 from palaestra.observe import Lacking, Objects, observe, references
 from tests.e2e.escalations import METADATA
 
+INITIAL = {"initialPolicy": {"claim": "runs", "path": "a/model.zip"}}
 OPEN = {"palaestra.dev/for-jobs": "true"}
 GROUPS = [{"name": "collect", "role": "Collect"}, {"name": "evaluate", "role": "Evaluate"}]
 WORLD = [{**GROUPS[0], "world": {"configMap": {"name": "worlds", "key": "hall.wbt"}}}, GROUPS[1]]
@@ -89,6 +90,14 @@ def held(scene):
             id="a claim of somebody else",
         ),
         pytest.param(
+            {"trainer": {"initialPolicy": {"claim": "policies", "path": "a/model.zip"}}},
+            {("PersistentVolumeClaim", "policies"): {"metadata": {"labels": {}}}},
+            "ClaimNotForJobs",
+            "spec.trainer.initialPolicy.claim: PersistentVolumeClaim policies is not for jobs; "
+            'label it palaestra.dev/for-jobs: "true"',
+            id="a policy of somebody else",
+        ),
+        pytest.param(
             {"scheduling": {"queueName": "robots"}},
             {},
             "NoKueue",
@@ -123,6 +132,7 @@ def test_a_job_is_held_with_a_reason_and_creates_nothing(make_scene, spec, there
         ({"simulators": WORLD}, "ConfigMap", "worlds"),
         ({"trainer": SECRET}, "Secret", "keys"),
         ({"storage": {"existingClaim": "runs"}}, "PersistentVolumeClaim", "runs"),
+        ({"trainer": INITIAL}, "PersistentVolumeClaim", "runs"),
     ],
 )
 def test_what_is_made_as_the_message_of_the_missing_one_says_is_not_refused_next(
@@ -321,3 +331,12 @@ def test_a_job_that_has_failed_is_not_read_again(make_scene):
     scene.settle()
 
     assert not wants_whole(*observed(scene), Lacking.FIELDS)
+
+
+def test_a_claim_that_only_the_initial_policy_names_counts_as_there(make_scene):
+    """The operator does not create it, so a Job that mounts it lacks nothing."""
+    scene = make_scene(trainer=INITIAL)
+    scene.there[("PersistentVolumeClaim", "runs")] = {"metadata": {"name": "runs", "labels": OPEN}}
+    scene.settle()
+
+    assert scene.settle().actions == ()

@@ -1,5 +1,7 @@
 """Problems of a machine or a job are found before anything is started."""
 
+import zipfile
+
 import pytest
 
 from palaestra.api import validate
@@ -139,3 +141,23 @@ def test_all_problems_are_reported_at_once(request_for, monkeypatch):
         preflight.check(request_for(trainer={"command": ["no-such-program"]}))
 
     assert len(str(refused.value).splitlines()) == 2
+
+
+def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path):
+    """Found before a simulator starts, as a world would be."""
+
+    def problems(path):
+        return list(preflight.initial_policy_is_there(request_for(trainer={"initialPolicy": {"path": path}})))
+
+    (tmp_path / "text.zip").write_text("no zip")
+    with zipfile.ZipFile(tmp_path / "model.zip", "w") as archive:
+        archive.writestr("policy.pth", b"")
+    field = "spec.trainer.initialPolicy.path: "
+
+    assert problems(f"{tmp_path}/none.zip") == [
+        f"{field}{tmp_path}/none.zip: No such file or directory; name a model.zip"
+    ]
+    assert problems(f"{tmp_path}/text.zip") == [
+        f"{field}{tmp_path}/text.zip: is not a model of Stable-Baselines3; name a model.zip"
+    ]
+    assert problems(f"{tmp_path}/model.zip") == []

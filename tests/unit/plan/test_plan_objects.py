@@ -139,6 +139,58 @@ def test_going_on_from_another_jobs_run_is_refused_without_a_cluster(make_job):
         plan(job, layout)
 
 
+INITIAL = {"initialPolicy": {"claim": "policies", "path": "5a0c/0/model.zip"}}
+
+
+def trainer_of(planned):
+    """Return what a trainer reads, and what is mounted for it."""
+    replica = planned.replicas[0]
+    training = yaml.safe_load(replica.config_map["data"]["training.yaml"])
+    (container,) = pod(planned)["containers"]
+    return training, container["volumeMounts"]
+
+
+def test_the_claim_of_an_initial_policy_is_mounted_for_the_trainer_alone_to_read(in_cluster):
+    """It is of another job, which may be running."""
+    planned = in_cluster(trainer=INITIAL)
+
+    training, mounts = trainer_of(planned)
+
+    volume = {"name": "initial-policy", "persistentVolumeClaim": {"claimName": "policies"}}
+    mount = {"name": "initial-policy", "mountPath": "/initial-policy", "readOnly": True}
+    mounted = [each["volumeMounts"] for each in pod(planned)["initContainers"]]
+    assert training["initialPolicy"] == "/initial-policy/5a0c/0/model.zip"
+    assert volume in pod(planned)["volumes"]
+    assert mount in mounts
+    assert not any(mount in others for others in mounted)
+
+
+def test_an_initial_policy_on_the_run_s_own_claim_needs_no_second_volume(in_cluster):
+    """Some drivers never mount a claim that a pod has twice."""
+    planned = in_cluster(trainer=INITIAL, storage={"existingClaim": "policies"})
+
+    training, mounts = trainer_of(planned)
+
+    assert training["initialPolicy"] == "/var/lib/palaestra/5a0c/0/model.zip"
+    assert "initial-policy" not in [each["name"] for each in (*mounts, *pod(planned)["volumes"])]
+
+
+def test_an_initial_policy_in_the_image_needs_no_volume(in_cluster):
+    """The path is the trainer's."""
+    training, mounts = trainer_of(in_cluster(trainer={"initialPolicy": {"path": "/opt/model.zip"}}))
+
+    assert training["initialPolicy"] == "/opt/model.zip"
+    assert "initial-policy" not in [each["name"] for each in mounts]
+
+
+def test_an_initial_policy_on_a_claim_is_refused_without_a_cluster(make_job):
+    """A run that began from random weights instead would be found out late."""
+    layout = LocalLayout(images=LAYOUT.images, job_directory="/runs/job")
+
+    with pytest.raises(PlanError, match=r"^spec\.trainer\.initialPolicy\.claim: names a claim .*; remove it"):
+        plan(make_job(trainer=INITIAL), layout)
+
+
 def test_the_pod_is_restricted(in_cluster):
     """As Pod Security's *restricted* asks, sidecars included."""
     spec = pod(in_cluster())

@@ -62,6 +62,14 @@ def test_what_is_normalized_is_read_as_it_was_written(make_job, written, read):
     assert read_back(job).algorithm.normalize == read
 
 
+def test_an_initial_policy_is_read_as_it_was_written_and_absent_unless_set(make_job):
+    """Trainers of older releases log an unknown field."""
+    initial = {"initialPolicy": {"claim": "policies", "path": "a/model.zip"}}
+
+    assert read_back(make_job(trainer=initial)).initial_policy == "/initial-policy/a/model.zip"
+    assert read_back(make_job()).initial_policy is None
+
+
 @pytest.mark.parametrize("cnn", ["small", None])
 def test_the_network_for_images_is_read_as_it_was_written(make_job, cnn):
     """A field that a job leaves out is absent, for trainers of older releases."""

@@ -210,6 +210,7 @@ class Configuration(_Section):
         steps: valid environment steps of the whole run, all simulators together.
         resume_from: the run directory of another job; a run without a checkpoint of its own resumes from
             the newest checkpoint there.
+        initial_policy: a model.zip whose policy a new run begins with; None: random weights.
         stall_deadline_seconds: the run fails after this long without an environment step.
         robot: class of the robot, `module:Class` or a name of `robots.choosing`; None: `DEFAULT_ROBOT`. None
             is left out of the file, since an older trainer ignores the field.
@@ -230,6 +231,7 @@ class Configuration(_Section):
     evaluation: Evaluation = Field(default_factory=Evaluation)
     checkpoint: Checkpoint = Field(default_factory=Checkpoint)
     resume_from: Annotated[str, Field(min_length=1)] | None = None
+    initial_policy: Annotated[str, Field(min_length=1)] | None = None
     stall_deadline_seconds: Annotated[float, Field(gt=0)] = 600
     command: tuple[str, ...] | None = None
     status_address: Annotated[str, Field(pattern=r"^[^:\s]+:\d{1,5}$")] = "127.0.0.1:9090"

@@ -55,6 +55,7 @@ ALGORITHM = f"^({'|'.join(ALGORITHMS)}|{CLASS})$"
 POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
 CLASS_NAME = f"^{CLASS}$"
 ROBOT_CLASS = "^[A-Za-z_][A-Za-z0-9_.]*(:[A-Za-z_][A-Za-z0-9_]*)?$"
+POLICY_FILE = "^(/.+|[A-Za-z0-9_][-A-Za-z0-9._]*(/[A-Za-z0-9_][-A-Za-z0-9._]*)*)[.]zip$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
 # The message for a value that does not match: <value> is not <first text>; <second text>
@@ -74,6 +75,10 @@ PATTERNS: dict[str, tuple[str, str]] = {
     ALGORITHM: ("an algorithm", f"use {', '.join(ALGORITHMS)} or module:Class"),
     POLICY: ("a policy", "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class"),
     CLASS_NAME: ("the name of a class", "write it as module:Class"),
+    POLICY_FILE: (
+        "the path of a model.zip",
+        "give an absolute path, or with a claim a path on it, without hidden folders and `..`",
+    ),
     ENVIRONMENT_ID: (
         "the id of an environment",
         "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",

@@ -204,6 +204,12 @@ class Spec(ApiModel):
             message="no group has role Evaluate; add one, or set everySteps: 0",
         ),
         Rule(
+            field="trainer.initialPolicy",
+            holds=lambda spec: spec.trainer.initial_policy is None or spec.storage.resume_from is None,
+            cel="!has(self.trainer.initialPolicy) || !has(self.storage.resumeFrom)",
+            message="cannot be combined with storage.resumeFrom; remove one of them",
+        ),
+        Rule(
             field="suspend",
             holds=lambda spec: not (spec.suspend and spec.scheduling.queue_name is not None),
             cel="!(self.suspend && has(self.scheduling.queueName))",

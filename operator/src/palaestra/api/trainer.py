@@ -11,11 +11,13 @@ from palaestra.api.fields import (
     CLASS_NAME,
     ENVIRONMENT_ID,
     POLICY,
+    POLICY_FILE,
     ROBOT_CLASS,
     Count,
     FreeObject,
     Image,
     Listed,
+    ObjectName,
     Words,
 )
 from palaestra.api.model import ApiModel, Rule
@@ -139,6 +141,27 @@ class Algorithm(ApiModel):
     """Callbacks that are called at every step and rollout of the built-in loop, in this order."""
 
 
+class InitialPolicy(ApiModel):
+    """The policy with which a new run begins, instead of random weights."""
+
+    claim: ObjectName | None = None
+    """Claim in the job's namespace with the label `palaestra.dev/for-jobs: "true"`, mounted read-only;
+    absent: the file is in the trainer's image, or with `palaestra run` on this machine."""
+
+    path: Annotated[str, Field(min_length=1, max_length=1024, pattern=POLICY_FILE)]
+    """Path of a `model.zip`, on the claim or absolute; on a claim it may be `<job UID>/<replica>/model.zip`.
+    Only its tensors are read, so the policy's networks must be the same."""
+
+    rules = (
+        Rule(
+            field="path",
+            holds=lambda initial: (initial.claim is None) == initial.path.startswith("/"),
+            cel="has(self.claim) != self.path.startsWith('/')",
+            message="must be relative with a claim and absolute without one; change it",
+        ),
+    )
+
+
 class Evaluation(ApiModel):
     """Evaluation of the policy during training."""
 
@@ -229,6 +252,10 @@ class Trainer(ApiModel):
 
     checkpoint: Checkpoint = Checkpoint()
     """How often a checkpoint is saved, and how many are kept."""
+
+    initial_policy: InitialPolicy | None = None
+    """Policy with which a new run begins. A run that has a checkpoint resumes from that instead. Absent: the
+    weights are random."""
 
     command: Words = ()
     """Program and arguments that replace the built-in training loop; empty: the built-in loop."""

@@ -204,7 +204,8 @@ def complete(job: TrainingJob, observed: Observed) -> bool:
 
 def _lacking(job: TrainingJob, observed: Observed) -> Mapping[int, frozenset[str]]:
     """Return the unfinished replicas that lack an object, each with the volumes that its Job mounts."""
-    there = {name for _, name in observed.present} | {job.spec.storage.existing_claim}
+    named = {source.name for source in references(job) if source.kind is SourceKind.CLAIM}
+    there = {name for _, name in observed.present} | named
     return {
         replica.index: replica.job.volumes if replica.job is not None else frozenset()
         for replica in unfinished(job, observed)

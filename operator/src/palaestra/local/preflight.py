@@ -4,6 +4,7 @@ import importlib.util
 import os
 import shutil
 import sys
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from palaestra_sim import world
 from palaestra_sim.errors import WorldError
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
+POLICY = "policy.pth"  # in a zip of Stable-Baselines3
 INSTALLATION = "this installation"
 ROS = "install python3-rospy and python3-rosmaster (`make setup` does)"
 
@@ -77,6 +79,23 @@ def worlds_are_right(request: Request) -> Iterator[str]:
             yield from (f"{field}: {problem}" for problem in _problems(Path(group.world.file)))
 
 
+def initial_policy_is_there(request: Request) -> Iterator[str]:
+    """The file of the initial policy is a zip with a policy's tensors; the trainer compares their shapes."""
+    initial = request.job.spec.trainer.initial_policy
+    if initial is None:
+        return
+    try:
+        with zipfile.ZipFile(initial.path) as archive:
+            archive.getinfo(POLICY)
+    except OSError as error:
+        yield f"spec.trainer.initialPolicy.path: {initial.path}: {error.strerror}; name a model.zip"
+    except (zipfile.BadZipFile, KeyError):
+        yield (
+            f"spec.trainer.initialPolicy.path: {initial.path}: is not a model of Stable-Baselines3; "
+            "name a model.zip"
+        )
+
+
 def space_is_left(request: Request) -> Iterator[str]:
     """The disk has space for the run."""
     folder = next(parent for parent in (request.runs, *request.runs.parents) if parent.exists())
@@ -94,6 +113,7 @@ CHECKS: tuple[Check, ...] = (
     nothing_is_put_off,
     programs_exist,
     worlds_are_right,
+    initial_policy_is_there,
     space_is_left,
 )
 

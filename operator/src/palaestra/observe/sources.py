@@ -44,3 +44,6 @@ def _of_variables(env: tuple[Variable, ...], owner: str) -> Iterator[Source]:
 def _claims(job: TrainingJob) -> Iterator[Source]:
     if (name := job.spec.storage.existing_claim) is not None:
         yield Source(kind=SourceKind.CLAIM, name=name, field="spec.storage.existingClaim")
+    if (initial := job.spec.trainer.initial_policy) is not None and initial.claim is not None:
+        field = "spec.trainer.initialPolicy.claim"
+        yield Source(kind=SourceKind.CLAIM, name=initial.claim, field=field)

@@ -1,9 +1,15 @@
-"""Where the run of a replica is kept: a claim of its own, one that was there before, or the pod."""
+"""Where the run of a replica is kept: a claim of its own, one that was there before, or the pod.
+
+And the claim with the policy that the run begins with, if the job names one.
+"""
 
 from typing import Any
 
 from palaestra.api.storage import Retain
-from palaestra.plan.replica import Replica
+from palaestra.errors import PlanError
+from palaestra.plan.replica import TRAINER, Replica
+
+INITIAL = "initial-policy"
 
 
 def claim(replica: Replica) -> dict[str, Any] | None:
@@ -36,6 +42,37 @@ def run_volume(replica: Replica) -> dict[str, Any]:
         return {"name": "run", "emptyDir": {"sizeLimit": storage.size}}
     name = storage.existing_claim or _name(replica)
     return {"name": "run", "persistentVolumeClaim": {"claimName": name}}
+
+
+def initial_volume(replica: Replica) -> dict[str, Any] | None:
+    """Return the volume with the initial policy; None: there is none, or it is the run's own volume.
+
+    A pod must not have one claim as two volumes: some drivers then never mount it.
+    """
+    initial = replica.job.spec.trainer.initial_policy
+    if initial is None or initial.claim in {None, replica.job.spec.storage.existing_claim}:
+        return None
+    return {"name": INITIAL, "persistentVolumeClaim": {"claimName": initial.claim}}
+
+
+def initial_path(replica: Replica) -> str | None:
+    """Return the path of the initial policy for the trainer; None: there is none.
+
+    Raises:
+        PlanError: it is on a claim, and there are no claims here.
+    """
+    initial = replica.job.spec.trainer.initial_policy
+    if initial is None:
+        return None
+    if initial.claim is None:
+        return initial.path
+    places = replica.places(TRAINER)
+    if places.initial is None:
+        raise PlanError(
+            "spec.trainer.initialPolicy.claim: names a claim of a cluster, and this machine has none; "
+            "remove it, and give the absolute path of a file of this machine"
+        )
+    return f"{places.volume if initial_volume(replica) is None else places.initial}/{initial.path}"
 
 
 def _name(replica: Replica) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 from palaestra.api import Driver
 from palaestra.api.container import Resources, Variable
 from palaestra.plan import resources as planned
+from palaestra.plan.claim import INITIAL, initial_volume
 from palaestra.plan.layout import Places
 from palaestra.plan.replica import ROS_MASTER, TRAINER, PlannedSimulator, Replica
 from palaestra.plan.text import literal
@@ -145,7 +146,7 @@ def _common(
         "env": [{"name": name, **value} for name, value in env.items()],
         "resources": quantities,
         "securityContext": SECURITY,
-        "volumeMounts": _mounts(container, places),
+        "volumeMounts": _mounts(replica, container, places),
     }
 
 
@@ -168,13 +169,15 @@ def _environment(replica: Replica, container: str, threads: int) -> dict[str, di
     return {**{name: {"value": value} for name, value in variables.items()}, "PALAESTRA_POD_UID": uid}
 
 
-def _mounts(container: str, places: Places) -> list[dict[str, Any]]:
+def _mounts(replica: Replica, container: str, places: Places) -> list[dict[str, Any]]:
     mounts: list[dict[str, Any]] = [
         {"name": "config", "mountPath": places.config, "readOnly": True},
         {"name": f"scratch-{container}", "mountPath": places.scratch},
     ]
     if container == TRAINER:
         mounts.append({"name": "run", "mountPath": places.volume})
+        if initial_volume(replica) is not None:
+            mounts.append({"name": INITIAL, "mountPath": places.initial, "readOnly": True})
     elif container != ROS_MASTER and places.shared_memory is not None:
         mounts.append({"name": shared_memory(container), "mountPath": places.shared_memory})
     return mounts

@@ -51,7 +51,8 @@ class Places:
 
     `volume` is where the claim is mounted and `run` the run directory on it. `home` is given where
     the image's own cannot be written, `shared_memory` where the default is too small for a simulator,
-    and `sidecar` where `palaestra-sidecar` has to be copied into a user's image.
+    `sidecar` where `palaestra-sidecar` has to be copied into a user's image, and `initial` where a claim
+    with an initial policy is mounted.
     """
 
     config: str
@@ -62,6 +63,7 @@ class Places:
     home: str | None = None
     shared_memory: str | None = None
     sidecar: str | None = None
+    initial: str | None = None
 
 
 class Layout(Protocol):
@@ -138,6 +140,7 @@ class ClusterLayout:
             home="/tmp",
             shared_memory="/dev/shm",
             sidecar="/palaestra",
+            initial="/initial-policy",
         )
 
     def another_run(self, uid: str, replica: int) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from palaestra.plan.claim import run_volume
+from palaestra.plan.claim import INITIAL, initial_volume, run_volume
 from palaestra.plan.config_map import config_volume
 from palaestra.plan.containers import install_sidecar, ros_master, shared_memory, sidecar, trainer
 from palaestra.plan.replica import Replica
@@ -32,6 +32,7 @@ def pod_template(
         *(sidecar(replica, simulator, worlds) for simulator in replica.simulators),
     ]
     main = trainer(replica)
+    initial = initial_volume(replica)
     return {
         "metadata": _metadata(replica),
         "spec": {
@@ -46,6 +47,7 @@ def pod_template(
             "volumes": [
                 config_volume(config_map),
                 run_volume(replica),
+                *([initial] if initial else []),
                 *_empty_volumes([*init, main], _sizes(replica)),
             ],
         },
@@ -84,7 +86,10 @@ def _sizes(replica: Replica) -> dict[str, str]:
 def _empty_volumes(containers: list[dict[str, Any]], memory: Mapping[str, str]) -> list[dict[str, Any]]:
     """Return an empty volume for every mount that has no other: each container has its own."""
     mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
-    return [{"name": name, "emptyDir": _empty(name, memory)} for name in sorted(mounted - {"config", "run"})]
+    return [
+        {"name": name, "emptyDir": _empty(name, memory)}
+        for name in sorted(mounted - {"config", "run", INITIAL})
+    ]
 
 
 def _empty(name: str, memory: Mapping[str, str]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from palaestra.api.simulators import Driver, Recycle, SimulatorGroup
+from palaestra.plan.claim import initial_path
 from palaestra.plan.replica import PlannedSimulator, Replica
 from palaestra.plan.resources import asks_for_gpu, in_bytes
 from palaestra.plan.text import as_yaml
@@ -46,6 +47,7 @@ def _training(replica: Replica, files: Mapping[str, bytes]) -> dict[str, Any]:
         "evaluation": trainer["evaluation"],
         "checkpoint": trainer["checkpoint"],
         "resumeFrom": another,
+        "initialPolicy": initial_path(replica),
         "stallDeadlineSeconds": spec.stall_deadline_seconds,
         "command": list(spec.trainer.command) or None,
         "statusAddress": status_address(replica),

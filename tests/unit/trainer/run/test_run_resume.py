@@ -218,3 +218,36 @@ def test_the_time_of_an_attempt_that_was_killed_is_kept(play, job, directory):
     assert 0 < saved.step < 70
     seconds = [sum(each.counters["goodput"].values()) for each in (saved, ended)]
     assert 0.0 < seconds[0] < seconds[1]
+
+
+def test_a_new_run_begins_with_the_policy_of_another_and_resumes_from_its_own(
+    play, job, directory, tmp_path, capsys
+):
+    """Its steps are counted from 0; an interrupted one has learned since."""
+    play(job())
+    tuned = RunDirectory(tmp_path / "tuned")
+    tuning = job(initial_policy=str(directory.model))
+
+    first, _ = play(tuning, on_step=signal_after(60), into=tuned)
+    began = "".join(capsys.readouterr())
+    second, _ = play(tuning, into=tuned)
+    resumed = "".join(capsys.readouterr())
+
+    assert (first, second) == (75, 0)
+    assert "begins from a policy" in began
+    assert "begins from a policy" not in resumed
+    reasons = [line["reason"] for line in read_lines(tuned.attempts)]
+    assert reasons[0] == "new run"
+    assert reasons[1].startswith("resumed at step ")
+
+
+def test_an_initial_policy_that_does_not_fit_starts_nothing(play, job, directory, tmp_path, last_word):
+    """The message names the file and a tensor; the exit code says that a retry cannot help."""
+    play(job("PPO"))
+    tuned = RunDirectory(tmp_path / "tuned")
+
+    code, members = play(job("DQN", initial_policy=str(directory.model)), into=tuned)
+
+    assert code == 2
+    assert f"initialPolicy: {directory.model}: the tensor q_net." in last_word().reason
+    assert all("start" not in member.log for member in members.values())

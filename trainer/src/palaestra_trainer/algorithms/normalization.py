@@ -148,6 +148,16 @@ class ValidNormalize(VecNormalize):
             raise ValueError("it clips elsewhere")
         self.scales = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in there}
 
+    def take_over(self, content: Mapping[str, Any]) -> None:
+        """Take over some statistics of `to_json`; where to clip stays as this run wants it.
+
+        Raises:
+            KeyError, TypeError, ValueError: the content is no such result, or of another shape.
+        """
+        running = self._running()
+        found = {name: Moments.from_json(content[name], np.shape(running[name].mean)) for name in content}
+        self.scales = {**self.scales, **found}
+
     def _running(self) -> dict[str, RunningMeanStd]:
         """Return the statistics by name: rewards, and observations or each key of them."""
         observations = self._seen() if self.norm_obs else {}

@@ -7,6 +7,7 @@ unpickles nothing: the model is rebuilt from the configuration, tensors are read
 rest is JSON and plain arrays. How a resumed run comes to be the same: docs/decisions/0008-exact-resume.md.
 """
 
+from palaestra_trainer.checkpoint.initial import begin_from
 from palaestra_trainer.checkpoint.manifest import Checkpoint, Manifest, describe, refuse_another_run
 from palaestra_trainer.checkpoint.state import State
 from palaestra_trainer.checkpoint.store import Saver, newest, restore, tidy
@@ -18,6 +19,7 @@ __all__ = [
     "Saver",
     "State",
     "Tensors",
+    "begin_from",
     "describe",
     "load_tensors",
     "newest",

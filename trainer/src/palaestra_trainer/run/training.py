@@ -192,7 +192,7 @@ class Attempt:
         fleet = Fleet(configuration, members, progress)
         progress.figures.meters = fleet.meters()
         stack.callback(fleet.stop)
-        learning = self._make_model(fleet, interruption, stack)
+        learning = self._make_model(fleet, interruption, stack, found)
         fleet.start(interruption.check, stepped=found is not None)
         for line in progress.left_out():
             log.warning("simulators leave out nodes of their world", what=line)
@@ -207,7 +207,9 @@ class Attempt:
         )
         return run, learning, found
 
-    def _make_model(self, fleet: Fleet, interruption: Interruption, stack: ExitStack) -> Learning:
+    def _make_model(
+        self, fleet: Fleet, interruption: Interruption, stack: ExitStack, found: Checkpoint | None
+    ) -> Learning:
         """Return a new model with its environment; no simulator has to be up."""
         use_threads(self._around.environment)
         wanted = self._configuration
@@ -216,7 +218,10 @@ class Attempt:
         stack.callback(env.close)
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
         refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))
-        return Learning(env, algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device))
+        model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
+        if found is None and wanted.initial_policy is not None:
+            checkpoint.begin_from(Path(wanted.initial_policy), model)
+        return Learning(env, model)
 
     def _take_over(self, found: Checkpoint | None) -> None:
         """Set the progress to that of the previous attempts."""

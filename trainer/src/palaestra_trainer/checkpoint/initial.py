@@ -1,0 +1,104 @@
+"""Begin a run with the policy of another: its tensors, and what its normalizer knows.
+
+The file is the zip of any model of Stable-Baselines3. Nothing in it is unpickled, so it need not be trusted.
+Optimizers begin anew, and so does everything that a run counts.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import pickle
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import structlog
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from palaestra_trainer.algorithms.normalization import normalizer_of
+from palaestra_trainer.checkpoint.tensors import NORMALIZE
+from palaestra_trainer.errors import ConfigurationError
+
+log = structlog.get_logger(__name__)
+
+POLICY = "policy.pth"
+_SHOWN = 3  # mismatches in a message
+
+
+def begin_from(path: Path, model: BaseAlgorithm) -> None:
+    """Let a new model have the policy in a zip, and its statistics where both normalize.
+
+    Raises:
+        ConfigurationError: the file cannot be read, or a tensor or statistic does not fit this model.
+    """
+    tensors, known = _read(path, model.device)
+    own = model.policy.state_dict()
+    if mistakes := list(_mistakes(tensors, own)):
+        more = f", and {len(mistakes) - _SHOWN} more" if len(mistakes) > _SHOWN else ""
+        facts = "; ".join(mistakes[:_SHOWN]) + more
+        raise _refused(path, f"{facts}; use the algorithm, policy and spaces that it was trained with")
+    model.policy.load_state_dict(tensors)
+    taken = _take_statistics(path, model, known)
+    log.info("begins from a policy", file=str(path), tensors=len(own), statistics=taken)
+
+
+def _read(path: Path, device: torch.device) -> tuple[Any, dict[str, Any]]:
+    """Return the tensors and the statistics in a zip."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            content = io.BytesIO(archive.read(POLICY))
+            known = json.loads(archive.read(NORMALIZE)) if NORMALIZE in archive.namelist() else {}
+        return torch.load(content, map_location=device, weights_only=True), known
+    except pickle.UnpicklingError as error:  # its text recommends to unpickle
+        raise _refused(
+            path, f"{POLICY} holds more than tensors, which is never unpickled; name a model.zip"
+        ) from error
+    except (OSError, KeyError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile) as error:
+        fact = f"cannot be read as a model of Stable-Baselines3 ({error}); name a model.zip"
+        raise _refused(path, fact) from error
+
+
+def _mistakes(tensors: Any, own: Mapping[str, torch.Tensor]) -> Iterator[str]:
+    if not isinstance(tensors, Mapping):
+        yield f"{POLICY} holds no tensors by name"
+        return
+    for name, tensor in own.items():
+        there = tensors.get(name)
+        if not isinstance(there, torch.Tensor):
+            yield f"the tensor {name}, {_shape(tensor)} in this run, is missing"
+        elif there.shape != tensor.shape:
+            yield f"the tensor {name} is {_shape(there)}, and {_shape(tensor)} in this run"
+    for name in tensors.keys() - own.keys():
+        yield f"the tensor {name} is unknown in this run"
+
+
+def _take_statistics(path: Path, model: BaseAlgorithm, known: Mapping[str, Any]) -> list[str]:
+    normalizer = normalizer_of(model)
+    own = {} if normalizer is None else normalizer.scales
+    if own.keys() - {"rewards"} != known.keys() - {"rewards", "epsilon"}:
+        log.warning(
+            "the initial policy and this run normalize different observations, so it sees others than it "
+            "learned from; set algorithm.normalize as it was",
+            file=str(path),
+        )
+    if normalizer is None:
+        return []
+    shared = sorted(own.keys() & known.keys())
+    try:
+        normalizer.take_over({name: known[name] for name in shared})
+    except (KeyError, TypeError, ValueError) as error:
+        raise _refused(
+            path, f"{NORMALIZE} does not fit this run ({error}); use the environment it was trained with"
+        ) from error
+    return shared
+
+
+def _shape(tensor: torch.Tensor) -> str:
+    return str(tuple(tensor.shape))
+
+
+def _refused(path: Path, fact: str) -> ConfigurationError:
+    return ConfigurationError(f"initialPolicy: {path}: {fact}")
