@@ -51,8 +51,8 @@ class Places:
 
     `volume` is where the claim is mounted and `run` the run directory on it. `home` is given where
     the image's own cannot be written, `shared_memory` where the default is too small for a simulator,
-    `sidecar` where `palaestra-sidecar` has to be copied into a user's image, and `initial` where a claim
-    with an initial policy is mounted.
+    and `sidecar` where `palaestra-sidecar` has to be copied into a user's image. A claim with an initial
+    policy is mounted at `initial`.
     """
 
     config: str
