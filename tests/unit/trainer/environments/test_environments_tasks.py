@@ -93,6 +93,15 @@ def test_both_may_be_chosen_even_if_they_are_near():
     assert task.target == (0.1, 0.0)
 
 
+def test_the_options_that_every_reset_of_a_run_gets_change_nothing():
+    """They are for environments with a curriculum."""
+    of_a_run = {"training_progress": 0.5, "episode": 7}
+
+    tasks = [chosen_task(np.random.default_rng(0), chosen) for chosen in ({}, of_a_run)]
+
+    assert tasks[0] == tasks[1]
+
+
 @pytest.mark.parametrize(
     ("chosen", "message"),
     [

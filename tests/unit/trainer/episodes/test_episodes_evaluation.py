@@ -48,6 +48,15 @@ def test_every_seed_is_an_episode(make_member):
     assert member.env.seeds == [10, 21, 32]
 
 
+def test_an_evaluation_measures_the_whole_task_at_any_time(make_member):
+    """A success rate of an early stage of a curriculum would stop the training."""
+    member = make_member()
+
+    evaluate(Walker(), member, [10, 20])
+
+    assert member.env.options == {"training_progress": 1.0, "episode": 1}
+
+
 def test_a_faulted_episode_is_played_again_with_its_seed(make_member):
     """All policies are measured on the same episodes, whatever broke."""
     member, losses = make_member(steps=[5]), Losses()

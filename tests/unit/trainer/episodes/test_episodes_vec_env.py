@@ -107,6 +107,35 @@ def test_each_episode_has_the_seed_of_its_number(make_env, make_member):
     assert [info["seed"] for info in env.reset_infos] == [members[i].env.seeds[-1] for i in (0, 1)]
 
 
+def test_each_episode_begins_with_its_number_and_the_progress_of_that_moment(make_env, make_member):
+    """For a curriculum; an episode under way keeps what it began with."""
+    member = make_member()
+    env = make_env(member)
+
+    env.reset()
+    env.set_training_progress(0.25)
+    begun = env.snapshot()[0].training_progress
+    walk(env, 3)  # the next episode begins
+
+    assert begun == 0.0
+    assert member.env.options == {"training_progress": 0.25, "episode": 1}
+    assert env.snapshot()[0].training_progress == 0.25
+
+
+def test_a_replayed_episode_begins_with_the_progress_that_it_had(make_env, make_member):
+    """Or it would be another episode; the next one begins with that of now."""
+    member = make_member()
+    env = make_env(member)
+    env.set_training_progress(0.5)
+
+    env.resume([EpisodeState(7, np.array([RIGHT]), 0.25)])
+    replayed = member.env.options
+    walk(env, 2)
+
+    assert replayed == {"training_progress": 0.25, "episode": 7}
+    assert member.env.options == {"training_progress": 0.5, "episode": 8}
+
+
 def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member):
     """Nobody did anything wrong: no reward, no punishment, no learning from it."""
     env = make_env(make_member(steps=[2]))
@@ -516,7 +545,7 @@ def test_the_rest_of_the_interface_reaches_the_environments(make_env, make_membe
     env.reset()
     env.set_attr("color", "red", indices=1)
 
-    assert env.get_attr("options") == [{"easy": True}] * 2
+    assert env.get_attr("options") == [{"training_progress": 0.0, "episode": 0, "easy": True}] * 2
     assert env.get_attr("color", indices=[1]) == ["red"]
     assert env.env_method("has_wrapper_attr", "seeds", indices=0) == [True]
     assert env.env_is_wrapped(Wrapper) == [True, False]

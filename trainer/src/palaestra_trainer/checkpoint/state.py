@@ -147,6 +147,7 @@ class State:
             "successes": self.successes,
             "positions": self.positions,
             "members": [member.episode for member in self.members],
+            "training_progress": [member.training_progress for member in self.members],
             "rollout": self.rollout,
         }
         text = json.dumps(content, default=_plain)
@@ -163,6 +164,8 @@ class State:
         with np.load(folder / ARRAYS, allow_pickle=False) as file:
             arrays = dict(file)
         positions = content["positions"]
+        members = content["members"]
+        progress = content.get("training_progress", [0.0] * len(members))  # added after a5276f3
         return cls(
             numbers=content["numbers"],
             generators=Generators.from_json(content["generators"]),
@@ -172,8 +175,8 @@ class State:
             successes=content["successes"],
             positions=positions and Positions.from_json(positions),
             members=[
-                EpisodeState(episode, arrays.get(f"actions-{index}"))
-                for index, episode in enumerate(content["members"])
+                EpisodeState(episode, arrays.get(f"actions-{index}"), progress[index])
+                for index, episode in enumerate(members)
             ],
             rollout=content["rollout"],
             noise={name: torch.from_numpy(arrays[name]) for name in _NOISE if name in arrays},

@@ -19,6 +19,7 @@ from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import Layout
 
 CLEARANCE_M = 0.10  # between the robot's outline and any obstacle, at the start and on the target
+OF_THE_RUN = ("training_progress", "episode")  # options of every reset of a run, which change nothing here
 APART_M = 1.0  # least distance from start to target
 MOST_DRAWS = 10_000  # a layout in which so many points are not free has no room
 
@@ -102,7 +103,7 @@ class Places:
             ConfigurationError: an unknown name, a wrong number of values, a target inside an obstacle, a
                 start at which the robot would touch one, or no free place.
         """
-        if unknown := sorted(set(chosen) - {"start", "target"}):
+        if unknown := sorted(set(chosen) - {"start", "target", *OF_THE_RUN}):
             raise ConfigurationError(f"reset option {unknown[0]!r} is not known; use start or target")
         start, target = chosen.get("start"), chosen.get("target")
         if start is not None:

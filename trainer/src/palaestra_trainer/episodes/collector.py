@@ -18,6 +18,7 @@ from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
+from palaestra_trainer.episodes.position import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.errors import Diverged, SimulatorFault
 from palaestra_trainer.simulators.keeper import Keeper
@@ -50,6 +51,7 @@ class Collector:
         run_seed: the replica's seed.
         index: the member's position among the collecting ones.
         episode: number of the next episode.
+        training_progress: share of training, 0 to 1, that the next episode begins with.
         reset_info: what the environment reported at the last reset; not `valid` if no episode began.
     """
 
@@ -58,6 +60,7 @@ class Collector:
         self.run_seed = run_seed
         self.index = index
         self.episode = 0
+        self.training_progress = self._began_at = 0.0
         self.reset_info: dict[str, Any] = {}
         self._check = check
         self._started = time.monotonic()
@@ -77,7 +80,7 @@ class Collector:
         """How far the member is now."""
         if self._actions is None:
             return EpisodeState(self.episode, None)
-        return EpisodeState(self.episode - 1, self._actions.taken())
+        return EpisodeState(self.episode - 1, self._actions.taken(), self._began_at)
 
     def next_seed(self) -> int:
         """Return the seed that the next episode will have."""
@@ -108,8 +111,10 @@ class Collector:
         Raises:
             FaultBudgetSpent: the member's restart budget is used up.
         """
-        self.episode = state.episode
+        self.episode, now = state.episode, self.training_progress
+        self.training_progress = now if state.actions is None else state.training_progress
         self.begin()
+        self.training_progress = now
         for action in () if state.actions is None or self._actions is None else state.actions:
             self._check()
             try:
@@ -147,9 +152,13 @@ class Collector:
 
     def _reset(self, options: dict[str, Any] | None) -> None:
         seed = self.next_seed()
+        position = reset_options(self.training_progress, self.episode)
+        self._began_at = self.training_progress
         self.episode += 1
         try:
-            self._observation, self.reset_info = self.keeper.reset(seed, options, self._check)
+            self._observation, self.reset_info = self.keeper.reset(
+                seed, position | (options or {}), self._check
+            )
         except Diverged as error:
             raise Diverged(f"episode {self.episode - 1}, reset: {error}") from error
         self._started = time.monotonic()

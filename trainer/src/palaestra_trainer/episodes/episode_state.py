@@ -16,10 +16,12 @@ class EpisodeState:
         episode: number of the current episode, or of the next one to begin.
         actions: actions taken in it so far, shape (steps, *action), read-only; None: no episode has
             begun.
+        training_progress: the share of training, 0 to 1, that was complete when the episode began.
     """
 
     episode: int
     actions: np.ndarray | None
+    training_progress: float = 0.0
 
 
 class ActionLog:

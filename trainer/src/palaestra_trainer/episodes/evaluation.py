@@ -20,6 +20,7 @@ import numpy as np
 
 from palaestra_protocol.pod.status import SuccessInterval
 from palaestra_trainer.episodes.intervals import wilson
+from palaestra_trainer.episodes.position import EVALUATING, reset_options
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member
@@ -218,7 +219,7 @@ class _Games:
             place, seed = self._waiting.popleft()
         rewards: list[float] = []
         try:
-            episode = _play(self._policy, keeper, seed, check, rewards)
+            episode = _play(self._policy, keeper, (place, seed), check, rewards)
         except SimulatorFault as fault:
             keeper.begin_mending(fault, len(rewards))
             with self._changed:
@@ -251,9 +252,15 @@ def _play_at_once(games: _Games, keepers: Sequence[Keeper], check: Check) -> Non
             over.set()
 
 
-def _play(policy: Policy, keeper: Keeper, seed: int, check: Check, rewards: list[float]) -> Episode:
-    """Play an episode to its end; if an error cuts it, `rewards` holds the reward of each step until then."""
-    observation, _ = keeper.reset(seed, check=check)
+def _play(
+    policy: Policy, keeper: Keeper, game: tuple[int, int], check: Check, rewards: list[float]
+) -> Episode:
+    """Play an episode, number and seed, to its end.
+
+    If an error cuts it, `rewards` holds the reward of each step until then.
+    """
+    number, seed = game
+    observation, _ = keeper.reset(seed, reset_options(EVALUATING, number), check)
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
     over = False

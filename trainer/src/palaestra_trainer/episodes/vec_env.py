@@ -80,6 +80,11 @@ class SimulatorsVecEnv(MembersVecEnv):
         self._keep_reset_infos()
         return self._stack(observations)
 
+    def set_training_progress(self, training_progress: float) -> None:
+        """Set the share of training, 0 to 1, with which the next episodes begin."""
+        for collector in self._collectors:
+            collector.training_progress = training_progress
+
     def snapshot(self) -> list[EpisodeState]:
         """Return the position of each member in its episodes; cheap, and not changed by later steps."""
         return [collector.state for collector in self._collectors]

@@ -167,6 +167,7 @@ class Conductor(BaseCallback):
         self._before_update = None
         self._step = self.model.num_timesteps
         progress = self._run.progress
+        self._env.set_training_progress(min(1.0, self._step / self._run.configuration.steps))
         self._boundary = State.of(
             self.model,
             self._env.snapshot(),

@@ -274,6 +274,7 @@ class Attempt:
     def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: Checkpoint) -> Resumed:
         """Bring model and simulators back to the state of the checkpoint."""
         saved = checkpoint.restore(found, model)
+        env.set_training_progress(min(1.0, found.manifest.step / self._configuration.steps))
         with self._progress.spending(Cause.RECOVERING):
             state = rejoin(env, saved)
         state.put_back(model)
