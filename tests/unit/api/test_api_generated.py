@@ -15,6 +15,7 @@ from palaestra_sim.world import builtin
 EXAMPLES = [
     "cartpole-mjcf",
     "chaos",
+    "curriculum",
     "minimal",
     "move-to-target",
     "move-to-target-mujoco",

@@ -1,0 +1,121 @@
+"""A curriculum with domain randomization: MoveToTargetEnv in a world that gets harder while the robot learns.
+
+    PYTHONPATH=examples palaestra run manifests/examples/curriculum.yaml
+
+`level` grows from 0 to 1 in the first half of training. With it grow the number of cylinders on the floor and
+their distance from their places, the noise of the distance sensors, the slip of the wheels, and how often a
+command takes effect one period late. Evaluations are always at level 1. All that is drawn follows from the
+episode's seed, so an interrupted run resumes as if it had not been interrupted.
+"""
+
+import math
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from palaestra_trainer.environments.arena import CLEARANCE_M, CYLINDER_CENTER_M, CYLINDER_RADIUS_M, CYLINDERS
+from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
+from palaestra_trainer.environments.options import Options, parse
+from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, Pose, RobotinoAbc
+
+HARDEST_AT = 0.5  # share of training
+MOVED_M, NOISE_M, SLIP, LATE = 0.3, 0.01, 0.2, 0.3  # at level 1: at most, deviation, at most, probability
+UNDER_THE_FLOOR_M = -1.0
+APART_M = CYLINDER_RADIUS_M + RADIUS_M + CLEARANCE_M  # of a cylinder from start and target
+
+Point = tuple[float, float]
+
+
+class DisturbedRobot(RobotinoAbc):
+    """A robot with noise, slip and late commands; `begin` says how much."""
+
+    def __init__(self, robot: RobotinoAbc) -> None:
+        self.robot = robot
+        self.begin(np.random.default_rng(0), 0.0)
+
+    def begin(self, random: np.random.Generator, level: float) -> None:
+        """Draw what stays for an episode; `random` draws the rest during it."""
+        self.random, self.level = random, level
+        self.grip = 1.0 - level * random.uniform(0.0, SLIP)
+        self.command, self.noise = (0.0, 0.0, 0.0), 0.0
+
+    @property
+    def period_s(self) -> float:
+        """Seconds of a period."""
+        return self.robot.period_s
+
+    def distances(self) -> np.ndarray:
+        """Return the distances of the robot with this period's noise."""
+        return np.clip(self.robot.distances() + self.noise, *SENSOR_RANGE_M, dtype=np.float32)
+
+    def bumped(self) -> bool:
+        """Return what the bumper says."""
+        return self.robot.bumped()
+
+    def pose(self) -> Pose:
+        """Return the true pose."""
+        return self.robot.pose()
+
+    def drive(self, vx: float, vy: float, omega: float) -> None:
+        """Drive slower by the slip; a late command takes effect in the next period."""
+        before, self.command = self.command, (self.grip * vx, self.grip * vy, self.grip * omega)
+        late = self.random.random() < LATE * self.level
+        self.robot.drive(*(before if late else self.command))
+
+    def advance(self) -> int:
+        """Let a period pass, and draw the noise of its readings."""
+        extra = self.robot.advance()
+        self.noise = self.random.normal(0.0, NOISE_M * self.level, len(self.robot.distances()))
+        return extra
+
+
+class HarderScene:
+    """A scene that puts as many cylinders on the floor as its level says, and disturbs the robot."""
+
+    def __init__(self, robot: DisturbedRobot, scene: Any) -> None:
+        self.robot, self.scene, self.level = robot, scene, 1.0
+
+    def reset(self, seed: int, start: Pose, target: Point) -> None:
+        """Begin anew; everything follows from the seed and the level."""
+        self.scene.reset(seed, start, target)  # puts everything back to its place in the world file
+        random = np.random.default_rng(seed)
+        for number, place in enumerate(CYLINDERS):
+            stands = number < round(self.level * len(CYLINDERS))
+            x, y = beside(place, random, self.level * MOVED_M, [(start.x_m, start.y_m), target])
+            height = CYLINDER_CENTER_M if stands else UNDER_THE_FLOOR_M
+            self.scene.supervisor.set_field(f"CYLINDER_{number}", "translation", (x, y, height))
+        self.robot.begin(random, self.level)
+        self.robot.advance()  # the writes take effect, and the sensors see them
+
+
+class CurriculumEnv(MoveToTargetEnv):
+    """MoveToTargetEnv at a level that follows from the progress of training."""
+
+    def __init__(self, robot: DisturbedRobot, scene: HarderScene, options: Options) -> None:
+        super().__init__(robot, scene, options)
+        self.harder = scene
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
+        """Begin an episode; without a run, at level 1."""
+        progress = (options or {}).get("training_progress", 1.0)
+        self.harder.level = min(1.0, progress / HARDEST_AT)
+        return super().reset(seed=seed, options=options)
+
+
+def beside(place: Point, random: np.random.Generator, most_m: float, free: list[Point]) -> Point:
+    """Return x, y near `place`, far enough from the points that must stay free."""
+    while True:
+        x, y = np.array(place) + random.uniform(-most_m, most_m, 2)
+        found = float(x), float(y)
+        if all(math.dist(found, point) >= min(APART_M, math.dist(place, point)) for point in free):
+            return found
+
+
+def make(robot: RobotinoAbc, scene: Any, **options: Any) -> CurriculumEnv:
+    """Return the environment of one simulator."""
+    disturbed = DisturbedRobot(robot)
+    return CurriculumEnv(disturbed, HarderScene(disturbed, scene), parse(options))
+
+
+gymnasium.register(id="Curriculum-v0", entry_point=make)
