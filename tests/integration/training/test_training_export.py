@@ -87,7 +87,7 @@ def test_the_data_sheet_explains_numbers_actions_and_origin(trained):
         "start": 0,
     }
     assert sheet["actions"]["tables"][0][1]["movement"] == "FORWARD"
-    assert sheet["normalized"]
+    assert sheet["normalized"] == {"observation": {"clip": 10.0, "epsilon": 1e-8}}
     assert sheet["steps"] in (64, 128)
     assert sheet["success_interval"]["episodes"] == 3
 
@@ -101,7 +101,7 @@ def test_safetensors_have_the_names_of_the_policy_and_its_normalizer(trained):
     with safe_open(written.path, "numpy") as file:
         names, sheet = set(file.keys()), json.loads(file.metadata()["palaestra"])
         weights = file.get_tensor("policy.action_net.weight")
-    assert {"mean", "variance", "policy.value_net.weight"} <= names
+    assert {"normalizers.0.mean", "normalizers.0.variance", "policy.value_net.weight"} <= names
     assert np.array_equal(weights, load_policy(run).model.policy.action_net.weight.detach().numpy())
     assert sheet["algorithm"] == "PPO"
 

@@ -20,6 +20,31 @@ OBSERVATION = "observation"
 STATE = ("hidden", "cell")  # of a recurrent policy; shape (layers, observations, units)
 
 
+class Normalizer(nn.Module):
+    """What `Policy.predict` does to a part of an observation, in its precision.
+
+    Args:
+        mean: of each number.
+        variance: of each number.
+        clip: largest absolute value of a result.
+        epsilon: added to the variance.
+    """
+
+    mean: torch.Tensor
+    variance: torch.Tensor
+
+    def __init__(self, mean: np.ndarray, variance: np.ndarray, clip: float, epsilon: float) -> None:
+        super().__init__()
+        self.clip, self.epsilon = clip, epsilon
+        self.register_buffer("mean", torch.from_numpy(np.asarray(mean, np.float64)))
+        self.register_buffer("variance", torch.from_numpy(np.asarray(variance, np.float64)))
+
+    def forward(self, part: torch.Tensor) -> torch.Tensor:
+        """Return a normalized batch."""
+        scaled = (part.double() - self.mean) / torch.sqrt(self.variance + self.epsilon)
+        return torch.clamp(scaled, -self.clip, self.clip).float()
+
+
 class Acting(nn.Module):
     """The deterministic policy, with its normalizer.
 
@@ -30,10 +55,8 @@ class Acting(nn.Module):
         spaces: the space of each input, as the environment returns it.
         action_space: the space of an action.
         state_shape: layers and units of the state; None: the policy has no state.
+        normalizers: one for each input, in their order; that of an input that is not normalized does nothing.
     """
-
-    mean: torch.Tensor
-    variance: torch.Tensor
 
     def __init__(self, loaded: Policy) -> None:
         super().__init__()
@@ -45,12 +68,10 @@ class Acting(nn.Module):
         self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
         lstm = getattr(policy, "lstm_actor", None)
         self.state_shape = None if lstm is None else (int(lstm.num_layers), int(lstm.hidden_size))
-        self._limits: tuple[float, float] | None = None
-        if loaded.scale is not None:
-            mean, variance, clip, self._epsilon = loaded.scale
-            self.register_buffer("mean", torch.from_numpy(np.asarray(mean, np.float64)))
-            self.register_buffer("variance", torch.from_numpy(np.asarray(variance, np.float64)))
-            self._limits = (-clip, clip)
+        scales = {} if loaded.scale is None else {OBSERVATION: loaded.scale}
+        self.normalizers = nn.ModuleList(
+            Normalizer(*scales[name]) if name in scales else nn.Identity() for name in self.spaces
+        )
 
     @property
     def inputs(self) -> list[str]:
@@ -71,8 +92,8 @@ class Acting(nn.Module):
 
     def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Return the actions for a batch, and the next state of a recurrent policy."""
-        parts = dict(zip(self.spaces, inputs, strict=False))
-        seen = {name: self._prepared(name, part) for name, part in parts.items()}
+        parts = zip(self.spaces, self.normalizers, inputs, strict=False)
+        seen = {name: self._channels_first(name, normalize(part)) for name, normalize, part in parts}
         observation = seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
         if self.state_shape is None:
             return (self._bounded(self.policy._predict(observation, deterministic=True)),)
@@ -81,14 +102,9 @@ class Acting(nn.Module):
         action, state = self.policy._predict(observation, (hidden, cell), running, deterministic=True)
         return (self._bounded(action), *state)
 
-    def _prepared(self, name: str, part: torch.Tensor) -> torch.Tensor:
-        if self.spaces[name].shape != self._seen[name].shape:
-            part = part.permute(0, 3, 1, 2)
-        if self._limits is None:
-            return part
-        # In the precision in which `Policy.predict` normalizes.
-        scaled = (part.double() - self.mean) / torch.sqrt(self.variance + self._epsilon)
-        return torch.clamp(scaled, *self._limits).float()
+    def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
+        """Return a batch of images with channels first; anything else unchanged."""
+        return part.permute(0, 3, 1, 2) if self.spaces[name].shape != self._seen[name].shape else part
 
     def _bounded(self, action: torch.Tensor) -> torch.Tensor:
         """Return actions as the environment takes them."""

@@ -21,7 +21,7 @@ from gymnasium import spaces
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.environments.making import creator_of
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.exporting.acting import Acting
+from palaestra_trainer.exporting.acting import Acting, Normalizer
 from palaestra_trainer.run.summary import measured
 from palaestra_trainer.run_directory import RunDirectory
 
@@ -45,7 +45,11 @@ def data_sheet(acting: Acting, configuration: Configuration, directory: RunDirec
         "success_interval": result.get("success_interval"),
         "inputs": acting.inputs,
         "outputs": acting.outputs,
-        "normalized": hasattr(acting, "mean"),
+        "normalized": {
+            name: {"clip": known.clip, "epsilon": known.epsilon}
+            for name, known in zip(acting.spaces, acting.normalizers, strict=True)
+            if isinstance(known, Normalizer)
+        },
         "state_shape": acting.state_shape,
         "observations": {
             "spaces": {name: describe(space) for name, space in acting.spaces.items()},

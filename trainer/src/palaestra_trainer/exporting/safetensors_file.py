@@ -1,7 +1,7 @@
 """A policy's tensors as a safetensors file, for a network that a person builds.
 
-The names are those of Stable-Baselines3's policy below `policy.`. The statistics of a normalizer are `mean`
-and `variance`; the data sheet says where it clips.
+The names are those of Stable-Baselines3's policy below `policy.`. The normalizer of the n-th input has its
+statistics below `normalizers.<n>.`; the data sheet says where it clips.
 """
 
 from __future__ import annotations
