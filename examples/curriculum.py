@@ -8,23 +8,18 @@ command takes effect one period late. Evaluations are always at level 1. All tha
 episode's seed, so an interrupted run resumes as if it had not been interrupted.
 """
 
-import math
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from palaestra_trainer.environments.arena import CLEARANCE_M, CYLINDER_CENTER_M, CYLINDER_RADIUS_M, CYLINDERS
 from palaestra_trainer.environments.move_to_target import MoveToTargetEnv
 from palaestra_trainer.environments.options import Options, parse
-from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, Pose, RobotinoAbc
+from palaestra_trainer.robots import Pose, RobotinoAbc, Scene, SceneWrapper
 
 HARDEST_AT = 0.5  # share of training
 MOVED_M, NOISE_M, SLIP, LATE = 0.3, 0.01, 0.2, 0.3  # at level 1: at most, deviation, at most, probability
 UNDER_THE_FLOOR_M = -1.0
-APART_M = CYLINDER_RADIUS_M + RADIUS_M + CLEARANCE_M  # of a cylinder from start and target
-
-Point = tuple[float, float]
 
 
 class DisturbedRobot(RobotinoAbc):
@@ -47,7 +42,7 @@ class DisturbedRobot(RobotinoAbc):
 
     def distances(self) -> np.ndarray:
         """Return the distances of the robot with this period's noise."""
-        return np.clip(self.robot.distances() + self.noise, *SENSOR_RANGE_M, dtype=np.float32)
+        return np.clip(self.robot.distances() + self.noise, *self.distance_range_m, dtype=np.float32)
 
     def bumped(self) -> bool:
         """Return what the bumper says."""
@@ -70,23 +65,24 @@ class DisturbedRobot(RobotinoAbc):
         return extra
 
 
-class HarderScene:
+class HarderScene(SceneWrapper):
     """A scene that puts as many cylinders on the floor as its level says, and disturbs the robot."""
 
-    def __init__(self, robot: DisturbedRobot, scene: Any) -> None:
-        self.robot, self.scene, self.level = robot, scene, 1.0
+    def __init__(self, robot: DisturbedRobot, scene: Scene) -> None:
+        super().__init__(scene)
+        self.robot, self.level = robot, 1.0
 
-    def reset(self, seed: int, start: Pose, target: Point) -> None:
+    def begin(self, seed: int) -> None:
         """Begin anew; everything follows from the seed and the level."""
-        self.scene.reset(seed, start, target)  # puts everything back to its place in the world file
+        self.scene.begin(seed)  # puts everything back to its place in the world file
         random = np.random.default_rng(seed)
-        for number, place in enumerate(CYLINDERS):
-            stands = number < round(self.level * len(CYLINDERS))
-            x, y = beside(place, random, self.level * MOVED_M, [(start.x_m, start.y_m), target])
-            height = CYLINDER_CENTER_M if stands else UNDER_THE_FLOOR_M
-            self.scene.supervisor.set_field(f"CYLINDER_{number}", "translation", (x, y, height))
+        cylinders = [it for it in self.layout().obstacles if it.name.startswith("CYLINDER")]
+        for number, cylinder in enumerate(cylinders):
+            stands = number < round(self.level * len(cylinders))
+            x, y = random.uniform(-self.level * MOVED_M, self.level * MOVED_M, 2)
+            height = 0.5 * cylinder.top_m if stands else UNDER_THE_FLOOR_M
+            self.put(cylinder.name, (float(cylinder.x_m + x), float(cylinder.y_m + y), height))
         self.robot.begin(random, self.level)
-        self.robot.advance()  # the writes take effect, and the sensors see them
 
 
 class CurriculumEnv(MoveToTargetEnv):
@@ -103,16 +99,7 @@ class CurriculumEnv(MoveToTargetEnv):
         return super().reset(seed=seed, options=options)
 
 
-def beside(place: Point, random: np.random.Generator, most_m: float, free: list[Point]) -> Point:
-    """Return x, y near `place`, far enough from the points that must stay free."""
-    while True:
-        x, y = np.array(place) + random.uniform(-most_m, most_m, 2)
-        found = float(x), float(y)
-        if all(math.dist(found, point) >= min(APART_M, math.dist(place, point)) for point in free):
-            return found
-
-
-def make(robot: RobotinoAbc, scene: Any, **options: Any) -> CurriculumEnv:
+def make(robot: RobotinoAbc, scene: Scene, **options: Any) -> CurriculumEnv:
     """Return the environment of one simulator."""
     disturbed = DisturbedRobot(robot)
     return CurriculumEnv(disturbed, HarderScene(disturbed, scene), parse(options))

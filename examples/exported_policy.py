@@ -6,7 +6,8 @@ import sys
 import gymnasium
 import onnxruntime
 
-from palaestra_trainer.robots.robotino import Robotino, RobotinoScene
+from palaestra_trainer.robots.robotino import Robotino
+from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Webots
 
 policy = onnxruntime.InferenceSession(sys.argv[1])
@@ -16,7 +17,7 @@ over = False
 with Webots("robotino", "arena") as webots:  # starts the simulator, and a ROS master if there is none
     robot = Robotino(webots)
     robot.connect()
-    scene = RobotinoScene(webots, robot)
+    scene = SimulatedScene(webots, robot)
     env = gymnasium.make(task, robot=robot, scene=scene, **sheet["environment"]["options"])
     observation, _ = env.reset(seed=1)
     while not over:

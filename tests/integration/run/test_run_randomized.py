@@ -82,7 +82,7 @@ def test_the_example_changes_world_and_robot_with_the_progress_of_training(maste
     del master
     webots = Webots("robotino", "arena")
     robot = Robotino(webots)
-    env = curriculum.make(robot, RobotinoScene(webots, robot))
+    env = curriculum.make(robot, SimulatedScene(webots, robot))
     seen = []
     try:
         with webots:

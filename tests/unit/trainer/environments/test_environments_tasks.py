@@ -97,7 +97,7 @@ def test_the_options_that_every_reset_of_a_run_gets_change_nothing():
     """They are for environments with a curriculum."""
     of_a_run = {"training_progress": 0.5, "episode": 7}
 
-    tasks = [chosen_task(np.random.default_rng(0), chosen) for chosen in ({}, of_a_run)]
+    tasks = [PLACES.chosen_task(np.random.default_rng(0), chosen) for chosen in ({}, of_a_run)]
 
     assert tasks[0] == tasks[1]
 

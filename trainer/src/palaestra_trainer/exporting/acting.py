@@ -68,7 +68,7 @@ class Acting(nn.Module):
         self.spaces = {name: as_returned(space) for name, space in self._seen.items()}
         lstm = getattr(policy, "lstm_actor", None)
         self.state_shape = None if lstm is None else (int(lstm.num_layers), int(lstm.hidden_size))
-        scales = {} if loaded.scale is None else {OBSERVATION: loaded.scale}
+        scales = {key or OBSERVATION: scale for key, scale in loaded.scales.items()}
         self.normalizers = nn.ModuleList(
             Normalizer(*scales[name]) if name in scales else nn.Identity() for name in self.spaces
         )
