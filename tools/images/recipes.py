@@ -58,6 +58,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="trainer",
             dockerfile="trainer/Dockerfile",
             packages=("sim_image", "trainer"),
+            extras=("install",),
             without=stood_in_for,
             arguments={"TORCH": torch},
         ),
@@ -65,6 +66,7 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
             name="notebook",
             dockerfile="images/notebook/Dockerfile",
             packages=("sim_image", "trainer"),
+            extras=("install",),
             files=(
                 "images/notebook/notebook.sh",
                 "images/notebook/overrides.json",

@@ -94,6 +94,15 @@ def test_an_image_with_ros_has_the_package_webots_ros(name):
     assert "&& palaestra-webots-ros --importable /usr/share" in ours
 
 
+@pytest.mark.parametrize("name", ["trainer", "notebook"])
+def test_an_image_has_a_folder_for_a_project_of_the_user_s_own(name):
+    """`palaestra-install` writes it in a build, as the user of the image, and Python looks there first."""
+    [made] = [run for run in values(parsed(recipes("debian")[name]), "RUN") if "useradd" in run]
+
+    assert "install --directory --owner=palaestra --group=palaestra /opt/packages" in made
+    assert "PYTHONPATH=/opt/packages" in values(parsed(recipes("debian")[name]), "ENV")
+
+
 def test_what_changes_most_comes_last(instructions):
     """A changed source builds one layer anew, not PyTorch."""
     order = [f"{instruction} {value}" for instruction, value in instructions]

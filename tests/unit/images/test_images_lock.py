@@ -122,7 +122,7 @@ def test_a_share_of_the_real_lock_is_again_a_lock_with_the_same_content(packages
         ),
         (
             "trainer",
-            {"numpy", "stable-baselines3", "gymnasium", "pydantic"},
+            {"numpy", "stable-baselines3", "gymnasium", "pydantic", "hatchling", "uv", "wheel"},
             {"mujoco-core", "torch", "triton", "pytest"},
         ),
     ],

@@ -1,0 +1,192 @@
+"""`palaestra-install`: a project of the user's own, into an image that is built from ours.
+
+The first folder of PYTHONPATH gets the project and those of its dependencies that the image lacks.
+What the image has stays as it is tested with: nothing replaces or hides it. A project whose dependencies
+are all in the image needs no index, as the image has the build backends hatchling and setuptools.
+"""
+
+from __future__ import annotations
+
+import argparse
+import compileall
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import Distribution, PathDistribution, distributions
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from palaestra_trainer.errors import ConfigurationError
+
+DESCRIPTION = """\
+Install a project of your own, while an image is built FROM one of Palaestra's.
+
+FOLDER holds a pyproject.toml or setup.py, or is a bare folder of modules and packages.
+It may be read-only. Hidden files, __pycache__ and a folder `runs` at its top are left out.
+Dependencies that the image lacks are installed too; the package index must then be reachable.
+"""
+PROJECT_FILES = ("pyproject.toml", "setup.py")
+RUNS = "runs"  # `palaestra run` writes it into the folder of the job
+DEFAULT_BACKEND = ("setuptools",)  # Source: PEP 518, for a project without [build-system]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run `palaestra-install`; return 0, or 2 if the folder cannot be installed."""
+    parser = argparse.ArgumentParser(
+        prog="palaestra-install",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    folder: Path = parser.parse_args(arguments).folder
+    try:
+        install(folder, _target())
+    except (ConfigurationError, OSError) as error:
+        sys.stderr.write(f"palaestra-install: {error}\n")
+        return 2
+    return 0
+
+
+def install(folder: Path, target: Path) -> None:
+    """Install the project in `folder` into `target`, whole or not at all.
+
+    Raises:
+        ConfigurationError: the project cannot be built, or would replace or hide a part of the image.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        source, staged = Path(scratch, "source"), Path(scratch, "staged")
+        _copy(folder, source)
+        if any((source / name).is_file() for name in PROJECT_FILES):
+            _install_project(source, staged)
+        else:
+            shutil.copytree(source, staged)
+        _check_names(folder, staged, target)
+        _check_requirements(staged)
+        # Now, as the root file system of a pod is read-only.
+        compileall.compile_dir(staged, quiet=1, stripdir=str(staged), prependdir=str(target))
+        shutil.copytree(staged, target, dirs_exist_ok=True)
+
+
+def _target() -> Path:
+    first, *_ = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    if not first:
+        raise ConfigurationError(
+            "PYTHONPATH: is not set, and its first folder is where a project goes; "
+            "run this in a Dockerfile FROM palaestra-trainer"
+        )
+    return Path(first)
+
+
+def _copy(folder: Path, source: Path) -> None:
+    """Copy a project to where a build backend may write."""
+    if not folder.is_dir():
+        raise ConfigurationError(f"{folder}: is not a folder; name the one with your project")
+
+    def left_out(at: str, names: Iterable[str]) -> set[str]:
+        top = {RUNS} if Path(at) == folder else set()
+        return {name for name in names if name.startswith(".") or name in {"__pycache__", *top}}
+
+    try:
+        shutil.copytree(folder, source, ignore=left_out)
+    except (PermissionError, shutil.Error) as error:
+        raise ConfigurationError(
+            f"{folder}: user {os.getuid()} cannot read all of it; `chmod --recursive a+rX` it on your machine"
+        ) from error
+
+
+def _install_project(source: Path, staged: Path) -> None:
+    """Build the project and install it into `staged` with everything that the image lacks.
+
+    uv leaves out what the image has, also where another version is wanted; `_check_requirements` finds that.
+    """
+    project = _pyproject(source)
+    there = list(distributions())
+    own = canonicalize_name(project.get("project", {}).get("name", ""))
+    listed = source.with_name("image.txt")
+    listed.write_text("".join(f"{name}\n" for name in {canonicalize_name(each.name) for each in there} - {own}))
+    backend = project.get("build-system", {}).get("requires", DEFAULT_BACKEND)
+    here = not any(_unmet(map(Requirement, backend), there))
+    command = ["uv", "pip", "install", "--quiet", "--no-cache", f"--python={sys.executable}"]
+    options = [f"--target={staged}", f"--excludes={listed}", *(["--no-build-isolation"] if here else [])]
+    if subprocess.run([*command, *options, str(source)], check=False).returncode:
+        raise ConfigurationError("uv could not install the project; its message is above")
+
+
+def _pyproject(source: Path) -> Mapping[str, Any]:
+    file = source / "pyproject.toml"
+    try:
+        return tomllib.loads(file.read_text()) if file.is_file() else {}
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError(f"pyproject.toml: {error}; correct the line") from error
+
+
+def _check_names(folder: Path, staged: Path, target: Path) -> None:
+    """Refuse a project without a module, and one that hides a module of the image."""
+    names = sorted(_importable(staged))
+    if not names or "__init__" in names:
+        fact = "is itself a package" if names else "holds neither a module nor a package"
+        raise ConfigurationError(f"{folder}: {fact}; name the folder that holds your modules")
+    for name in names:
+        if name in sys.stdlib_module_names or _elsewhere(name, target):
+            raise ConfigurationError(
+                f"{name}: the project would hide the image's module of this name; rename it"
+            )
+
+
+def _importable(folder: Path) -> Iterator[str]:
+    """Yield the names by which the modules and packages directly in a folder are imported."""
+    for path in folder.iterdir():
+        if path.suffix in {".py", ".so"} or (path / "__init__.py").is_file():
+            yield path.name.partition(".")[0]
+
+
+def _elsewhere(name: str, target: Path) -> bool:
+    """Return whether a module is imported from another folder than `target`."""
+    found = find_spec(name)
+    return bool(found and found.origin and not Path(found.origin).is_relative_to(target))
+
+
+def _check_requirements(staged: Path) -> None:
+    """Refuse what asks for another version of a package, or for an extra of one, than the image has."""
+    new = [PathDistribution(path) for path in staged.glob("*.dist-info")]
+    there = [*new, *distributions()]
+    for distribution in new:
+        for requirement in _unmet(_requirements(distribution), there):
+            found = _found(requirement, there)
+            raise ConfigurationError(
+                f"{distribution.name}: needs {requirement}, and the image has {found.version if found else 'none'};"
+                " choose a version that fits the image, or name the package in your dependencies"
+            )
+
+
+def _unmet(requirements: Iterable[Requirement], there: Sequence[Distribution]) -> Iterator[Requirement]:
+    """Yield those requirements, and those of the extras that they name, which no distribution meets."""
+    for requirement in requirements:
+        found = _found(requirement, there)
+        if found is None or not requirement.specifier.contains(found.version, prereleases=True):
+            yield requirement
+        else:
+            for extra in requirement.extras:
+                yield from _unmet(_requirements(found, extra), there)
+
+
+def _requirements(distribution: Distribution, extra: str = "") -> Iterator[Requirement]:
+    """Yield what a distribution needs here; with an extra, only what it needs for that."""
+    for requirement in map(Requirement, distribution.requires or ()):
+        marker = requirement.marker
+        always = marker is None or marker.evaluate({"extra": ""})
+        if always != bool(extra) and (marker is None or marker.evaluate({"extra": extra})):
+            yield requirement
+
+
+def _found(requirement: Requirement, there: Iterable[Distribution]) -> Distribution | None:
+    wanted = canonicalize_name(requirement.name)
+    return next((each for each in there if canonicalize_name(each.name) == wanted), None)
