@@ -62,6 +62,14 @@ class Engine(Protocol):
         """
         ...
 
+    def load(self, archive: Path, log: Path) -> None:
+        """Take in the image of an archive, under its name, so that another can be built FROM it.
+
+        Raises:
+            ImagesError: it cannot be read.
+        """
+        ...
+
 
 class Docker:
     """Docker Engine, with its own cache of layers."""
@@ -94,6 +102,10 @@ class Docker:
         save = ["docker", "save", f"--output={part}", order.reference]
         programs.run(save, log=_beside(order.log, "archive"), deadline_s=_STEP_DEADLINE_S)
         part.rename(order.archive)
+
+    def load(self, archive: Path, log: Path) -> None:
+        """Load an archive by `docker load`."""
+        programs.run(["docker", "load", f"--input={archive}"], log=log, deadline_s=_STEP_DEADLINE_S)
 
 
 class Buildah:
@@ -151,6 +163,10 @@ class Buildah:
         self._run(push, log=_beside(order.log, "archive"), deadline_s=_STEP_DEADLINE_S)
         part.rename(order.archive)
         self._answer("rmi", "--prune")
+
+    def load(self, archive: Path, log: Path) -> None:
+        """Load an archive by `buildah pull`; layers that are in the store are not written again."""
+        self._run(["pull", "--quiet", f"docker-archive:{archive}"], log=log, deadline_s=_STEP_DEADLINE_S)
 
     def _import_tree(self) -> None:
         dockerfile = self._logs / "Dockerfile.base"

@@ -88,6 +88,14 @@ def test_docker_builds_with_the_arguments_and_saves_the_archive(docker, order):
     assert "--build-arg=VERSION=1.2.3 /context" in calls.read_text()
 
 
+def test_docker_loads_what_another_image_is_built_from(docker, tmp_path):
+    """Its name may be that of an older image, which another checkout has built."""
+    calls = docker(f"{EVERYTHING} load")
+    Docker.here().load(tmp_path / "trainer.tar", tmp_path / "load.log")
+
+    assert f"load --input={tmp_path / 'trainer.tar'}" in calls.read_text()
+
+
 def test_a_failed_build_leaves_no_archive(docker, order):
     """An archive that is there is whole."""
     docker(EVERYTHING)

@@ -72,7 +72,16 @@ def install(folder: Path, target: Path) -> None:
         _check_requirements(staged)
         # Now, as the root file system of a pod is read-only.
         compileall.compile_dir(staged, quiet=1, stripdir=str(staged), prependdir=str(target))
-        shutil.copytree(staged, target, dirs_exist_ok=True)
+        _replace(staged, target)
+
+
+def _replace(staged: Path, target: Path) -> None:
+    """Put all that is staged into `target`, in place of older versions of the same distributions."""
+    new = {canonicalize_name(PathDistribution(path).name) for path in staged.glob("*.dist-info")}
+    for path in target.glob("*.dist-info"):
+        if canonicalize_name(PathDistribution(path).name) in new:
+            shutil.rmtree(path)
+    shutil.copytree(staged, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".lock"))
 
 
 def _target() -> Path:
@@ -111,7 +120,9 @@ def _install_project(source: Path, staged: Path) -> None:
     there = list(distributions())
     own = canonicalize_name(project.get("project", {}).get("name", ""))
     listed = source.with_name("image.txt")
-    listed.write_text("".join(f"{name}\n" for name in {canonicalize_name(each.name) for each in there} - {own}))
+    listed.write_text(
+        "".join(f"{name}\n" for name in {canonicalize_name(each.name) for each in there} - {own})
+    )
     backend = project.get("build-system", {}).get("requires", DEFAULT_BACKEND)
     here = not any(_unmet(map(Requirement, backend), there))
     command = ["uv", "pip", "install", "--quiet", "--no-cache", f"--python={sys.executable}"]
@@ -162,8 +173,9 @@ def _check_requirements(staged: Path) -> None:
         for requirement in _unmet(_requirements(distribution), there):
             found = _found(requirement, there)
             raise ConfigurationError(
-                f"{distribution.name}: needs {requirement}, and the image has {found.version if found else 'none'};"
-                " choose a version that fits the image, or name the package in your dependencies"
+                f"{distribution.name}: needs {requirement.name}{requirement.specifier}, and the image has "
+                f"{found.version if found else 'none'}; choose a version that fits the image, "
+                "or name the package in your dependencies"
             )
 
 
