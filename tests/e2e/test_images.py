@@ -4,16 +4,16 @@ import json
 import os
 import tarfile
 from importlib.metadata import version
-from pathlib import Path
 
 import pytest
 
 from tests.e2e.long_run import operators
 from tests.e2e.namespace import OPERATOR, SYSTEM, named
+from tests.e2e.own_image import ARCHIVES
+from tests.e2e.own_image import archives as built
 
 pytestmark = pytest.mark.timeout(600)
 
-ARCHIVES = "PALAESTRA_E2E_IMAGES"  # a file with a line NAME=ARCHIVE for each; tests/cluster/e2e.sh sets it
 MOST_MB = {"stub": 500, "mujoco": 700, "operator": 200, "trainer": 2500, "notebook": 2500}
 LABEL = "org.opencontainers.image."
 NOBODY = "65532:65532"
@@ -21,11 +21,10 @@ NOBODY = "65532:65532"
 
 @pytest.fixture(scope="module")
 def archives():
-    """Archives by image; of the operator, which is there under two tags, the last."""
+    """Archives by image."""
     if ARCHIVES not in os.environ:
         pytest.skip("nobody says where the images' archives are; `make e2e` does")
-    lines = Path(os.environ[ARCHIVES]).read_text().splitlines()
-    return {name: Path(archive) for name, _, archive in (line.partition("=") for line in lines)}
+    return built()
 
 
 def configuration(archive):

@@ -1,0 +1,60 @@
+"""docs/your-environment.md on a cluster: the environment in an image of its own, as a pod of a job."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from tests.chart.helm import ROOT
+from tests.e2e.jobs import SLOW
+from tests.e2e.namespace import LONG_S
+from tests.e2e.own_image import ARCHIVES
+from tests.pages import fenced
+
+pytestmark = pytest.mark.timeout(1200)
+
+PAGE = dict(fenced((ROOT / "docs/your-environment.md").read_text()))
+IMAGE = "corridor:1"
+BUILD_S, LOAD_S = 600, 300
+# One rollout and one episode: the page's laptop part, tests/integration/run, learns the task.
+SHORT = {
+    "steps": 256,
+    "evaluation": {"everySteps": 256, "episodes": 1},
+    "checkpoint": {"everySteps": 256, "keep": 2},
+}
+WHOSE = "import corridor, os; print(os.getuid(), os.stat(corridor.__file__).st_uid, corridor.__cached__)"
+
+
+@pytest.fixture(scope="module")
+def image(cluster, tmp_path_factory):
+    """The page's image, in the nodes of the cluster."""
+    del cluster
+    if ARCHIVES not in os.environ or os.environ.get("PALAESTRA_CLUSTER") == "existing":
+        pytest.skip("the release's archives are not here, or this cluster loads none; `make e2e` has both")
+    folder = tmp_path_factory.mktemp("own") / "corridor"
+    folder.mkdir(mode=0o755)
+    for name in ("python corridor.py", "dockerfile Dockerfile"):
+        (folder / name.split()[1]).write_text(PAGE[name])
+    build = [sys.executable, "-m", "tests.e2e.own_image", folder, IMAGE]
+    archive = subprocess.run(build, cwd=ROOT, check=True, timeout=BUILD_S, stdout=subprocess.PIPE, text=True)
+    load = [ROOT / "tests/cluster/load.sh", archive.stdout.strip()]
+    subprocess.run(load, check=True, timeout=LOAD_S)
+    return IMAGE
+
+
+def test_an_environment_in_an_image_of_its_own_trains_in_a_restricted_pod(namespace, image):
+    """Only the image can bring the module: the pod has no other file of the user's."""
+    job = yaml.safe_load(PAGE["yaml job.yaml"])
+    job["spec"]["trainer"] |= {"image": image, **SHORT}
+    job["spec"]["simulators"][0] |= SLOW  # so that the pod is still there when it is looked into
+    namespace.apply(job)
+    pod = namespace.wait_for_pod("corridor", LONG_S)
+
+    own, owner, compiled = namespace.execute(pod, "python3", "-c", WHOSE).split()
+
+    assert own == owner == "65532"
+    assert compiled.startswith("/opt/packages/__pycache__/corridor.")
+    assert namespace.wait_for_end("corridor", LONG_S) == "Succeeded"
+    assert namespace.replica("corridor")["step"] == 256
