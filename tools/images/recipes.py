@@ -65,14 +65,17 @@ def recipes(torch: str) -> Mapping[str, Recipe]:
         "notebook": Recipe(
             name="notebook",
             dockerfile="images/notebook/Dockerfile",
-            packages=("sim_image", "trainer"),
+            packages=("sim_image", "trainer", "operator"),
             extras=("install",),
             files=(
                 "images/notebook/notebook.sh",
                 "images/notebook/overrides.json",
                 "examples/first-steps.ipynb",
             ),
-            without=stood_in_for,
+            without=(
+                *stood_in_for,
+                "kubernetes",
+            ),  # is in the other lock, so that the trainer's share is equal
             extra="images/notebook/requirements.lock",
             arguments={"TORCH": torch},
         ),

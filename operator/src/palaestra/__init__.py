@@ -1,17 +1,19 @@
 """The control plane: the TrainingJob, its plan, the local runner, and a client of clusters."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__all__ = ["Client"]
+__all__ = ["Client", "changed", "run"]
 
 if TYPE_CHECKING:
     from palaestra.client import Client
+    from palaestra.given import changed
+    from palaestra.local.background import run
 else:
+    _HOMES = {"Client": "palaestra.client", "changed": "palaestra.given", "run": "palaestra.local.background"}
 
     def __getattr__(name: str) -> Any:
-        """Return `Client`, imported when it is asked for: plans and schemas need no cluster."""
-        if name != "Client":
+        """Return a public name, imported when it is asked for: plans and schemas need no cluster."""
+        if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from palaestra.client import Client  # noqa: PLC0415 - see above
-
-        return Client
+        return getattr(import_module(_HOMES[name]), name)

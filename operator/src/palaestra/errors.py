@@ -7,6 +7,7 @@
     ├── LocalError                   the local runner cannot go on (local.errors)
     │   ├── Refused                  the run cannot be started as asked
     │   ├── StartFailed              a container that others wait for did not start
+    │   ├── StillRunning         a run in the background has not ended by a deadline
     │   └── StorageFailed            a file of the run could not be written
     ├── ApiError                     a call of the API server failed (cluster.errors)
     │   ├── AlreadyExists            the name is taken

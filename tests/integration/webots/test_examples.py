@@ -12,15 +12,16 @@ ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples"
 
 
-def carried_out(*program, **variables):
+def carried_out(*program, folder=None, **variables):
     """Return what comes of a Python program, without pod, runner and ROS master."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("ROS_")}
     return subprocess.run(
         [sys.executable, *program],
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=200,
         check=True,
+        cwd=folder,
         env={**environment, "MPLBACKEND": "agg", **variables},
     )
 
@@ -62,13 +63,15 @@ def test_the_listings_of_the_paper_run_in_their_order():
     assert "done: 200 steps, mean return" in result.stdout
 
 
-def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom():
+def test_the_cells_of_the_first_notebook_can_be_carried_out_from_top_to_bottom(tmp_path):
     """`make e2e` does it in the notebook's pod; and a notebook that is new holds no results."""
     cells = json.loads((EXAMPLES / "first-steps.ipynb").read_text())["cells"]
     code = [cell for cell in cells if cell["cell_type"] == "code"]
 
-    result = carried_out("-c", "\n".join("".join(cell["source"]) for cell in code))
+    result = carried_out("-c", "\n".join("".join(cell["source"]) for cell in code), folder=tmp_path)
 
     assert "reached after" in result.stdout
+    assert "trained 600 steps, policy: " in result.stdout
+    assert (tmp_path / "runs/first/0/model.zip").exists()
     assert result.stderr == ""
     assert not any(cell["outputs"] for cell in code)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from palaestra.api import TrainingJob
 from palaestra.api.container import Variable
-from palaestra.api.paths import Pruned, shown
+from palaestra.api.paths import Pruned, path_of, shown
 from palaestra.api.simulators import World
 from palaestra.api.tree import model_at, walk
 
@@ -23,6 +23,21 @@ from palaestra.api.tree import model_at, walk
 def test_a_path_is_shown_as_a_person_writes_it(path, text) -> None:
     """Dots between words, numbers in brackets, the rest quoted."""
     assert shown(path) == text
+
+
+PIECES = st.integers(0, 99) | st.text(max_size=4) | st.from_regex(r"[a-z_]{1,4}", fullmatch=True)
+
+
+@given(st.lists(PIECES, min_size=1).map(tuple))
+def test_a_path_is_read_as_it_is_shown(path) -> None:
+    """A path from a message can be typed."""
+    assert path_of(shown(path)) == path
+
+
+@pytest.mark.parametrize("text", ["", ".a", "a..b", "a.", "a[", "a[-1]", 'a["b]', 'a["\\x"]', "a-b"])
+def test_a_text_that_is_no_path_is_empty(text) -> None:
+    """So that a typing mistake is not a field."""
+    assert path_of(text) == ()
 
 
 def test_what_is_left_of_a_list_knows_its_old_numbers() -> None:

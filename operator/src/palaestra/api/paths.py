@@ -25,6 +25,26 @@ def shown(path: Path) -> str:
     return text
 
 
+_PIECE = re.compile(r'(?:^|(?!^)\.)([A-Za-z_][A-Za-z0-9_]*)|\[([0-9]+)\]|\[("(?:[^"\\]|\\.)*")\]')
+
+
+def path_of(text: str) -> Path:
+    """Return the path that `shown` writes as `text`; empty if `text` is not a path."""
+    pieces: list[str | int] = []
+    at = 0
+    while at < len(text):
+        found = _PIECE.match(text, at)
+        if found is None:
+            return ()
+        name, index, key = found.groups()
+        try:
+            pieces.append(name or (int(index) if index else json.loads(key)))
+        except ValueError:  # an escape that JSON does not have
+            return ()
+        at = found.end()
+    return tuple(pieces)
+
+
 class Pruned:
     """A copy of plain data from which parts can be removed.
 

@@ -1,15 +1,13 @@
 """The client: one method for each operation on the TrainingJobs of a cluster."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from palaestra.api import Spec, Status, TrainingJob, validate
-from palaestra.api.job import API_VERSION, KIND
 from palaestra.api.status import TERMINAL, PodReference
-from palaestra.api.yaml_text import NotYaml, read
 from palaestra.client.asking import asked
 from palaestra.client.errors import EndedOtherwise, NoPod, NoSuchJob, QueueDecides
 from palaestra.client.fetching import fetch
@@ -18,7 +16,7 @@ from palaestra.client.happenings import Happening, happenings
 from palaestra.client.waiting import News, current, why
 from palaestra.cluster import Api, Invalid, NotFound, connect, namespace_of
 from palaestra.cluster.resources import TRAINING_JOBS
-from palaestra.errors import SpecErrors
+from palaestra.given import Given, data_of, name_of
 from palaestra.objects import Object
 from palaestra.plan import ClusterLayout, Images
 from palaestra.plan.replica import ROS_MASTER, TRAINER, Replica
@@ -65,19 +63,19 @@ class Client:
         """Close all idle connections."""
         self.api.close()
 
-    def apply(self, job: TrainingJob | Mapping[str, Any] | Path) -> TrainingJob:
+    def apply(self, job: Given) -> TrainingJob:
         """Create a job, or change its mutable fields, and return the stored job.
 
         Args:
-            job: the job, plain data, or a file with one. Absent fields are left to the cluster.
+            job: the job, plain data, YAML text, or the path of a file. Absent fields are left to the cluster.
 
         Raises:
             SpecErrors: the job is wrong; lists every mistake; nothing was sent.
             OSError: the file cannot be read.
             ApiError: the API server refuses, for example a change of an immutable field.
         """
-        data = _data(job)
-        validate(data, str(job) if isinstance(job, Path) else "job")
+        data = data_of(job)
+        validate(data, name_of(job))
         metadata = {"namespace": self.namespace, **data["metadata"]}
         # A second server-side apply of an empty spec would remove the spec.
         spec = data["spec"] or {"replicas": Spec().replicas}
@@ -306,19 +304,6 @@ def _check_queue(job: TrainingJob, refusal: Invalid | None = None) -> None:
     queue = job.spec.scheduling.queue_name
     if queue is not None:
         raise QueueDecides.of(job.metadata.name, job.metadata.namespace, queue) from refusal
-
-
-def _data(job: TrainingJob | Mapping[str, Any] | Path) -> Any:
-    """Return a job as plain data, with only the fields that were given."""
-    if isinstance(job, TrainingJob):
-        given = job.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"status"})
-        return {**given, "apiVersion": API_VERSION, "kind": KIND}
-    if isinstance(job, Path):
-        try:
-            return read(job.read_text(encoding="utf-8"), str(job))
-        except NotYaml as error:
-            raise SpecErrors(str(job), (error.problem,)) from None
-    return job
 
 
 def _job(found: Object) -> TrainingJob:

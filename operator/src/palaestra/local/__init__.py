@@ -8,4 +8,7 @@ is in reverse order, within one grace period.
 As in a cluster, no process is left behind. A marker in the environment identifies a pod's processes. A
 watchdog ends them when the runner's end of a pipe closes, so they end with the runner, even if it is
 SIGKILLed (`watchdog`).
+
+A Python program runs a job with `palaestra.run` (`background`). The runner is then a process of its own,
+which ends with that program (`bound`).
 """

@@ -3,6 +3,7 @@
 LocalError              one line for a person, and the exit code of `palaestra run`
 ├── Refused             exit 2: found before anything was started
 ├── StartFailed         exit 1: a sidecar did not come up, so the trainer was not started
+├── StillRunning        no exit code: a run in the background has not ended by a deadline
 └── StorageFailed       exit 1: the run directory cannot be written (full disk, no permission)
 """
 
@@ -32,3 +33,7 @@ class StartFailed(LocalError, RuntimeError):
 
 class StorageFailed(LocalError, OSError):
     """A file of the run could not be written; what was there before is unharmed."""
+
+
+class StillRunning(LocalError, TimeoutError):
+    """A run in the background has not ended by a deadline; the same call may be repeated."""

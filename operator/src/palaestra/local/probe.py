@@ -10,7 +10,7 @@ from http import HTTPStatus
 from palaestra.local.process import Process
 from palaestra.local.spec import Probe
 
-_DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # no proxy: the address is on loopback
+DIRECT = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # no proxy: the address is on loopback
 
 
 async def passes(probe: Probe, env: Mapping[str, str]) -> bool:
@@ -52,7 +52,7 @@ async def _command_succeeds(probe: Probe, env: Mapping[str, str]) -> bool:
 def _answers(url: str, timeout_s: float) -> bool:
     """Return whether a GET is answered with a status from 200 to 399."""
     try:
-        with _DIRECT.open(url, timeout=timeout_s) as answer:
+        with DIRECT.open(url, timeout=timeout_s) as answer:
             return bool(answer.status < HTTPStatus.BAD_REQUEST)  # the kubelet's own rule
     except OSError:  # refused, timed out, or an HTTP error status
         return False

@@ -1,7 +1,7 @@
 """Start programs, each in a session of its own, and wait for them without blocking.
 
-The only module that starts processes. A terminal's Ctrl-C reaches the runner alone, because no process that
-it starts is in its process group.
+The only module that starts processes of a pod. A terminal's Ctrl-C reaches the runner alone, because no
+process that it starts is in its process group.
 """
 
 import asyncio

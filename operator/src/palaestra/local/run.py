@@ -27,7 +27,11 @@ SHOWN_LINES = 5  # of the trainer's log, if it failed without a termination mess
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """The options of the command line; `file` is the job's file, for use in messages."""
+    """The options of the command line.
+
+    `lock` is the descriptor of the run directory's lock, which the process that started this one has taken
+    for it; None: not taken.
+    """
 
     runs: Path
     version: str
@@ -35,6 +39,7 @@ class Options:
     fresh: bool = False
     verbose: bool = False
     ros_port: int | None = None
+    lock: int | None = None
 
 
 def run(job: TrainingJob, options: Options) -> int:
@@ -99,7 +104,7 @@ def _chosen(job: TrainingJob, replica: int | None) -> range:
 
 def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Outcome:
     record = rundir.record_of(job)
-    with rundir.locked(path), HeldPorts() as held:
+    with rundir.locked(path, options.lock), HeldPorts() as held:
         ports = chosen_ports(held, job, options)
         if options.fresh and (aside := rundir.set_aside(path)):
             say(f"{path}: the run that was there is now {aside}")

@@ -3,6 +3,7 @@
     <dir>/<job name>/<replica>/     job.yaml, training.yaml, worlds/, logs/, scratch/, outcome.json,
                                     and what the trainer writes: checkpoints/, tensorboard/, ...
     <dir>/<job name>/<replica>.lock held by the runner that uses the directory
+    <dir>/<job name>/<replica>.log  the output of a runner in the background
     <dir>/<job name>/<replica>.old-<n>/   what --fresh has set aside; no run is ever deleted
 
 The uid of a job on a laptop is derived from this path. So it is the same for every `palaestra run` of one
@@ -63,32 +64,41 @@ def uid_of(directory: Path) -> str:
 
 
 @contextmanager
-def locked(directory: Path) -> Iterator[None]:
-    """Lock a run directory for this process; the kernel releases the lock when the process ends.
+def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
+    """Lock a run directory for this process, and yield the descriptor of the lock.
+
+    The kernel releases the lock when every process with this descriptor has closed it or ended. A process
+    that was started with the descriptor passes it as `taken`.
 
     Raises:
         Refused: another runner has it.
         StorageFailed: its parent cannot be written.
     """
-    make_folder(directory.parent)
     path = directory.with_name(f"{directory.name}.lock")
-    with storage(path):
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    descriptor = _take(directory, path) if taken is None else taken
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            holder = os.read(descriptor, 32).decode(errors="replace").strip() or "unknown"
-            raise Refused(
-                f"{directory}: `palaestra run` is at work there (process {holder}); "
-                "wait for its end, or choose another folder with --dir"
-            ) from None
         with storage(path):
             os.truncate(descriptor, 0)
             os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
-        yield
+        yield descriptor
     finally:
         os.close(descriptor)
+
+
+def _take(directory: Path, path: Path) -> int:
+    make_folder(directory.parent)
+    with storage(path):
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = os.read(descriptor, 32).decode(errors="replace").strip() or "unknown"
+        os.close(descriptor)
+        raise Refused(
+            f"{directory}: `palaestra run` is at work there (process {holder}); "
+            "wait for its end, or choose another folder with --dir"
+        ) from None
+    return descriptor
 
 
 def record_of(job: TrainingJob) -> dict[str, Any]:

@@ -1,0 +1,77 @@
+"""The progress of a run, as its trainer reports it at `/status`."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from palaestra.local.probe import DIRECT
+from palaestra_protocol.fields import MOST_BYTES, decoded
+from palaestra_protocol.pod.status import TrainerStatus
+from palaestra_protocol.pod.terms import FaultKind
+
+ANSWER_S = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """The newest figures of a run; a value that is not known is None.
+
+    Attributes:
+        phase: `starting`, then what the trainer does, in one word; at last `ended`.
+        step: environment steps learned from, over all attempts.
+        target: steps at which the run ends; 0 before the trainer has answered.
+        steps_per_second: recently.
+        success_rate: of the last evaluation, 0 to 1.
+        mean_return: of recent training episodes.
+        faults: of all simulators, over all attempts.
+    """
+
+    phase: str = "starting"
+    step: int = 0
+    target: int = 0
+    steps_per_second: float | None = None
+    success_rate: float | None = None
+    mean_return: float | None = None
+    faults: int = 0
+
+
+class Watch:
+    """Reads the progress of one run, from its start on."""
+
+    def __init__(self, directory: Path) -> None:
+        """Remember what an earlier run left in the directory; its address may be another program's by now."""
+        self._file = directory / "training.yaml"
+        self._stale = self._written()
+        self._last = Progress()
+
+    def progress(self) -> Progress:
+        """Return the newest figures; the last ones while the trainer does not answer."""
+        if (status := self._status()) is not None:
+            self._last = Progress(
+                phase=status.phase,
+                step=status.step,
+                target=status.target,
+                steps_per_second=status.steps_per_second,
+                success_rate=status.success_rate,
+                mean_return=status.mean_return,
+                faults=sum(status.faults.values()) - status.faults.get(FaultKind.SLOW, 0),
+            )
+        return self._last
+
+    def _status(self) -> TrainerStatus | None:
+        written = self._written()
+        if written is None or written == self._stale:
+            return None
+        with suppress(OSError, ValueError, LookupError, TypeError, yaml.YAMLError):
+            address = yaml.safe_load(self._file.read_bytes())["statusAddress"]
+            with DIRECT.open(f"http://{address}/status", timeout=ANSWER_S) as answer:
+                return TrainerStatus.from_json(decoded(answer.read(MOST_BYTES)))
+        return None  # the trainer has not started, is between two attempts, or has ended
+
+    def _written(self) -> int | None:
+        try:
+            return self._file.stat().st_mtime_ns
+        except OSError:
+            return None
