@@ -80,6 +80,6 @@ golden: setup ## record the plans of the examples and other generated files anew
 	@$(BIN)/python -m tests.golden
 
 lock: setup ## resolve the dependencies again, within the bounds of the pyproject files
-	@$(COMPILE) --no-emit-package palaestra-sim --group dev --extra mujoco --extra export --extra install $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
+	@$(COMPILE) --no-emit-package palaestra-sim --group dev --extra mujoco --extra export --extra install --extra sweeps $(PACKAGES:%=%/pyproject.toml) -o requirements.lock
 	@$(COMPILE) --group notebook --constraint requirements.lock -o images/notebook/requirements.lock
 	@$(COMPILE) --group checkov -o tests/chart/checkov.lock

@@ -7,7 +7,7 @@
     ├── LocalError                   the local runner cannot go on (local.errors)
     │   ├── Refused                  the run cannot be started as asked
     │   ├── StartFailed              a container that others wait for did not start
-    │   ├── StillRunning         a run in the background has not ended by a deadline
+    │   ├── StillRunning             a run in the background has not ended by a deadline
     │   └── StorageFailed            a file of the run could not be written
     ├── ApiError                     a call of the API server failed (cluster.errors)
     │   ├── AlreadyExists            the name is taken
@@ -31,6 +31,7 @@
     │   ├── NoSuchNamespace          no such namespace
     │   ├── NotFetched               a run could not be copied
     │   ├── NotInstalled             the cluster has no TrainingJobs
+    │   ├── NotOfThisSweep           a job has the name of a sweep's trial (sweeps.there)
     │   ├── QueueDecides             Kueue alone suspends and resumes this job
     │   └── TookTooLong              a deadline passed
     ├── NotLeading                   this operator may have lost its lease (operator.writing)

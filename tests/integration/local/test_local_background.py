@@ -56,7 +56,7 @@ import palaestra
 
 run = palaestra.run(sys.argv[1], runs=sys.argv[2])
 {fork}
-print(run.handle, flush=True)
+print(run.directory, flush=True)
 time.sleep(1000)
 """
 
@@ -164,9 +164,11 @@ def test_all_of_it_ends_with_the_program_also_after_sigkill(job, tmp_path, fork)
         start_new_session=True,
     )
     try:
-        runner = int(program.stdout.readline())
+        program.stdout.readline()
         eventually((tmp_path / "desk/0/begun").exists, PATIENCE_S)
-        pids = [runner, *(pid for pid, _ in below(runner))]
+        pids = [
+            pid for pid, command in below(program.pid) if "palaestra" in command or "sleep" not in command
+        ]
         program.kill()
         program.wait(PATIENCE_S)
 

@@ -1,10 +1,16 @@
-"""The pages about training from Python can be typed."""
+"""The pages about training from Python and about sweeps can be typed."""
 
 from pathlib import Path
 
+import pytest
+
+from palaestra.cli import main
+from palaestra.sweeps.expanding import trials
+from palaestra.sweeps.model import SweepSpec, load
 from tests.pages import blocks
 
 ROOT = Path(__file__).parents[3]
+SWEEPS = (ROOT / "docs/sweeps.md").read_text()
 
 
 def test_the_script_of_the_page_about_tools_trains(tmp_path, monkeypatch, capsys):
@@ -17,3 +23,44 @@ def test_the_script_of_the_page_about_tools_trains(tmp_path, monkeypatch, capsys
 
     assert "True " in capsys.readouterr().out.splitlines()[-1]
     assert (tmp_path / "runs/tiny/0/model.zip").exists()
+
+
+@pytest.fixture
+def sweep(tmp_path, monkeypatch):
+    """Return a function that writes the sweep of the page behind a fence, in a folder with the examples."""
+    (tmp_path / "manifests").symlink_to(ROOT / "manifests")
+    monkeypatch.chdir(tmp_path)
+
+    def write(fence):
+        [text] = blocks(SWEEPS, fence)
+        (tmp_path / "sweep.yaml").write_text(text)
+        return Path("sweep.yaml")
+
+    return write
+
+
+def test_the_first_sweep_of_the_page_trains_and_compares(sweep, tmp_path, capsys):
+    """As typed there, with the real trainer: two trials of an example, here with one seed each."""
+    [console] = blocks(SWEEPS, "console")
+    typed = console.removeprefix("$ palaestra ").split()
+    file = sweep("yaml sweep")
+    file.write_text(file.read_text().replace("seeds: 2", "seeds: 1"))
+
+    code = main(typed)
+
+    out = capsys.readouterr().out
+    assert code == 0, out
+    assert "best: rates-" in out
+    assert len(list(tmp_path.glob("runs/rates/rates-?/?/model.zip"))) == 2
+    assert (tmp_path / "runs/rates/curves.png").exists()
+
+
+@pytest.mark.parametrize(("fence", "count"), [("yaml sweep-at-random", 20), ("yaml sweep-by-optuna", 2)])
+def test_the_other_sweeps_of_the_page_are_right(sweep, fence, count):
+    """Every job of them; of the search those at its bounds."""
+    assert len(trials(load(sweep(fence)))) == count
+
+
+def test_the_page_explains_every_field():
+    """In the table below the first sweep."""
+    assert all(f"| `{name}` |" in SWEEPS for name in SweepSpec.model_fields)

@@ -16,7 +16,7 @@ __all__ = ["main"]
 
 # Modules with commands, in the order of the help. The operator runs for months and imports only its own.
 COMMANDS = (
-    "run", "exporting", "documents", "operator", "looking", "watching", "changing", "fetching", "doctor",
+    "run", "sweep", "exporting", "documents", "operator", "looking", "watching", "changing", "fetching", "doctor",
     "trial",
 )  # fmt: skip
 OPERATOR = ["operator"]

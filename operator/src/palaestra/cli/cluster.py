@@ -29,13 +29,18 @@ def cluster_command(
     commands: Commands, name: str, work: Work, summary: str, description: str
 ) -> argparse.ArgumentParser:
     """Return the parser of a new cluster command, with kubectl's options that choose the cluster."""
-    parser = command(commands, name, _connected(work), summary, description, EXIT_CODES)
+    parser = command(commands, name, connected(work), summary, description, EXIT_CODES)
+    add_cluster(parser)
+    return parser
+
+
+def add_cluster(parser: argparse.ArgumentParser) -> None:
+    """Add kubectl's options that choose the cluster."""
     parser.add_argument(*NAMESPACE, metavar="NS", help="namespace of the jobs; default: the context's")
     parser.add_argument(CONTEXT, metavar="NAME", help="kubeconfig context; default: the current one")
     parser.add_argument(
         KUBECONFIG, metavar="FILE", help="kubeconfig; default: $KUBECONFIG, then ~/.kube/config"
     )
-    return parser
 
 
 def say(lines: Iterable[str]) -> None:
@@ -58,7 +63,7 @@ def cleaned_up() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _connected(work: Work) -> Callable[[argparse.Namespace], int]:
+def connected(work: Work) -> Callable[[argparse.Namespace], int]:
     """Return a command that connects, does its work, and prints errors of the cluster in one line."""
 
     def run(options: argparse.Namespace) -> int:

@@ -24,7 +24,8 @@ exit codes of all commands:
   0    done
   1    failed, or the cluster has no such job, refused, or the deadline passed; the last lines give the reason
   2    the command line, a file, the kubeconfig or this machine is not suitable; nothing was started
-  75, 80, 81, 82  of `run` only
+  75   of `run` and `sweep`: interrupted after a checkpoint
+  80, 81, 82  of `run` only
   130  ended by Ctrl-C
 `COMMAND --help` explains the exit codes of one command.
 """

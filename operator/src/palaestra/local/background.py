@@ -83,6 +83,7 @@ class Run:
                 pass_fds=[request.control, request.lock],
                 start_new_session=True,
             )
+        self._end = os.pidfd_open(self._process.pid)
 
     def __enter__(self) -> Self:
         """Return the run."""
@@ -113,10 +114,9 @@ class Run:
         """Return whether it has ended."""
         return self.wait(0.0)
 
-    @property
-    def handle(self) -> int:
-        """Return the id of its process, which ends last."""
-        return self._process.pid
+    def fileno(self) -> int:
+        """Return a descriptor that is readable once the run has ended, for `select`; valid until `wait`."""
+        return self._end
 
     def wait(self, deadline_s: float) -> bool:
         """Return whether it ended within `deadline_s`."""
@@ -159,8 +159,10 @@ class Run:
         self._let_go()
 
     def _let_go(self) -> None:
-        _RUNNING.discard(self)
-        self._control.close()
+        if self in _RUNNING:
+            _RUNNING.discard(self)
+            self._control.close()
+            os.close(self._end)
 
     def _result(self) -> Result:
         code = self._process.returncode

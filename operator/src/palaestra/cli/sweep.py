@@ -1,0 +1,197 @@
+"""`palaestra sweep`: train with different values of some fields, and compare."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from palaestra.cli.cluster import add_cluster, connected, say
+from palaestra.cli.files import add_dir
+from palaestra.cli.parsing import Commands, command
+from palaestra.client import Client
+from palaestra.errors import PalaestraError, SpecErrors
+from palaestra.local import rundir
+from palaestra.local.errors import KILLED
+from palaestra.local.files import write
+from palaestra.sweeps import expanding, ledger
+from palaestra.sweeps.carrying_out import Place, carry_out
+from palaestra.sweeps.here import Here
+from palaestra.sweeps.model import Sweep, load
+from palaestra.sweeps.searching import InTurn, Search
+from palaestra.sweeps.table import Row, lines
+from palaestra.sweeps.there import There
+from palaestra.sweeps.trial import State
+from palaestra_protocol.numbers import whole
+from palaestra_protocol.pod.status import ExitCode
+
+FAILED = 1
+SEARCHED_AT_ONCE = 4  # trials of a search in a cluster: it learns nothing from those that run
+SWEEP = """\
+Trains the job of the Sweep in FILE with different values of some fields, each with several seeds. Checks
+every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
+trials.jsonl, table.txt and curves.png. The same command skips trials that are complete and resumes the
+others. Ctrl-C saves a checkpoint of each run and exits; a second Ctrl-C exits at once.
+
+With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; a queue of the job
+decides when it runs. Ctrl-C ends the command and leaves the jobs; the same command continues. Deletes the
+jobs of pruned trials.
+"""
+EXIT_CODES = """\
+exit codes:
+  0    all trials are complete or pruned
+  1    a trial failed, or the cluster refused; the table or the last line gives the reason
+  2    the sweep, its job, a world or this machine is not suitable; nothing was started
+  75   interrupted after checkpoints; run the same command to resume
+  130  killed by a second Ctrl-C, or with --cluster by the first; run the same command to resume
+"""
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    parser = command(commands, "sweep", _sweep, "train with different values and compare", SWEEP, EXIT_CODES)
+    parser.add_argument("file", metavar="FILE", type=Path, help="a Sweep")
+    add_dir(parser)
+    parser.add_argument(
+        "--at-once",
+        metavar="N",
+        type=whole(1),
+        help="runs at the same time; default: as many as fit the processors. With --cluster: trials at the "
+        f"same time; default: all, with optuna {SEARCHED_AT_ONCE}",
+    )
+    parser.add_argument(
+        "--cluster", action="store_true", help="train in a cluster instead of on this machine"
+    )
+    add_cluster(parser)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    if options.cluster:
+        return connected(_there)(options)
+    if options.namespace or options.context or options.kubeconfig:
+        raise PalaestraError(
+            "--cluster: is missing; give it too, or remove the options that choose a cluster"
+        )
+    return _here(options)
+
+
+def _here(options: argparse.Namespace) -> int:
+    sweep = _loaded(options.file)
+    folder = options.dir.absolute() / sweep.metadata.name
+    place = Here(folder, options.at_once)
+    with _begun(sweep, place, folder) as search:
+        code = 0
+        try:
+            with _interruptible():
+                _carried_out(search, place, folder)
+        except KeyboardInterrupt:
+            code = int(ExitCode.INTERRUPTED) if place.stopped else KILLED
+        shown = _shown(search, place, sweep, folder)
+        return code or shown
+
+
+def _carried_out(search: Search, place: Here, folder: Path) -> None:
+    """Run the trials, and end what still runs at the end."""
+    try:
+        carry_out(search, place, folder, _say)
+    except KeyboardInterrupt:
+        _say("interrupted; each run saves a checkpoint, and the same command resumes it")
+        raise
+    finally:
+        place.stop()
+
+
+def _there(client: Client, options: argparse.Namespace) -> int:
+    sweep = _loaded(options.file)
+    folder = options.dir.absolute() / sweep.metadata.name
+    default = None if sweep.spec.optuna is None else SEARCHED_AT_ONCE
+    place = There(client, sweep.metadata.name, options.at_once or default)
+    with _begun(sweep, place, folder) as search:
+        carry_out(search, place, folder, _say)
+        return _shown(search, place, sweep, folder)
+
+
+def _loaded(file: Path) -> Sweep:
+    """Return the Sweep in a file.
+
+    Raises:
+        PalaestraError: it is wrong or cannot be read; nothing was sent to a cluster.
+    """
+    try:
+        return load(file)
+    except SpecErrors as error:
+        raise PalaestraError(str(error)) from error
+    except OSError as error:
+        raise PalaestraError(f"{error.filename}: {error.strerror}; name a readable file") from error
+
+
+@contextmanager
+def _begun(sweep: Sweep, place: Here | There, folder: Path) -> Iterator[Search]:
+    """Check every trial, lock the folder and yield the search."""
+    try:
+        trials = expanding.trials(sweep)
+    except SpecErrors as error:
+        raise PalaestraError(str(error)) from error
+    for trial in trials:
+        place.check(trial.job)
+    suggesting = None if sweep.spec.optuna is None else _extra("suggesting", "spec.optuna")
+    with rundir.locked(folder):
+        ledger.begin(folder, sweep)
+        if suggesting is None:
+            yield InTurn(trials, ledger.ended(folder))
+        else:
+            yield suggesting.Suggested(sweep, folder)
+
+
+def _extra(module: str, purpose: str) -> Any:
+    """Return a module that needs an optional package.
+
+    Raises:
+        PalaestraError: the package is not installed.
+    """
+    try:
+        return import_module(f"palaestra.sweeps.{module}")
+    except ModuleNotFoundError as error:
+        raise PalaestraError(f"{purpose}: needs {error.name}; install palaestra[sweeps]") from error
+
+
+def _say(line: str) -> None:
+    say([line])
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Handle SIGTERM and SIGHUP like Ctrl-C."""
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+def _shown(search: Search, place: Place, sweep: Sweep, folder: Path) -> int:
+    """Print the table, write it and the picture into the folder, and return the exit code."""
+    ended, objective = ledger.ended(folder), sweep.spec.objective
+    rows = [
+        Row(
+            name=trial.name,
+            changes=trial.changes,
+            figures=ended.get(trial.number) or replace(place.look(trial), state=State.WAITING),
+        )
+        for trial in search.known
+    ]
+    table = list(lines(rows, objective))
+    write(folder / "table.txt", "".join(f"{line}\n" for line in table).encode())
+    say(["", *table, "", f"folder: {folder}"])
+    try:
+        if _extra("drawing", "curves.png").draw(rows, objective, folder / "curves.png"):
+            _say(f"picture: {folder / 'curves.png'}")
+    except PalaestraError as error:
+        sys.stderr.write(f"{error}\n")
+    return FAILED if any(row.figures.state is State.FAILED for row in rows) else 0

@@ -1,0 +1,79 @@
+"""The folder of a sweep: the Sweep that it was begun with, and the trials that have ended.
+
+<dir>/<sweep>/sweep.yaml        the Sweep, with its job
+<dir>/<sweep>/trials.jsonl      a line for each trial that has ended
+<dir>/<sweep>/optuna.journal    the search, if Optuna makes it
+<dir>/<sweep>/<sweep>-<n>/      on this machine: the runs of trial n, one folder a seed
+<dir>/<sweep>/table.txt, curves.png     the result
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from palaestra.local.errors import Refused
+from palaestra.local.files import storage, write
+from palaestra.sweeps.model import Sweep
+from palaestra.sweeps.trial import Figures, Point, RunFigures, State
+
+RECORD = "sweep.yaml"
+TRIALS = "trials.jsonl"
+MUTABLE = {"trials"}
+
+
+def begin(folder: Path, sweep: Sweep) -> None:
+    """Write the Sweep into its folder; one that is there must be the same, but for `trials`.
+
+    Raises:
+        Refused: the folder has another sweep.
+        StorageFailed: it cannot be written.
+    """
+    record = sweep.model_dump(mode="json", by_alias=True, exclude_none=True)
+    path = folder / RECORD
+    if path.exists():
+        before = yaml.safe_load(path.read_bytes())
+        if changes := [field for field in _fields(before, record) if field not in MUTABLE]:
+            named = ", ".join(f"spec.{field}" for field in changes)
+            raise Refused(
+                f"{named}: not as when the sweep in {folder} was begun; "
+                "change it back, give the sweep another name, or choose another folder with --dir"
+            )
+    write(path, yaml.safe_dump(record, sort_keys=False).encode())
+
+
+def ended(folder: Path) -> Mapping[int, Figures]:
+    """Return the trials that have ended, by number; the last line about a trial counts."""
+    path = folder / TRIALS
+    if not path.exists():
+        return {}
+    *lines, _ = path.read_text().split("\n")  # the last is empty, or was cut by a crash
+    return {line["trial"]: _figures(line) for line in map(json.loads, lines)}
+
+
+def note(folder: Path, number: int, figures: Figures) -> None:
+    """Append the end of a trial.
+
+    Raises:
+        StorageFailed: it cannot be written.
+    """
+    line = {"trial": number, **asdict(figures)}
+    with storage(folder / TRIALS), (folder / TRIALS).open("a") as file:
+        file.write(json.dumps(line) + "\n")
+
+
+def _fields(before: Any, now: Mapping[str, Any]) -> list[str]:
+    old = before.get("spec", {}) if isinstance(before, dict) else {}
+    new = now["spec"]
+    return [field for field in sorted(old.keys() | new.keys()) if old.get(field) != new.get(field)]
+
+
+def _figures(line: Mapping[str, Any]) -> Figures:
+    runs = tuple(
+        RunFigures(**{**run, "curve": tuple(Point(**point) for point in run["curve"])})
+        for run in line["runs"]
+    )
+    return Figures(state=State(line["state"]), runs=runs)

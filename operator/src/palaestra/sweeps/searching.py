@@ -1,0 +1,53 @@
+"""The order of trials: which one comes next, and whether one is worth going on."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
+
+from palaestra.sweeps.trial import Figures, State, Trial
+
+
+class Search(Protocol):
+    """Chooses trials, and learns from those that have ended."""
+
+    @property
+    def known(self) -> Sequence[Trial]:
+        """Return all trials that are known by now, in order."""
+        ...
+
+    def next(self) -> Trial | None:
+        """Return the next trial; None if there is none, or none before another has ended."""
+        ...
+
+    def hopeless(self, trial: Trial, figures: Figures) -> bool:
+        """Return whether a trial that runs should be pruned."""
+        ...
+
+    def learn(self, trial: Trial, figures: Figures) -> None:
+        """Note the end of a trial."""
+        ...
+
+
+class InTurn:
+    """Every trial of a list, in order, without those that are complete."""
+
+    def __init__(self, trials: Iterable[Trial], ended: Mapping[int, Figures]) -> None:
+        self.known: Sequence[Trial] = tuple(trials)
+        self._left: Iterator[Trial] = iter(
+            [
+                trial
+                for trial in self.known
+                if not (old := ended.get(trial.number)) or old.state is State.FAILED
+            ]
+        )
+
+    def next(self) -> Trial | None:
+        """Return the next trial."""
+        return next(self._left, None)
+
+    def hopeless(self, trial: Trial, figures: Figures) -> bool:
+        """Return False: each trial counts."""
+        del trial, figures
+        return False
+
+    def learn(self, trial: Trial, figures: Figures) -> None:
+        """Return at once: the list stays as it is."""

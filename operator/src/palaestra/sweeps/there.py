@@ -1,0 +1,116 @@
+"""Trials in a cluster: TrainingJobs with a label in common, which the operator and a queue run.
+
+They need no command that runs. This one creates them, reads their status, and deletes those of pruned trials.
+"""
+
+import time
+from collections.abc import Mapping
+
+from palaestra.api import TrainingJob
+from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
+from palaestra.client import Client, ClientError, NoSuchJob
+from palaestra.client.waiting import current
+from palaestra.errors import PalaestraError
+from palaestra.sweeps.model import LABEL
+from palaestra.sweeps.trial import Figures, Point, RunFigures, State, Trial
+
+LOOK_S = 5.0  # the operator writes a status every 30 s at most
+DELETED_S = 300.0
+
+
+class NotOfThisSweep(ClientError):
+    """A job of a trial's name exists that is not of the sweep."""
+
+
+class There:
+    """The TrainingJobs of a sweep in a namespace.
+
+    Args:
+        client: of the cluster and namespace.
+        sweep: its name.
+        at_once: trials at the same time; None: all, and the queue decides.
+        look_s: seconds between two looks.
+    """
+
+    def __init__(self, client: Client, sweep: str, at_once: int | None, look_s: float = LOOK_S) -> None:
+        self._client = client
+        self._selector = f"{LABEL}={sweep}"
+        self._at_once = at_once
+        self._look_s = look_s
+        self._begun: set[int] = set()
+        self._jobs: Mapping[str, TrainingJob] = {}
+        self._curves: dict[tuple[int, int], tuple[Point, ...]] = {}
+
+    def check(self, job: TrainingJob) -> None:
+        """Check that the job of a trial is for the namespace.
+
+        Raises:
+            PalaestraError: it names another one.
+        """
+        named = job.metadata.namespace if "namespace" in job.metadata.model_fields_set else None
+        if named not in {None, self._client.namespace}:
+            raise PalaestraError(
+                f"metadata.namespace: is {named}, and the sweep is for {self._client.namespace}; "
+                "choose the namespace with -n"
+            )
+
+    def has_room(self) -> bool:
+        """Return whether another trial can begin."""
+        return self._at_once is None or len(self._begun) < self._at_once
+
+    def begin(self, trial: Trial) -> None:
+        """Create the job of a trial, unless it exists.
+
+        Raises:
+            NotOfThisSweep: a job of this name is not of the sweep.
+        """
+        try:
+            found = self._client.get(trial.name)
+        except NoSuchJob:
+            pass
+        else:
+            if found.metadata.labels.get(LABEL) != trial.job.metadata.labels[LABEL]:
+                raise NotOfThisSweep(
+                    f"job {trial.name}: exists in namespace {self._client.namespace}, not of this sweep; "
+                    "give the sweep another name"
+                )
+        self._client.apply(trial.job)
+        self._begun.add(trial.number)
+
+    def wait(self) -> None:
+        """Return after some seconds, with the newest status of every job."""
+        time.sleep(self._look_s)
+        self._jobs = {job.metadata.name: job for job in self._client.list(self._selector)}
+
+    def look(self, trial: Trial) -> Figures:
+        """Return the figures of a trial by the status of its job; a job that was deleted has failed."""
+        job = self._jobs.get(trial.name)
+        if job is None:
+            return Figures(state=State.FAILED)
+        runs = tuple(self._figures(trial, replica) for replica in job.status.replicas)
+        if not current(job) or job.status.phase not in TERMINAL:
+            return Figures(state=State.RUNNING, runs=runs)
+        self._begun.discard(trial.number)
+        done = job.status.phase is Phase.SUCCEEDED
+        return Figures(state=State.COMPLETE if done else State.FAILED, runs=runs)
+
+    def prune(self, trial: Trial) -> None:
+        """Delete the job of a trial and wait until its pods are gone."""
+        self._begun.discard(trial.number)
+        self._client.delete(trial.name, deadline_s=DELETED_S)
+
+    def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:
+        """Return the figures of a replica; each change of them is a point of its curve."""
+        key = (trial.number, status.index)
+        curve = self._curves.get(key, ())
+        rate, mean = status.success_rate, status.mean_return
+        last = (curve[-1].success_rate, curve[-1].mean_return) if curve else (None, None)
+        if status.step is not None and (rate, mean) != last:
+            curve = (*curve, Point(step=status.step, success_rate=rate, mean_return=mean))
+            self._curves[key] = curve
+        return RunFigures(
+            curve=curve,
+            success_rate=rate,
+            ended=status.phase in TERMINAL,
+            succeeded=status.phase is Phase.SUCCEEDED,
+        )

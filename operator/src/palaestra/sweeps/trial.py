@@ -1,0 +1,106 @@
+"""One trial of a sweep, and the figures of its runs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from statistics import median
+from typing import Any, Self
+
+from palaestra.api import TrainingJob
+from palaestra.sweeps.model import Objective
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """The values of the fields that differ, and the job with them; it has a replica for each seed."""
+
+    number: int
+    changes: Mapping[str, Any]
+    job: TrainingJob
+
+    @property
+    def name(self) -> str:
+        """Return the name of the job."""
+        return self.job.metadata.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Point:
+    """The figures of one evaluation; None: not reported."""
+
+    step: int
+    success_rate: float | None
+    mean_return: float | None
+
+    def value(self, objective: Objective) -> float | None:
+        """Return the figure that counts."""
+        return self.success_rate if objective is Objective.SUCCESS_RATE else self.mean_return
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunFigures:
+    """One run of a trial: its evaluations in order, and its result by objective; None: none yet."""
+
+    curve: tuple[Point, ...] = ()
+    success_rate: float | None = None
+    ended: bool = False
+    succeeded: bool = False
+
+    def at(self, step: int, objective: Objective) -> float | None:
+        """Return the newest figure at a step; None if there is none yet, or the curve ends before."""
+        if not self.curve or self.curve[-1].step < step:
+            return None
+        newest = next((point for point in reversed(self.curve) if point.step <= step), None)
+        return None if newest is None else newest.value(objective)
+
+    def value(self, objective: Objective) -> float | None:
+        """Return the result: the policy's if it was measured at the end, else that of the last evaluation."""
+        if objective is Objective.SUCCESS_RATE and self.success_rate is not None:
+            return self.success_rate
+        return self.curve[-1].value(objective) if self.curve else None
+
+
+class State(StrEnum):
+    """How far a trial has come."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    COMPLETE = "complete"
+    FAILED = "failed"
+    PRUNED = "pruned"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figures:
+    """The runs of a trial, by seed, and its state."""
+
+    state: State
+    runs: tuple[RunFigures, ...] = ()
+
+    @classmethod
+    def of(cls, runs: tuple[RunFigures, ...]) -> Self:
+        """Return the figures of runs that nobody pruned."""
+        if not all(run.ended for run in runs):
+            return cls(state=State.RUNNING, runs=runs)
+        done = all(run.succeeded for run in runs)
+        return cls(state=State.COMPLETE if done else State.FAILED, runs=runs)
+
+    def values(self, objective: Objective) -> tuple[float, ...]:
+        """Return the known results, one a seed."""
+        return tuple(value for run in self.runs if (value := run.value(objective)) is not None)
+
+    def median(self, objective: Objective) -> float | None:
+        """Return the median of the known results; None if there is none."""
+        values = self.values(objective)
+        return median(values) if values else None
+
+    def common(self, objective: Objective) -> Mapping[int, float]:
+        """Return the median over all seeds by step, as far as the figures of every run go."""
+        steps = {point.step for run in self.runs for point in run.curve}
+        values = {step: self.at(step, objective) for step in sorted(steps)}
+        return {step: median(found) for step, found in values.items() if len(found) == len(self.runs)}
+
+    def at(self, step: int, objective: Objective) -> tuple[float, ...]:
+        """Return the newest figure of each run at a step, for the runs whose figures go that far."""
+        values = (run.at(step, objective) for run in self.runs)
+        return tuple(value for value in values if value is not None)

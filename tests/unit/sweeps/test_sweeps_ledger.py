@@ -1,0 +1,20 @@
+"""The folder of a sweep belongs to one sweep."""
+
+import pytest
+
+from palaestra.local.errors import Refused
+from palaestra.sweeps import ledger
+
+RANDOM = {"random": {"seed": {"low": 1, "high": 9}}}
+
+
+def test_more_trials_are_the_same_sweep_and_other_values_are_not(sweep, tmp_path) -> None:
+    """Results of two sweeps in one table would be of none."""
+    folder = tmp_path / "s"
+    ledger.begin(folder, sweep(**RANDOM, trials=3))
+    ledger.begin(folder, sweep(**RANDOM, trials=5))
+
+    with pytest.raises(
+        Refused, match=r"spec\.random, spec\.seed: not as when the sweep in .* was begun; change"
+    ):
+        ledger.begin(folder, sweep(random={"seed": {"low": 2, "high": 9}}, seed=2, trials=5))

@@ -1,0 +1,50 @@
+"""The result: medians and quartiles over seeds, as text and as a picture."""
+
+from palaestra.sweeps.drawing import draw
+from palaestra.sweeps.model import Objective
+from palaestra.sweeps.table import Row, lines
+from palaestra.sweeps.trial import Figures, State
+from tests.unit.sweeps.conftest import figures
+
+RATE = Objective.SUCCESS_RATE
+ROWS = [
+    Row(
+        name="s-0",
+        changes={"trainer.a": 1e-4, "b": "x"},
+        figures=figures({5: 0.2, 10: 0.4}, {5: 0.0, 10: 0.8}),
+    ),
+    Row(name="s-1", changes={"trainer.a": 1e-3, "b": "x"}, figures=figures({5: 0.9}, {5: 0.7}, {5: 0.8})),
+    Row(name="s-2", changes={"trainer.a": 1e-2, "b": "x"}, figures=figures({5: 1.0}, succeeded=False)),
+    Row(name="s-3", changes={"trainer.a": 0.1, "b": "x"}, figures=Figures(state=State.WAITING)),
+]
+
+
+def test_the_table_has_median_and_quartiles_and_the_best_complete_trial() -> None:
+    """A trial that failed is not the best one, whatever it had reached."""
+    assert list(lines(ROWS, RATE)) == [
+        "trial  a       b  state     seeds  success rate  quartiles",
+        "s-0    0.0001  x  complete  2/2    0.6           0.5 to 0.7",
+        "s-1    0.001   x  complete  3/3    0.8           0.75 to 0.85",
+        "s-2    0.01    x  failed    0/1    1             1 to 1",
+        "s-3    0.1     x  waiting   -      -             -",
+        "",
+        "best: s-1, trainer.a = 0.001, b = x",
+    ]
+
+
+def test_a_curve_goes_as_far_as_all_of_its_seeds() -> None:
+    """A median over those that are ahead would compare seeds, not settings."""
+    found = figures({5: 0.2, 10: 0.4, 15: 1.0}, {4: 0.1, 10: 0.8}, ended=False)
+
+    assert found.common(RATE) == {5: 0.15000000000000002, 10: 0.6000000000000001}
+    assert found.state is State.RUNNING
+    assert found.common(Objective.MEAN_RETURN)[10] == -0.6000000000000001
+
+
+def test_curves_are_drawn_where_there_are_some(tmp_path) -> None:
+    """A sweep that was interrupted at once has no picture."""
+    assert draw(ROWS, RATE, tmp_path / "curves.png")
+    assert not draw(ROWS[3:], RATE, tmp_path / "none.png")
+
+    assert (tmp_path / "curves.png").read_bytes().startswith(b"\x89PNG")
+    assert not (tmp_path / "none.png").exists()
