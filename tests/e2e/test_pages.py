@@ -1,4 +1,4 @@
-"""docs/install.md and docs/tools.md on the real cluster: every command as it stands, from top to bottom.
+"""docs/install.md, docs/tools.md and docs/sweeps.md on the real cluster: every command as it stands.
 
 docs/queues.md is typed by tests/e2e/test_kueue.py, which needs its cluster for longer.
 """
@@ -25,6 +25,7 @@ SESSION_S = 800  # a small training, with a pause
 RUNS = "from urllib.request import urlopen; print(urlopen('http://127.0.0.1:6006/data/runs').read())"
 INSTALL = (ROOT / "docs" / "install.md").read_text()
 TOOLS = (ROOT / "docs" / "tools.md").read_text()
+SWEEPS = (ROOT / "docs" / "sweeps.md").read_text()
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
 NAMESPACES = (LAB, "robots", "drones")  # of the page, besides that of the operator
 TENSORBOARD, NOTEBOOKS = "palaestra-tensorboard", "palaestra-jupyter"
@@ -153,3 +154,17 @@ def test_the_script_of_the_tools_trains(at_home, namespace, tmp_path):
 
     assert "Succeeded 2000 " in printed
     assert namespace.select("trainingjobs") == []
+
+
+@pytest.mark.comes_late  # after the long run, whose operator is killed again and again
+@pytest.mark.timeout(900)
+def test_the_sweep_of_the_page_trains_in_the_cluster(at_home, namespace, tmp_path):
+    """Two trials with two seeds each, compared, listed by their label and deleted."""
+    [sweep] = blocks(SWEEPS, "yaml sweep")
+    (tmp_path / "sweep.yaml").write_text(sweep)
+
+    printed = "".join(at_home.type_in(block, SESSION_S) for block in blocks(SWEEPS, "sh"))
+
+    assert "best: rates-" in printed
+    assert (tmp_path / "runs/rates/table.txt").is_file()
+    namespace.wait(lambda: namespace.select("trainingjobs") == [])

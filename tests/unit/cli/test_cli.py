@@ -303,7 +303,7 @@ def test_the_first_help_has_the_exit_codes_of_all_commands(capsys):
 
     out = " ".join(capsys.readouterr().out.split())
     assert "exit codes of all commands: 0 done 1 failed, or the cluster has no such job" in out
-    assert "75, 80, 81, 82 of `run` only" in out
+    assert "75 of `run` and `sweep`: interrupted after a checkpoint 80, 81, 82 of `run` only" in out
     assert "`COMMAND --help` explains the exit codes of one command" in out
 
 

@@ -156,7 +156,9 @@ def _extra(module: str, purpose: str) -> Any:
     try:
         return import_module(f"palaestra.sweeps.{module}")
     except ModuleNotFoundError as error:
-        raise PalaestraError(f"{purpose}: needs {error.name}; install palaestra[sweeps]") from error
+        raise PalaestraError(
+            f"{purpose}: needs {error.name}; install palaestra[sweeps] (`make setup` does)"
+        ) from error
 
 
 def _say(line: str) -> None:

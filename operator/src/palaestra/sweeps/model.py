@@ -86,7 +86,7 @@ class Optuna(ApiModel):
 
 
 class SweepSpec(ApiModel):
-    """What is tried."""
+    """The job, the values to try, and how they are compared."""
 
     job: str | dict[str, Any]
     """The TrainingJob, or the path of its file, relative to the file of the Sweep."""

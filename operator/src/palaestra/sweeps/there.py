@@ -10,6 +10,7 @@ from palaestra.api import TrainingJob
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
 from palaestra.client import Client, ClientError, NoSuchJob
 from palaestra.client.waiting import current
+from palaestra.cluster import ApiError
 from palaestra.errors import PalaestraError
 from palaestra.sweeps.model import LABEL
 from palaestra.sweeps.trial import Figures, Point, RunFigures, State, Trial
@@ -78,9 +79,16 @@ class There:
         self._begun.add(trial.number)
 
     def wait(self) -> None:
-        """Return after some seconds, with the newest status of every job."""
-        time.sleep(self._look_s)
-        self._jobs = {job.metadata.name: job for job in self._client.list(self._selector)}
+        """Return after some seconds with the newest status of every job; ask a busy API server again."""
+        while True:
+            time.sleep(self._look_s)
+            try:
+                self._jobs = {job.metadata.name: job for job in self._client.list(self._selector)}
+            except ApiError as error:
+                if not error.retryable:
+                    raise
+            else:
+                return
 
     def look(self, trial: Trial) -> Figures:
         """Return the figures of a trial by the status of its job; a job that was deleted has failed."""

@@ -1,0 +1,61 @@
+"""`palaestra sweep`, as far as it goes without a run."""
+
+import sys
+
+import pytest
+import yaml
+
+from palaestra.cli import main
+
+SWEEP = {
+    "apiVersion": "palaestra.dev/v1alpha1",
+    "kind": "Sweep",
+    "metadata": {"name": "s"},
+    "spec": {"job": "job.yaml", "random": {"seed": {"low": 1, "high": 2}}, "trials": 2, "optuna": {}},
+}
+JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}, "spec": {}}
+
+
+@pytest.fixture
+def file(tmp_path):
+    """A file with a sweep; the file of its job is missing."""
+    path = tmp_path / "sweep.yaml"
+    path.write_text(yaml.safe_dump(SWEEP))
+    return path
+
+
+def test_help_has_its_own_exit_codes(capsys):
+    """75 means for a sweep what it means for a run."""
+    with pytest.raises(SystemExit):
+        main(["sweep", "--help"])
+
+    out = " ".join(capsys.readouterr().out.split())
+    assert "75 interrupted after checkpoints; run the same command to resume" in out
+    assert "palaestra.dev/sweep=<sweep>" in out
+
+
+@pytest.mark.parametrize("option", ["--namespace=lab", "--context=c", "--kubeconfig=k"])
+def test_an_option_for_a_cluster_without_one_is_refused(file, option, capsys):
+    """Training here, while a cluster was meant, is found hours later."""
+    assert main(["sweep", str(file), option]) == 2
+
+    assert capsys.readouterr().err.startswith("--cluster: is missing; give it too")
+
+
+def test_a_job_that_cannot_be_read_is_named(file, capsys):
+    """Its path is relative to the sweep, not to where the command is typed."""
+    assert main(["sweep", str(file)]) == 2
+
+    assert capsys.readouterr().err.startswith(f"{file.parent}/job.yaml: No such file or directory; name a")
+
+
+def test_a_search_without_optuna_names_the_extra(file, tmp_path, monkeypatch, capsys):
+    """Before anything is started or written."""
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(JOB))
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    monkeypatch.delitem(sys.modules, "palaestra.sweeps.suggesting", raising=False)
+
+    assert main(["sweep", str(file), "--dir", str(tmp_path / "runs")]) == 2
+
+    assert "spec.optuna: needs optuna; install palaestra[sweeps]" in capsys.readouterr().err
+    assert not (tmp_path / "runs").exists()
