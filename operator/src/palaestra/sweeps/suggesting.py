@@ -59,15 +59,12 @@ class Suggested:
 
     def hopeless(self, trial: Trial, figures: Figures) -> bool:
         """Report the medians over the seeds so far; return whether Optuna prunes the trial."""
-        asked, reported = self._asked[trial.number], self._reported.setdefault(trial.number, set())
-        for step, value in figures.common(self._sweep.spec.objective).items():
-            if step not in reported:
-                asked.report(value, step)
-                reported.add(step)
-        return asked.should_prune()
+        self._report(trial, figures)
+        return self._asked[trial.number].should_prune()
 
     def learn(self, trial: Trial, figures: Figures) -> None:
         """Report the median result; a trial without one has failed."""
+        self._report(trial, figures)  # a short trial may have ended before it was looked at
         asked, value = self._asked.pop(trial.number), figures.median(self._sweep.spec.objective)
         if figures.state is State.PRUNED:
             self._study.tell(asked, state=TrialState.PRUNED)
@@ -75,6 +72,14 @@ class Suggested:
             self._study.tell(asked, value)
         else:
             self._study.tell(asked, state=TrialState.FAIL)
+
+    def _report(self, trial: Trial, figures: Figures) -> None:
+        """Report the medians over the seeds that are new."""
+        asked, reported = self._asked[trial.number], self._reported.setdefault(trial.number, set())
+        for step, value in figures.common(self._sweep.spec.objective).items():
+            if step not in reported:
+                asked.report(value, step)
+                reported.add(step)
 
     def _know(self, number: int | None, values: Mapping[str, Any]) -> Trial | None:
         """Return a trial by its number; None if it was interrupted before it had one."""
