@@ -16,8 +16,8 @@ __all__ = ["main"]
 
 # Modules with commands, in the order of the help. The operator runs for months and imports only its own.
 COMMANDS = (
-    "run", "sweep", "exporting", "documents", "operator", "looking", "watching", "changing", "fetching", "doctor",
-    "trial",
+    "run", "sweep", "exporting", "documents", "operator", "looking", "watching", "changing", "fetching",
+    "doctor", "trial",
 )  # fmt: skip
 OPERATOR = ["operator"]
 
