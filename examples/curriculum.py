@@ -1,6 +1,6 @@
 """A curriculum with domain randomization: MoveToTargetEnv in a world that gets harder while the robot learns.
 
-    PYTHONPATH=examples palaestra run manifests/examples/curriculum.yaml
+    palaestra run manifests/examples/curriculum.yaml
 
 `level` grows from 0 to 1 in the first half of training. With it grow the number of cylinders on the floor and
 their distance from their places, the noise of the distance sensors, the slip of the wheels, and how often a

@@ -10,7 +10,7 @@ from tests.soak import resume
 from tests.soak.jobs import make_job
 
 STEPS = 900  # `make soak` takes more
-SEEING_STEPS = 384
+SEEING_STEPS = 768
 SEEING = {"builtin": "seeing"}
 PPO = {"n_steps": 64, "batch_size": 64, "n_epochs": 1}
 
@@ -30,7 +30,7 @@ def test_an_interrupted_run_that_sees_ends_as_one_that_was_not(tmp_path, monkeyp
     """Its observations are pictures, which a new simulator has to draw as the first one would have."""
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
 
-    assert_resumes_exactly(tmp_path, seeing(), SEEING_STEPS // 3)
+    assert_resumes_exactly(tmp_path, seeing(), SEEING_STEPS // 6)
 
 
 def seeing():
@@ -42,7 +42,7 @@ def seeing():
         algorithm={"name": "PPO", "cnn": "small", "hyperparameters": PPO},
         steps=SEEING_STEPS,
         evaluation={"everySteps": SEEING_STEPS // 2, "episodes": 2, "confirmEpisodes": 0},
-        checkpoint={"everySteps": SEEING_STEPS // 6, "keep": 3},
+        checkpoint={"everySteps": SEEING_STEPS // 12, "keep": 3},
     )
 
 

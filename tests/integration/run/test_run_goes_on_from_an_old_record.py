@@ -13,7 +13,10 @@ PATIENCE_S = 240.0  # it takes 20 s on a machine of its own
 
 
 def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_a5276f3(tmp_path):
-    """The machine was upgraded between Ctrl-C and the same command again."""
+    """The machine was upgraded between Ctrl-C and the same command again.
+
+    Its unfinished episodes cannot be replayed: a5276f3 drew their starts before it knew what stands where.
+    """
     record = yaml.safe_load((OLD / rundir.RECORD).read_text())
     run = LocalRun(tmp_path, {**record, "metadata": {"name": record["metadata"]["name"]}})
     shutil.copytree(OLD, run.directory)
@@ -26,5 +29,5 @@ def test_a_run_of_two_collectors_goes_on_from_a_checkpoint_of_a5276f3(tmp_path):
 
     assert code == 0, output
     assert run.attempts() == ["new run", "resumed at step 200"]
-    assert "do not repeat" not in run.log()
+    assert run.log().count("do not repeat") == 1
     assert run.summary()["steps"] == 400

@@ -21,10 +21,10 @@ def test_what_simulators_leave_out_reaches_the_person_who_reads_the_run():
 
     with running(job) as run:
         left_out = run.wait_for_step(1)["left_out"]
-        output = run.output()
+        run.until(lambda: "simulators leave out nodes of their world" in run.output())
+        output = run.until(lambda: out if all(line in (out := run.output()) for line in left_out) else None)
 
     collect, evaluate = left_out
     assert re.fullmatch(LINE.format("collect"), collect)
     assert re.fullmatch(LINE.format("evaluate"), evaluate)
     assert [output.count(line) for line in left_out] == [1, 1]
-    assert "simulators leave out nodes of their world" in output

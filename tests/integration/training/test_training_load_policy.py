@@ -35,7 +35,7 @@ def test_a_loaded_policy_acts_on_raw_observations_as_it_did_in_its_run(
 
     made = gymnasium.make(by_run.environment_id, simulator=fake_arena, **by_run.environment_options)
     assert made.unwrapped.options.max_steps == 30
-    assert (by_run.scale is None) is (normalize is None)
+    assert bool(by_run.scales) is (normalize is not None)
     for seed in range(20):
         observation, _ = made.reset(seed=seed)
         expected, _ = policy_of(trained).predict(observation, deterministic=True)
