@@ -128,7 +128,7 @@ def test_the_progress_is_what_the_trainer_reports(job, tmp_path):
 
 
 def test_a_second_run_of_the_same_directory_is_refused_at_once(job, tmp_path):
-    """Not in a log that nobody reads."""
+    """The call raises it; the log is not the only place."""
     with palaestra.run(job(WAIT), runs=tmp_path) as run:
         with pytest.raises(Refused, match="is at work there"):
             palaestra.run(job(WAIT), runs=tmp_path)

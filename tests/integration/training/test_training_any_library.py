@@ -136,7 +136,7 @@ def test_the_simulators_of_a_job_are_used_and_released(simulators):
 
 
 def test_ctrl_c_ends_everything_that_was_started(stubs):
-    """A simulator that stays would use a core until somebody notices."""
+    """A simulator that stays would keep a core busy."""
     stubs("")
     with subprocess.Popen(
         [sys.executable, "-c", LOOP], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

@@ -134,7 +134,7 @@ def test_mlflow_has_both_attempts_as_one_run_with_the_curves_of_tensorboard(serv
 
 
 def test_a_server_that_does_not_answer_ends_an_attempt_with_the_callback_s_name(write_job, play, monkeypatch):
-    """At its beginning, so that nobody waits for curves that never come."""
+    """The run ends at its beginning; otherwise its curves would be missing only at the end."""
     pytest.importorskip("mlflow", reason=INSTALL)
     monkeypatch.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
     callback = {"name": "palaestra_trainer.trackers.mlflow:MLflow", "options": {"uri": "http://127.0.0.1:9"}}

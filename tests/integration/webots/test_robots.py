@@ -67,7 +67,7 @@ def running(master, tmp_path):
 
 @pytest.mark.parametrize("kind", [TurtleBot3Burger, EPuck])
 def test_a_robot_on_two_wheels_passes_the_checks(running, kind):
-    """It drives as it is told, in the curve that its wheels allow."""
+    """It follows its commands, in the curve that its wheels allow."""
     world = builtin("court")
     if kind is EPuck:
         world = world.replace(b"turtlebot/protos/TurtleBot3Burger.proto", b"e-puck/protos/E-puck.proto")

@@ -95,7 +95,7 @@ def held(scene):
             "ClaimNotForJobs",
             "spec.trainer.initialPolicy.claim: PersistentVolumeClaim policies is not for jobs; "
             'label it palaestra.dev/for-jobs: "true"',
-            id="a policy of somebody else",
+            id="a policy without the label",
         ),
         pytest.param(
             {"scheduling": {"queueName": "robots"}},

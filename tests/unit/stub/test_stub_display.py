@@ -161,7 +161,7 @@ def test_a_picture_is_mixed_with_what_is_there_only_if_it_blends(painter):
 
 
 def test_a_copy_ends_at_the_edge_of_the_display(painter):
-    """What is beyond is not part of it."""
+    """Pixels beyond the edge are left out."""
     robot, picture = painter
     robot.call("screen/draw_pixel", x1=7, y1=5)
     image = robot.get("screen/image_copy", x=7, y=5, width=4, height=4)

@@ -199,7 +199,7 @@ def test_a_speaker_knows_the_languages_of_its_engine(pair):
 
 
 def test_a_pen_takes_its_ink(pair):
-    """What nobody sees is kept."""
+    """Its strokes are not drawn, but its services answer as in Webots."""
     here, _ = pair('Pen { name "pen" }', "")
 
     assert here.get("pen/write", value=False) is True

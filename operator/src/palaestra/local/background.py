@@ -27,7 +27,7 @@ from palaestra.local.run import Options, check
 from palaestra.plan import identified
 
 STOP_S = 90.0  # A pod has 60 s for its last checkpoint; the rest is for its processes.
-_RUNNING: set["Run"] = set()  # keeps a run that nobody holds from being collected
+_RUNNING: set["Run"] = set()  # a run lives on if the program drops its handle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -79,7 +79,7 @@ class Figures:
 
     @classmethod
     def of(cls, runs: tuple[RunFigures, ...]) -> Self:
-        """Return the figures of runs that nobody pruned."""
+        """Return the figures of runs that were not pruned."""
         if not all(run.ended for run in runs):
             return cls(state=State.RUNNING, runs=runs)
         done = all(run.succeeded for run in runs)

@@ -131,7 +131,7 @@ def test_goals_are_places_that_the_same_episode_reached(strategy):
 
 
 def test_nothing_is_sampled_before_an_episode_is_whole():
-    """Nobody can know how long it takes, so learning waits."""
+    """Its length is unknown before it ends, so learning waits."""
     buffer = buffer_of()
     add(buffer, (0,))
 

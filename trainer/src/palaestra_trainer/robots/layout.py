@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from palaestra_trainer.robots.geometry import Point
 
-REACH_M = 0.5  # robots are lower; what hangs higher is in nobody's way
+REACH_M = 0.5  # robots are lower, and pass below a thing that hangs higher
 SUNKEN_M = 0.001  # what rises less above the floor is a part of it
 
 

@@ -71,7 +71,7 @@ class RobotServices:
         return {"value": self._from_window.popleft() if self._from_window else ""}
 
     def _send_as_window(self, request: Any) -> Fields:
-        """Take a text as if the robot's window had sent it: nobody opens one here."""
+        """Queue a text for the controller, as the robot's window does in Webots."""
         if len(self._from_window) == _MOST_TEXTS:
             return {"success": False}
         self._from_window.append(request.value)
