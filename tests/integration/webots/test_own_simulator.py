@@ -49,6 +49,33 @@ def test_an_environment_that_sees_starts_mujoco_by_its_name_alone(make):
     assert image.std() > 0
 
 
+@pytest.mark.usefixtures("nothing_configured")
+@pytest.mark.parametrize("make", [gymnasium.make, palaestra_trainer.make_env], ids=["plain", "tolerant"])
+def test_an_environment_of_another_robot_starts_the_world_of_that_robot(make):
+    """`Navigate-v0` drives a TurtleBot3 in the world `court`."""
+    env = make("Navigate-v0")
+    first, _ = env.reset(seed=1)
+    env.close()
+
+    assert env.observation_space.contains(first)
+
+
+@pytest.mark.usefixtures("nothing_configured")
+def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program():
+    """The facade itself knows no robot."""
+    webots = Webots("burger", "court")
+    try:
+        env = gymnasium.make("Navigate-v0")
+        with webots:
+            first, _ = env.reset(seed=1)
+        env.close()
+    finally:
+        webots.stop()
+        webots.close()
+
+    assert env.observation_space.contains(first)
+
+
 @pytest.fixture
 def webots(nothing_configured):
     """A facade as a notebook creates it, closed with the test."""

@@ -48,7 +48,7 @@ def simulator_for(role: Role, world: str = "arena", driver: str = "stub") -> Con
         ConfigurationError: each simulator with this role has an environment, or MuJoCo is not installed.
         SimulatorFault: the simulator does not start.
     """
-    found = offered_simulator()
+    found = offered_simulator(world)
     if found is not None:
         name = found.webots.robot_name
         return Configured(name=name, robot=found.robot, scene=found.scene, release=found.release)

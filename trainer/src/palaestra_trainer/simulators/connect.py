@@ -6,18 +6,23 @@ starts sidecars of its own.
 
 from __future__ import annotations
 
+import os
 from functools import partial
 from pathlib import Path
 
 import palaestra_trainer.environments  # noqa: F401 - the import registers the shipped environments
-from palaestra_trainer.configuration import DEFAULT_ROBOT, Configuration, SimulatorConfiguration, load
+from palaestra_trainer.configuration import (
+    CONFIG_VARIABLE,
+    DEFAULT_ROBOT,
+    Configuration,
+    SimulatorConfiguration,
+    load,
+)
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.launching.sidecar import Sidecar
 from palaestra_trainer.robots.choosing import robot_class
-from palaestra_trainer.robots.differential import TurtleBot3Burger
-from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
 from palaestra_trainer.ros import ensure_node
 from palaestra_trainer.simulators.fleet import limit_of
@@ -70,12 +75,29 @@ def connect_here(configuration: Configuration, run: Path) -> list[Simulator]:
     ]
 
 
-# Worlds that ship: the ROS name of the supervisor in each, and the class of its robot.
-_WORLDS: dict[str, tuple[str, type[SimulatedRobot]]] = {
-    "arena": ("robotino", Robotino),
-    "seeing": ("robotino", Robotino),
-    "court": ("burger", TurtleBot3Burger),
+# Worlds that ship: the ROS name of the supervisor in each, and its robot as `trainer.robot` names it.
+_WORLDS: dict[str, tuple[str, str]] = {
+    "arena": ("robotino", DEFAULT_ROBOT),
+    "seeing": ("robotino", DEFAULT_ROBOT),
+    "court": ("burger", "TurtleBot3Burger"),
 }
+
+
+def robot_of(world: str) -> str:
+    """Return the robot in a world that ships, as `trainer.robot` names it."""
+    _, robot = _WORLDS[world]
+    return robot
+
+
+def robot_for(world: str) -> type[SimulatedRobot]:
+    """Return the class of the robot of PALAESTRA_CONFIG; without that, of the one in a world that ships.
+
+    Raises:
+        ConfigurationError: the configuration cannot be read, or names no such class.
+    """
+    if os.environ.get(CONFIG_VARIABLE):
+        return robot_class(load().robot or DEFAULT_ROBOT)
+    return robot_class(robot_of(world))
 
 
 class OwnSimulator:
@@ -93,7 +115,7 @@ class OwnSimulator:
         supervisor, robot = _WORLDS[world]
         self.webots = Webots(supervisor, world, driver=driver)
         withdraw(self.webots)
-        self.robot = robot(self.webots)
+        self.robot = robot_class(robot)(self.webots)
         self.scene = SimulatedScene(self.webots, self.robot)
         try:
             self.webots.start()  # connects the robot too

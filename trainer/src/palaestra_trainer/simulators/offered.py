@@ -12,8 +12,8 @@ import gymnasium
 from palaestra_trainer.configuration import Environment as Wanted
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import SimulatorDead
-from palaestra_trainer.robots.robotino import Robotino
-from palaestra_trainer.robots.simulated import SimulatedScene
+from palaestra_trainer.robots.simulated import SimulatedRobot, SimulatedScene
+from palaestra_trainer.simulators.connect import robot_for
 from palaestra_trainer.simulators.member import Environment, Step
 from palaestra_trainer.webots import Webots
 from palaestra_trainer.webots.offers import give_back, offered, take
@@ -24,13 +24,17 @@ class Offered:
 
     The robot connects when the facade starts its simulator, or at once if it runs.
 
+    Args:
+        webots: the facade.
+        robot: the class of the robot in its world.
+
     Raises:
         SimulatorDead, SimulatorHung, WrongData: it runs, and the robot cannot connect.
     """
 
-    def __init__(self, webots: Webots) -> None:
+    def __init__(self, webots: Webots, robot: type[SimulatedRobot]) -> None:
         self.webots = webots
-        self.robot = Robotino(webots)
+        self.robot = robot(webots)
         self.scene = SimulatedScene(webots, self.robot)
         if webots.available():
             self.robot.connect()
@@ -42,10 +46,13 @@ class Offered:
         give_back(self.webots)
 
 
-def offered_simulator() -> Offered | None:
-    """Return the newest facade that no environment uses; None: this process has none."""
+def offered_simulator(world: str) -> Offered | None:
+    """Return the newest facade that no environment uses; None: this process has none.
+
+    Its robot is that of PALAESTRA_CONFIG; without that, the one in the world that ships for the environment.
+    """
     webots = offered()
-    return None if webots is None else Offered(webots)
+    return None if webots is None else Offered(webots, robot_for(world))
 
 
 class OfferedMember:

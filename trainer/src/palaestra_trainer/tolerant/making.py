@@ -23,7 +23,7 @@ from palaestra_trainer.launching.process import ProcessLauncher
 from palaestra_trainer.run.reporting import Reported, reported
 from palaestra_trainer.simulators.allocation import allocate
 from palaestra_trainer.simulators.configured import require_driver
-from palaestra_trainer.simulators.connect import connect_members, simulator_at
+from palaestra_trainer.simulators.connect import connect_members, robot_of, simulator_at
 from palaestra_trainer.simulators.entry_point import own_world
 from palaestra_trainer.simulators.fleet import Fleet
 from palaestra_trainer.simulators.keeper import Keeper
@@ -60,12 +60,14 @@ def make_players(wanted: Environment | None, number: int | None, role: Role) -> 
         raise ConfigurationError(
             f"environment: none was given, and {CONFIG_VARIABLE} is not set; give the id of an environment"
         )
-    place = offered_simulator() if number in {None, 1} else None
+    world, driver = own_world(environment.id)
+    place = offered_simulator(world) if number in {None, 1} else None
     if place is not None:
         return _in_facade(place, environment)
     if configuration is not None:
         return _in_job(configuration.model_copy(update={"environment": environment}), number, role)
-    return _in_own(environment, number or 1)
+    require_driver(driver)
+    return _in_own(environment, number or 1, world, driver)
 
 
 def _in_facade(place: Offered, environment: Environment) -> Players:
@@ -97,9 +99,7 @@ def _in_job(configuration: Configuration, number: int | None, role: Role) -> Pla
         )
 
 
-def _in_own(environment: Environment, number: int) -> Players:
-    world, driver = own_world(environment.id)
-    require_driver(driver)
+def _in_own(environment: Environment, number: int, world: str, driver: str) -> Players:
     entries = tuple(
         SimulatorConfiguration(
             name=f"collect-{index}",
@@ -111,7 +111,9 @@ def _in_own(environment: Environment, number: int) -> Players:
         )
         for index in range(number)
     )
-    configuration = Configuration(job="own", environment=environment, steps=1, simulators=entries)
+    configuration = Configuration(
+        job="own", environment=environment, steps=1, simulators=entries, robot=robot_of(world)
+    )
     with ExitStack() as stack:
         members = []
         for entry in entries:
