@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final, Protocol
 
@@ -110,15 +110,7 @@ class Movies:
         frames_s = Fraction(1000 * movie.acceleration, self._every_ms)
         self._eye.open()
         try:
-            self._film = self._new_film(
-                Movie(
-                    path=movie.path,
-                    size=movie.size,
-                    quality=movie.quality,
-                    acceleration=movie.acceleration,
-                    frames_s=frames_s,
-                )
-            )
+            self._film = self._new_film(replace(movie, frames_s=frames_s))
         except OSError as error:
             log.warning("movie %s: %s", movie.path, error.strerror or error)
         self._elapsed_ms = 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from palaestra_trainer.robots.capabilities import Distances, Scanner, Steering
 from palaestra_trainer.robots.scanning import scan_of
 from palaestra_trainer.robots.simulated import MobileRobot
-from palaestra_trainer.webots import DistanceSensor, Lidar, Motor, Webots, set_velocities
+from palaestra_trainer.webots import DistanceSensor, Lidar, Motor, set_velocities
 
 
 class DifferentialDrive(MobileRobot, Steering):
@@ -32,15 +31,8 @@ class DifferentialDrive(MobileRobot, Steering):
     axle_m: ClassVar[float]
     wheel_rad_s: ClassVar[float]
 
-    def __init__(
-        self,
-        webots: Webots,
-        node_name: str | None = None,
-        definition: str | None = None,
-        period_ms: int | None = None,
-        robots: Iterable[str] = (),
-    ) -> None:
-        super().__init__(webots, node_name, definition, period_ms, robots)
+    def equip(self) -> None:
+        """Add the wheels."""
         self._wheels = tuple(Motor(self.node_name, wheel) for wheel in self.wheels)
         self.simulation.add((), self._wheels)
 
@@ -74,15 +66,9 @@ class TurtleBot3Burger(DifferentialDrive, Scanner):
     scan_view_rad = 2.0 * math.pi
     scan_range_m = (0.12, 3.5)
 
-    def __init__(
-        self,
-        webots: Webots,
-        node_name: str | None = None,
-        definition: str | None = None,
-        period_ms: int | None = None,
-        robots: Iterable[str] = (),
-    ) -> None:
-        super().__init__(webots, node_name, definition, period_ms, robots)
+    def equip(self) -> None:
+        """Add the wheels; the scanner is optional."""
+        super().equip()
         self._laser = Lidar(self.node_name, self.laser)
 
     def use_scanner(self) -> None:
@@ -121,15 +107,9 @@ class EPuck(DifferentialDrive, Distances):
     )
     distance_range_m = (0.0, 0.07)
 
-    def __init__(
-        self,
-        webots: Webots,
-        node_name: str | None = None,
-        definition: str | None = None,
-        period_ms: int | None = None,
-        robots: Iterable[str] = (),
-    ) -> None:
-        super().__init__(webots, node_name, definition, period_ms, robots)
+    def equip(self) -> None:
+        """Add the wheels and the distance sensors."""
+        super().equip()
         self._infrared = tuple(DistanceSensor(self.node_name, sensor) for sensor in self.infrared)
         self.simulation.add(self._infrared, ())
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from palaestra_trainer.robots.capabilities import Joints
 from palaestra_trainer.robots.simulated import SimulatedRobot
 from palaestra_trainer.ros import call_together
 from palaestra_trainer.waiting.turns import let_others
-from palaestra_trainer.webots import Command, Lever, PositionSensor, Webots
+from palaestra_trainer.webots import Command, Lever, PositionSensor
 
 
 class JointRobot(SimulatedRobot, Joints):
@@ -38,20 +38,16 @@ class JointRobot(SimulatedRobot, Joints):
     greatest: ClassVar[tuple[float, ...]] = ()
     commanded: ClassVar[Command] = "force"
 
-    def __init__(
-        self,
-        webots: Webots,
-        node_name: str | None = None,
-        definition: str | None = None,
-        period_ms: int | None = None,
-        robots: Iterable[str] = (),
-    ) -> None:
+    def __init__(self, *arguments: Any, **options: Any) -> None:
         if not self.motors or len(self.motors) != len(self.greatest):
             raise ConfigurationError(
                 f"trainer.robot: {type(self).__name__} has {len(self.motors)} motors and "
                 f"{len(self.greatest)} numbers in greatest; name motors in a subclass, with a number for each"
             )
-        super().__init__(webots, node_name, definition, period_ms, robots)
+        super().__init__(*arguments, **options)
+
+    def equip(self) -> None:
+        """Add the motors and sensors."""
         self._motors = tuple(Lever(self.node_name, motor, self.commanded) for motor in self.motors)
         self._sensors = tuple(PositionSensor(self.node_name, sensor) for sensor in self.sensors)
         self.simulation.add(self._sensors, self._motors)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -21,7 +21,6 @@ from palaestra_trainer.webots import (
     Motor,
     RangeFinder,
     TouchSensor,
-    Webots,
     set_velocities,
 )
 
@@ -69,15 +68,8 @@ class Robotino(MobileRobot, RobotinoAbc, Cameras, Scanner, Gripper, Forklift):
     scan_view_rad: ClassVar[float] = math.radians(220.0)
     scan_range_m: ClassVar[tuple[float, float]] = (0.02, 20.0)
 
-    def __init__(
-        self,
-        webots: Webots,
-        node_name: str | None = None,
-        definition: str | None = None,
-        period_ms: int | None = None,
-        robots: Iterable[str] = (),
-    ) -> None:
-        super().__init__(webots, node_name, definition, period_ms, robots)
+    def equip(self) -> None:
+        """Add the wheels, distance sensors and bumper; the rest is optional."""
         name = self.node_name
         self._wheels = tuple(Motor(name, wheel) for wheel in self.wheels)
         self._infrared = tuple(DistanceSensor(name, sensor) for sensor in self.infrared)

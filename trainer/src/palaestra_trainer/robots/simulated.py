@@ -31,6 +31,8 @@ PERIOD_MS = 192  # six basic steps of 32 ms
 class SimulatedRobot(RobotAbc):
     """A robot whose devices a simulator offers; `trainer.robot` names a subclass.
 
+    Its constructor calls `equip`, where a subclass adds its devices.
+
     Args:
         webots: the simulator. Each of its starts connects this robot, the newest of its name; if it runs
             already, `connect` must be called.
@@ -69,7 +71,11 @@ class SimulatedRobot(RobotAbc):
         self.simulation = Simulation(tuple(together), webots.supervisor, webots.observer, self.period_ms)
         if self.definition:
             self.simulation.track(self.definition)
+        self.equip()
         webots.at_start(name, self.connect)
+
+    def equip(self) -> None:
+        """Add sensors and motors to `simulation`; a subclass with devices overrides it."""
 
     @property
     def period_s(self) -> float:
