@@ -13,13 +13,14 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import NoSuchSensor, SimulatorDead
+from palaestra_trainer.errors import NoSuchSensor
 from palaestra_trainer.robots.base import RobotAbc
 from palaestra_trainer.robots.capabilities import Localization, Scanner, Steering
 from palaestra_trainer.robots.geometry import Point, Pose
 from palaestra_trainer.robots.layout import Layout, Obstacle
 from palaestra_trainer.testing.fake_robotino import wrapped
 from palaestra_trainer.testing.fake_scene import FakeScene
+from palaestra_trainer.testing.mortal import Mortal
 
 PERIOD_S = 0.192
 RAYS = 360
@@ -48,7 +49,7 @@ COURT = Layout(
 _Rays = NDArray[np.float64]
 
 
-class FakeBurger(RobotAbc, Steering, Localization, Scanner):
+class FakeBurger(Mortal, RobotAbc, Steering, Localization, Scanner):
     """A TurtleBot3 Burger, computed here.
 
     Args:
@@ -68,13 +69,11 @@ class FakeBurger(RobotAbc, Steering, Localization, Scanner):
     scan_range_m = (0.12, 3.5)
 
     def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
-        self._deaths = frozenset(deaths)
-        self._name = name
+        super().__init__(deaths, name)
         self.layout = COURT
         self.target: Point = (0.0, 0.0)
-        self._steps = 0
         self._heading_rad = 0.0
-        self._dead = self._scans = False
+        self._scans = False
         self.place(Pose(0.0, 0.0, 0.0), seed=0)
 
     @property
@@ -107,10 +106,7 @@ class FakeBurger(RobotAbc, Steering, Localization, Scanner):
 
     def advance(self) -> int:
         """Simulate one control period; there are never extra ones."""
-        self._live()
-        self._steps += 1
-        self._dead = self._steps in self._deaths
-        self._live()
+        self._live_a_step()
         forward, turn = self._wanted
         middle = self._heading_rad + 0.5 * turn * PERIOD_S
         self._x_m += forward * math.cos(middle) * PERIOD_S
@@ -127,14 +123,6 @@ class FakeBurger(RobotAbc, Steering, Localization, Scanner):
         self._wanted = (0.0, 0.0)
         self._random = np.random.default_rng(seed)
         self._look()
-
-    def restart(self) -> None:
-        """Bring the robot back to life."""
-        self._dead = False
-
-    def _live(self) -> None:
-        if self._dead:
-            raise SimulatorDead(self._name, f"died at step {self._steps}; restart it")
 
     def _slide(self) -> None:
         """Push the robot out of the walls and of the things that it hit."""

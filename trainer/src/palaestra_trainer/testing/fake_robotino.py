@@ -16,7 +16,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from palaestra_trainer.errors import NoSuchSensor, SimulatorDead
+from palaestra_trainer.errors import NoSuchSensor
 from palaestra_trainer.robots.base import RADIUS_M, SENSOR_RANGE_M, SENSORS, RobotinoAbc
 from palaestra_trainer.robots.capabilities import Cameras
 from palaestra_trainer.robots.geometry import Point, Pose, Twist
@@ -30,6 +30,7 @@ from palaestra_trainer.testing.fake_scene import (
     FakeScene,
     arena,
 )
+from palaestra_trainer.testing.mortal import Mortal
 
 BASIC_STEP_S = 0.032
 BASIC_STEPS = 6  # in one control period
@@ -37,7 +38,7 @@ ACCELERATIONS = (10.0, 6.0, 20.0)  # m/s2, m/s2, rad/s2. Source: Webots, robotin
 NOISE = 0.005  # of the reading. Source: GP2Y0A41 in Webots' model of the Robotino 3
 
 
-class FakeRobotino(RobotinoAbc):
+class FakeRobotino(Mortal, RobotinoAbc):
     """A Robotino on the arena's floor, computed here.
 
     Args:
@@ -51,13 +52,10 @@ class FakeRobotino(RobotinoAbc):
     """
 
     def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
-        self._deaths = frozenset(deaths)
-        self._name = name
+        super().__init__(deaths, name)
         self.cylinders: Sequence[Point] = ()
         self.layout = arena()
         self.target: Point = (0.0, 0.0)
-        self._steps = 0
-        self._dead = False
         self._wanted: Twist
         self._velocity: Twist
         self.place(Pose(0.0, 0.0, 0.0), seed=0)
@@ -99,10 +97,7 @@ class FakeRobotino(RobotinoAbc):
 
     def advance(self) -> int:
         """Simulate one control period; there are never extra ones."""
-        self._live()
-        self._steps += 1
-        self._dead = self._steps in self._deaths
-        self._live()
+        self._live_a_step()
         self._bumped = False
         for _ in range(BASIC_STEPS):
             self._speed_up()
@@ -119,14 +114,6 @@ class FakeRobotino(RobotinoAbc):
         self._bumped = False
         self._random = np.random.default_rng(seed)
         self._sense()
-
-    def restart(self) -> None:
-        """Bring the robot back to life."""
-        self._dead = False
-
-    def _live(self) -> None:
-        if self._dead:
-            raise SimulatorDead(self._name, f"died at step {self._steps}; restart it")
 
     def _speed_up(self) -> None:
         vx, vy, omega = (
