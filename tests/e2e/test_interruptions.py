@@ -60,8 +60,8 @@ def test_a_run_goes_on_from_its_checkpoint_after(interrupt, counted, namespace):
     assert namespace.wait_for_end("amid", LONG_S) == "Succeeded"
     replica = namespace.replica("amid")
     assert replica["step"] == STEPS
-    assert replica["attempt"] == 2
     assert replica["restarts"] == {"trainer": 0, "simulator": 0, "disruption": 0, "suspension": 0, counted: 1}
+    assert replica["attempt"] == 2
     assert [named(pod) for pod in namespace.pods("amid", live=False)] == [second]
 
 

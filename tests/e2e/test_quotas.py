@@ -10,8 +10,8 @@ from tests.e2e.namespace import LONG_S, Namespace, named
 
 pytestmark = [pytest.mark.after_the_kills, pytest.mark.timeout(600)]
 
-MISSING, URGENT = "palaestra-e2e-missing", "palaestra-e2e-urgent"
-OF_URGENT = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [URGENT]}]}
+MISSING, LIMITED, URGENT = "palaestra-e2e-missing", "palaestra-e2e-limited", "palaestra-e2e-urgent"
+OF_LIMITED = {"matchExpressions": [{"scopeName": "PriorityClass", "operator": "In", "values": [LIMITED]}]}
 PLACE = "palaestra.dev/place"  # a resource of which there is one
 IN_PLACE = {"resources": {"requests": {**LITTLE["requests"], PLACE: "1"}, "limits": {PLACE: "1"}}}
 WAITS_ONCE = (
@@ -49,9 +49,14 @@ class NoSuchClass(Refusal):
         place.cluster.create(self.kind, priority_class(MISSING))
 
 
-def priority_class(name: str) -> Object:
-    """Return a PriorityClass above the default."""
-    return {"metadata": {"name": name}, "value": 1000, "description": "Made by a test, and taken away."}
+def priority_class(name: str, preemption: str = "Never") -> Object:
+    """Return a PriorityClass above the default; on a full node, one that preempts ends other tests' pods."""
+    return {
+        "metadata": {"name": name},
+        "value": 1000,
+        "preemptionPolicy": preemption,
+        "description": "Made by a test, and taken away.",
+    }
 
 
 def at_least(**quantities: str) -> Object:
@@ -73,21 +78,22 @@ REFUSALS = {
     "class": NoSuchClass(
         "priorityclasses", {}, f"no PriorityClass with name {MISSING}", {"priorityClassName": MISSING}
     ),
-    "urgent": Refusal(
+    "limited": Refusal(
         "resourcequotas",
-        {"hard": {"pods": "0"}, "scopeSelector": OF_URGENT},
+        {"hard": {"pods": "0"}, "scopeSelector": OF_LIMITED},
         "exceeded quota: none",
-        {"priorityClassName": URGENT},
+        {"priorityClassName": LIMITED},
     ),
 }
 
 
 @pytest.fixture(scope="module")
 def classes(cluster):
-    """A PriorityClass; the one that is missing is taken away too."""
-    cluster.create("priorityclasses", priority_class(URGENT))
+    """Two PriorityClasses; the one that is missing is taken away too."""
+    cluster.create("priorityclasses", priority_class(LIMITED))
+    cluster.create("priorityclasses", priority_class(URGENT, "PreemptLowerPriority"))
     yield
-    for name in (MISSING, URGENT):
+    for name in (MISSING, LIMITED, URGENT):
         cluster.delete("priorityclasses", None, name)
 
 
