@@ -28,6 +28,8 @@ MUTABLE = {"trials"}
 def begin(folder: Path, sweep: Sweep) -> None:
     """Write the Sweep into its folder; one that is there must be the same, but for `trials`.
 
+    A line of `trials.jsonl` that a crash has cut is removed, so that the next one begins a line.
+
     Raises:
         Refused: the folder has another sweep.
         StorageFailed: it cannot be written.
@@ -43,6 +45,7 @@ def begin(folder: Path, sweep: Sweep) -> None:
                 "change it back, give the sweep another name, or choose another folder with --dir"
             )
     write(path, yaml.safe_dump(record, sort_keys=False).encode())
+    _remove_cut_line(folder / TRIALS)
 
 
 def ended(folder: Path) -> Mapping[int, Figures]:
@@ -50,7 +53,7 @@ def ended(folder: Path) -> Mapping[int, Figures]:
     path = folder / TRIALS
     if not path.exists():
         return {}
-    *lines, _ = path.read_text().split("\n")  # the last is empty, or was cut by a crash
+    *lines, _ = path.read_text().split("\n")
     return {line["trial"]: _figures(line) for line in map(json.loads, lines)}
 
 
@@ -63,6 +66,12 @@ def note(folder: Path, number: int, figures: Figures) -> None:
     line = {"trial": number, **asdict(figures)}
     with storage(folder / TRIALS), (folder / TRIALS).open("a") as file:
         file.write(json.dumps(line) + "\n")
+
+
+def _remove_cut_line(path: Path) -> None:
+    if path.exists():
+        with storage(path), path.open("rb+") as file:
+            file.truncate(file.read().rfind(b"\n") + 1)
 
 
 def _fields(before: Any, now: Mapping[str, Any]) -> list[str]:
