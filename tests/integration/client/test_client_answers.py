@@ -6,11 +6,16 @@ import pytest
 import yaml
 
 from palaestra import Client
+from palaestra.api import validate
 from palaestra.cli import main
 from palaestra.client import NotInstalled
 from palaestra.cluster import connect
 from palaestra.doctor import Site
 from palaestra.doctor.installation import leads
+from palaestra.given import data_of
+from palaestra.sweeps.model import LABEL
+from palaestra.sweeps.there import There
+from palaestra.sweeps.trial import State, Trial
 from tests.integration.apiserver.server import raw, refusal, reply, serving, stream
 
 JOB = "apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: trial}\nspec: {}\n"
@@ -278,6 +283,43 @@ def test_a_job_that_is_made_anew_under_the_name_is_not_waited_for(server):
         client.delete("trial", deadline_s=20.0)
 
     assert len(script.of(watches=True)) == 0
+
+
+@pytest.fixture
+def trial():
+    """The first trial of the sweep `s`."""
+    job = {**yaml.safe_load(JOB), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
+    return Trial(number=0, changes={}, job=validate(job))
+
+
+def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
+    """With one trial at a time, the sweep would wait forever for a job that does not exist."""
+    script, kubeconfig = server
+    stored = {**data_of(trial.job), "metadata": {"name": "s-0", "labels": {LABEL: "s"}}}
+    script.calls = [refusal(404, "NotFound"), reply(201, stored), reply(obj={"metadata": {}, "items": []})]
+
+    with Client(kubeconfig=kubeconfig) as client:
+        place = There(client, "s", 1, look_s=0.01)
+        place.begin(trial)
+        full = not place.has_room()
+        place.wait()
+        figures = place.look(trial)
+
+    assert full
+    assert figures.state is State.FAILED
+    assert place.has_room()
+
+
+@pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
+def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers):
+    """A person and the sweep may both find that it is not worth going on."""
+    script, kubeconfig = server
+    script.calls = [*answers, refusal(404, "NotFound")]
+
+    with Client(kubeconfig=kubeconfig) as client:
+        There(client, "s", 1).prune(trial)
+
+    assert [asked.method for asked in script.asked] == ["GET", "DELETE"][: 1 + len(answers)]
 
 
 def test_a_lease_that_is_given_back_has_no_leader(server):

@@ -243,14 +243,12 @@ class Client:
             NoSuchJob: no job has this name.
             TookTooLong: the job still exists after `deadline_s`.
         """
-        found = self.raw(name)
+        uid = self.raw(name)["metadata"]["uid"]
         propagation = "Background" if deadline_s is None else "Foreground"
-        self.api.delete(
-            TRAINING_JOBS, self.namespace, name, uid=found["metadata"]["uid"], propagation=propagation
-        )
+        with asked(name, self.namespace):
+            self.api.delete(TRAINING_JOBS, self.namespace, name, uid=uid, propagation=propagation)
         if deadline_s is not None:
             deadline = time.monotonic() + deadline_s
-            uid = found["metadata"]["uid"]
             for _ in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline, uid=uid):
                 pass
 

@@ -5,6 +5,7 @@ They need no command that runs. This one creates them, reads their status, and d
 
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
@@ -94,6 +95,7 @@ class There:
         """Return the figures of a trial by the status of its job; a job that was deleted has failed."""
         job = self._jobs.get(trial.name)
         if job is None:
+            self._begun.discard(trial.number)
             return Figures(state=State.FAILED)
         runs = tuple(self._figures(trial, replica) for replica in job.status.replicas)
         if not current(job) or job.status.phase not in TERMINAL:
@@ -103,9 +105,10 @@ class There:
         return Figures(state=State.COMPLETE if done else State.FAILED, runs=runs)
 
     def prune(self, trial: Trial) -> None:
-        """Delete the job of a trial and wait until its pods are gone."""
+        """Delete the job of a trial, if it exists, and wait until its pods are gone."""
         self._begun.discard(trial.number)
-        self._client.delete(trial.name, deadline_s=DELETED_S)
+        with suppress(NoSuchJob):
+            self._client.delete(trial.name, deadline_s=DELETED_S)
 
     def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:
         """Return the figures of a replica; each change of them is a point of its curve."""
