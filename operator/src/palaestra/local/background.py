@@ -159,8 +159,8 @@ class Run:
         self._let_go()
 
     def _let_go(self) -> None:
-        if self in _RUNNING:
-            _RUNNING.discard(self)
+        with suppress(KeyError):  # another thread has let go
+            _RUNNING.remove(self)
             self._control.close()
             os.close(self._end)
 
