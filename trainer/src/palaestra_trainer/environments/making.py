@@ -7,8 +7,7 @@ before a simulator starts.
 from __future__ import annotations
 
 import importlib
-import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import gymnasium
@@ -20,14 +19,14 @@ from gymnasium.envs.registration import (
     parse_env_id,
 )
 
-from palaestra_trainer.configuration import DEFAULT_REWARD, Environment, nearest
+from palaestra_trainer.arguments import Arguments
+from palaestra_trainer.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.environments.checking import held
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import require
 
 _OF_MAKE = ("max_episode_steps",)  # an argument of gymnasium.make itself
-_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
 def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
@@ -72,30 +71,25 @@ def creator_of(name: str) -> Callable[..., Any]:
 
 def _checked(wanted: Environment, simulated: Mapping[str, Any]) -> dict[str, Any]:
     spec = _spec(wanted.id)
-    signature = inspect.signature(_creator(wanted.id, spec))
+    taken = Arguments(_creator(wanted.id, spec), wanted.id)
     offered = {**simulated, "reward": wanted.reward}
-    accepted = {name: value for name, value in offered.items() if _accepts(signature, name)}
+    accepted = {name: value for name, value in offered.items() if taken.accepts(name)}
     arguments = {**accepted, **wanted.options}
-    if mistakes := list(_mistakes(wanted, signature, {**spec.kwargs, **arguments})):
+    if mistakes := list(_mistakes(wanted, taken, {*spec.kwargs, *arguments})):
         raise ConfigurationError("\n".join(mistakes))
     return arguments
 
 
-def _mistakes(wanted: Environment, signature: inspect.Signature, given: Mapping[str, Any]) -> Iterator[str]:
-    if not {"robot", "scene"} & given.keys():
+def _mistakes(wanted: Environment, taken: Arguments, given: set[str]) -> Iterator[str]:
+    if not {"robot", "scene"} & given:
         yield (
             f"environment.id: {wanted.id} accepts neither robot nor scene, so no simulator would be used; "
             "add one of these arguments, or **kwargs"
         )
     if wanted.reward != DEFAULT_REWARD and "reward" not in given:
         yield f"environment.reward: {wanted.id} has no argument reward; remove it, or add the argument"
-    known = list(_named(signature))
-    for name in wanted.options:
-        if name not in _OF_MAKE and not _accepts(signature, name):
-            yield f"environment.options.{name}: {wanted.id} has no such argument; {nearest(name, known)}"
-    for name in _required(signature):
-        if name not in given:
-            yield f"environment.options.{name}: {wanted.id} needs this argument; set it, or give it a default"
+    options = [name for name in wanted.options if name not in _OF_MAKE]
+    yield from taken.mistakes("environment.options", options, given)
 
 
 def _spec(name: str) -> EnvSpec:
@@ -127,20 +121,3 @@ def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
     if creator is None:
         raise ConfigurationError(f"environment.id: {name} is registered without entry_point; add one")
     return creator
-
-
-def _accepts(signature: inspect.Signature, name: str) -> bool:
-    anything = any(
-        parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in signature.parameters.values()
-    )
-    return anything or name in _named(signature)
-
-
-def _named(signature: inspect.Signature) -> Iterable[str]:
-    return [name for name, parameter in signature.parameters.items() if parameter.kind in _NAMED]
-
-
-def _required(signature: inspect.Signature) -> Iterator[str]:
-    for name in _named(signature):
-        if signature.parameters[name].default is inspect.Parameter.empty:
-            yield name

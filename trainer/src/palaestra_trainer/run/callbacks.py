@@ -8,7 +8,7 @@ callback is saved, since that would need pickling: each attempt creates the call
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -16,13 +16,13 @@ import structlog
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
 from palaestra_trainer.algorithms import own
-from palaestra_trainer.configuration import Callback, nearest
+from palaestra_trainer.arguments import Arguments
+from palaestra_trainer.configuration import Callback
 from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError
 
 log = structlog.get_logger(__name__)
 
 FIELD = "algorithm.callbacks"
-_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
 def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
@@ -37,12 +37,11 @@ def make_callbacks(wanted: Sequence[Callback]) -> JobCallbacks:
         field = f"{FIELD}[{index}]"
         try:
             cls = _class(f"{field}.name", callback.name)
-            _check_options(f"{field}.options", cls, callback)
+            _refuse(Arguments(cls, callback.name).mistakes(f"{field}.options", callback.options))
             made.append(_Named(callback.name, _made(f"{field}.options", cls, callback)))
         except ConfigurationError as error:
             mistakes.append(str(error))
-    if mistakes:
-        raise ConfigurationError("\n".join(mistakes))
+    _refuse(mistakes)
     return JobCallbacks(made)
 
 
@@ -145,6 +144,11 @@ def _naming(name: str) -> Iterator[None]:
         raise CallbackFailed(f"callback {name}: raised {type(error).__name__}: {error}") from error
 
 
+def _refuse(mistakes: Iterable[str]) -> None:
+    if lines := list(mistakes):
+        raise ConfigurationError("\n".join(lines))
+
+
 def _class(field: str, name: str) -> type[BaseCallback]:
     if not own.names_class(name):
         raise ConfigurationError(f"{field}: {name} names no class; write it as module:Class")
@@ -152,28 +156,6 @@ def _class(field: str, name: str) -> type[BaseCallback]:
     if inspect.isabstract(cls):
         raise ConfigurationError(f"{field}: {name} has no _on_step; add this method")
     return cls
-
-
-def _check_options(field: str, cls: type[BaseCallback], callback: Callback) -> None:
-    parameters = inspect.signature(cls).parameters
-    known = [name for name, parameter in parameters.items() if parameter.kind in _NAMED]
-    anything = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters.values())
-    lines = [
-        f"{field}.{name}: {callback.name} has no such argument; {_nearest(name, known)}"
-        for name in callback.options
-        if name not in known and not anything
-    ]
-    lines += [
-        f"{field}.{name}: {callback.name} needs this argument; set it"
-        for name in known
-        if parameters[name].default is inspect.Parameter.empty and name not in callback.options
-    ]
-    if lines:
-        raise ConfigurationError("\n".join(lines))
-
-
-def _nearest(name: str, known: list[str]) -> str:
-    return nearest(name, known) if known else "it has no arguments, so remove this one"
 
 
 def _made(field: str, cls: type[BaseCallback], callback: Callback) -> BaseCallback:

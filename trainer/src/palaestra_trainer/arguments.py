@@ -1,0 +1,48 @@
+"""The keyword arguments of a class or function, as options of a job give them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from palaestra_trainer.configuration import nearest
+
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+class Arguments:
+    """The arguments that a class or function accepts by name.
+
+    Args:
+        taker: the class or function.
+        name: its name in messages.
+    """
+
+    def __init__(self, taker: Callable[..., Any], name: str) -> None:
+        parameters = inspect.signature(taker).parameters.values()
+        self._name = name
+        self._named = {parameter.name: parameter for parameter in parameters if parameter.kind in _NAMED}
+        self._any = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters)
+
+    def accepts(self, name: str) -> bool:
+        """Return whether an argument of this name may be given."""
+        return self._any or name in self._named
+
+    def mistakes(self, field: str, options: Iterable[str], others: Iterable[str] = ()) -> Iterator[str]:
+        """Yield field, fact and remedy of each option that is not accepted, and of each argument that lacks.
+
+        Args:
+            field: the field of the job with the options.
+            options: the names of the arguments that the job gives.
+            others: the names of those that are given too.
+        """
+        known = list(self._named)
+        for name in options:
+            if not self.accepts(name):
+                remedy = nearest(name, known) if known else "it has no arguments, so remove this one"
+                yield f"{field}.{name}: {self._name} has no such argument; {remedy}"
+        given = {*options, *others}
+        for name, parameter in self._named.items():
+            if parameter.default is inspect.Parameter.empty and name not in given:
+                yield f"{field}.{name}: {self._name} needs this argument; set it, or give it a default"
