@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from palaestra_trainer.errors import SimulatorDead
+from palaestra_trainer.testing.mortal import Mortal
 
 _IMAGE = spaces.Box(0, 255, (36, 36, 3), np.uint8)
 _NUMBERS = spaces.Box(-1.0, 1.0, (3,), np.float32)
@@ -42,7 +42,7 @@ ACTIONS: Mapping[str, spaces.Space[Any]] = MappingProxyType(
 )
 
 
-class FakeTask(gymnasium.Env[Any, Any]):
+class FakeTask(Mortal, gymnasium.Env[Any, Any]):
     """Episodes of at most `max_steps` steps whose observations are drawn anew at each step.
 
     Args:
@@ -59,14 +59,12 @@ class FakeTask(gymnasium.Env[Any, Any]):
         deaths: Collection[int] = (),
         max_steps: int = 6,
     ) -> None:
+        super().__init__(deaths, "fake")
         self.observation_space = deepcopy(observation_space)
         self.action_space = deepcopy(action_space)
-        self._deaths = frozenset(deaths)
         self._max_steps = max_steps
-        self._life = 0
-        self._dead = False
         self._past = 0
-        self._steps = 0
+        self._length = 0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -74,28 +72,18 @@ class FakeTask(gymnasium.Env[Any, Any]):
         """Begin an episode that `seed` decides."""
         super().reset(seed=seed, options=options)
         self._live()
-        self._past, self._steps = zlib.crc32(repr(seed).encode()), 0
+        self._past, self._length = zlib.crc32(repr(seed).encode()), 0
         return self._observe(), {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Take a step; one of nine ends the episode."""
-        self._life += 1
-        self._dead = self._dead or self._life in self._deaths
-        self._live()
-        self._steps += 1
+        self._live_a_step()
+        self._length += 1
         self._past = zlib.crc32(np.ascontiguousarray(action).tobytes(), self._past)
         over = self._past % 9 == 0
-        truncated = self._steps >= self._max_steps and not over
+        truncated = self._length >= self._max_steps and not over
         return self._observe(), self._past % 100 / 100, over, truncated, {"is_success": over}
-
-    def restart(self) -> None:
-        """Bring the task back to life."""
-        self._dead = False
 
     def _observe(self) -> Any:
         self.observation_space.seed(self._past)
         return self.observation_space.sample()
-
-    def _live(self) -> None:
-        if self._dead:
-            raise SimulatorDead("fake", f"died at step {self._life}; restart it")
