@@ -79,7 +79,10 @@ def _replace(staged: Path, target: Path) -> None:
     """Put all that is staged into `target`, in place of older versions of the same distributions."""
     new = {canonicalize_name(PathDistribution(path).name) for path in staged.glob("*.dist-info")}
     for path in target.glob("*.dist-info"):
-        if canonicalize_name(PathDistribution(path).name) in new:
+        old = PathDistribution(path)
+        if canonicalize_name(old.name) in new:
+            for file in old.files or ():
+                Path(str(old.locate_file(file))).unlink(missing_ok=True)
             shutil.rmtree(path)
     shutil.copytree(staged, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".lock"))
 

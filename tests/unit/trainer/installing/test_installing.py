@@ -178,6 +178,21 @@ def test_a_newer_version_replaces_an_older_one(project, target):
     assert [path.name for path in target.glob("*.dist-info")] == ["corridor-2.0.dist-info"]
 
 
+def test_a_module_that_a_newer_version_lacks_is_gone(project, target):
+    """A job could still name an environment that the project no longer has."""
+    folder = project()
+    file = folder / "pyproject.toml"
+    file.write_text(file.read_text().replace('["corridor.py"]', '["corridor.py", "hall.py"]'))
+    (folder / "hall.py").write_text("")
+    assert main([str(folder)]) == 0
+    assert modules(target) == {"corridor", "hall"}
+    (folder / "hall.py").unlink()
+
+    assert main([str(folder)]) == 0
+
+    assert modules(target) == {"corridor"}
+
+
 def test_a_folder_without_a_module_is_refused(tmp_path, target, capfd):
     """A build that installs nothing looks like one that works."""
     assert f"{target}: holds neither a module nor a package" in refusal(capfd, target)
