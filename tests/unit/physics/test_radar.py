@@ -165,3 +165,15 @@ def test_noise_is_drawn_for_each_reading(radar):
     assert 0.0 < abs(echo.distance - 3.0) < 1.0
     assert 0.0 < abs(echo.speed) < 1.0
     assert 0.0 < abs(echo.azimuth) < 1.0
+
+
+def test_noise_to_a_distance_of_nothing_is_no_error(radar):
+    """The power that comes back from there would be infinite, and the simulator ended."""
+    simulation, device = radar(solid(0.2), f"{ANY} minRange 0 rangeNoise 0.2")
+    readings = []
+    for _ in range(50):
+        simulation.step(32)
+        readings += device.value
+
+    assert min(reading["distance"] for reading in readings) == 0.0
+    assert all(math.isfinite(reading["receivedPower"]) for reading in readings)

@@ -22,6 +22,7 @@ from palaestra_sim.seam import Fields, Row
 
 _LIGHT_M_S: Final = 299_792_458.0
 _MILLIWATT: Final = 0.001
+_NEAREST_M: Final = 0.001  # the power from a distance of 0 would be infinite
 _Gauss = Callable[[float, float], float]
 
 
@@ -141,7 +142,7 @@ class Radar:
         distance = self._distance(bounds, gauss)
         if distance is None:
             return None
-        power_w = self.gain_w_m2 * target.cross_section_m2 / distance**4
+        power_w = self.gain_w_m2 * target.cross_section_m2 / max(distance, _NEAREST_M) ** 4
         speed = self._speed(target.place, passed_s) + _noise(limits.noise[1], gauss)
         if power_w < limits.power_w or not limits.accept(speed):
             return None
