@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from palaestra_trainer.environments import observation
 from palaestra_trainer.environments.actions import action_space, twist
 from palaestra_trainer.environments.observation import Situation
-from palaestra_trainer.environments.options import Options, time_up_terminates
-from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
+from palaestra_trainer.environments.options import Options
+from palaestra_trainer.environments.results import result
+from palaestra_trainer.environments.rewards import Outcome, Transition
 from palaestra_trainer.environments.tasks import Places
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 from palaestra_trainer.robots.capabilities import require
@@ -202,18 +203,10 @@ class MoveToTargetEnv(gymnasium.Env[Observation, Any]):
         after = self._look(observation.velocity(before.pose, self._robot.pose(), elapsed_s))
         self._situation = after
         outcome = self._outcome(after)
-        terms = reward_terms(self.options.reward, _transition(before, after, outcome))
+        step = _transition(before, after, outcome)
         if outcome is Outcome.DELIVERED:
             self._situation = after = self._next_target(after)
-        info = {
-            "is_success": outcome is Outcome.REACHED,
-            "outcome": outcome.value,
-            "reward_terms": terms,
-            "extra_steps": extra_steps,
-        }
-        time_up, terminates = outcome is Outcome.TIME_UP, time_up_terminates(self.options)
-        terminated = outcome.terminal or (time_up and terminates)
-        return self._numbers_of(after), sum(terms.values()), terminated, time_up and not terminates, info
+        return self._numbers_of(after), *result(step, self.options, extra_steps)
 
     def close(self) -> None:
         """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""

@@ -17,8 +17,9 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from palaestra_trainer.environments.observation import in_frame, velocity
-from palaestra_trainer.environments.options import NavigateOptions, time_up_terminates
-from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
+from palaestra_trainer.environments.options import NavigateOptions
+from palaestra_trainer.environments.results import result
+from palaestra_trainer.environments.rewards import Outcome, Transition
 from palaestra_trainer.environments.tasks import Places
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import Localization, Scanner, Steering, require
@@ -173,18 +174,9 @@ class NavigateEnv(gymnasium.Env[Observation, Any]):
         after_m = math.hypot(*self._ahead(after))
         outcome = self._outcome(after_m, nearest_m)
         step = Transition(before_m=before_m, after_m=after_m, nearest_m=nearest_m, outcome=outcome)
-        terms = reward_terms(self.options.reward, step)
-        info = {
-            "is_success": outcome is Outcome.REACHED,
-            "outcome": outcome.value,
-            "reward_terms": terms,
-            "extra_steps": extra_steps,
-        }
         moved = velocity(before, after, self._robot.period_s * (1 + extra_steps))
-        time_up, terminates = outcome is Outcome.TIME_UP, time_up_terminates(self.options)
-        terminated = outcome.terminal or (time_up and terminates)
         seen = self._observe(after, moved[0], moved[2])
-        return seen, sum(terms.values()), terminated, time_up and not terminates, info
+        return seen, *result(step, self.options, extra_steps)
 
     def close(self) -> None:
         """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""

@@ -18,8 +18,9 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from palaestra_trainer.environments.actions import action_space, twist
-from palaestra_trainer.environments.options import SeeOptions, time_up_terminates
-from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
+from palaestra_trainer.environments.options import SeeOptions
+from palaestra_trainer.environments.results import result
+from palaestra_trainer.environments.rewards import Outcome, Transition
 from palaestra_trainer.environments.tasks import Places
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
@@ -167,23 +168,13 @@ class SeeTargetEnv(gymnasium.Env[Observation, Any]):
         extra_steps = self._robot.advance()
         self._steps += 1
         self._frames.append(self._image())
-        outcome = self._outcome()
         step = Transition(
             before_m=before_m,
             after_m=self.target_m,
             nearest_m=float(self._robot.distances().min()),
-            outcome=outcome,
+            outcome=self._outcome(),
         )
-        terms = reward_terms(self.options.reward, step)
-        info = {
-            "is_success": outcome is Outcome.REACHED,
-            "outcome": outcome.value,
-            "reward_terms": terms,
-            "extra_steps": extra_steps,
-        }
-        time_up, terminates = outcome is Outcome.TIME_UP, time_up_terminates(self.options)
-        terminated = outcome.terminal or (time_up and terminates)
-        return self._seen(), sum(terms.values()), terminated, time_up and not terminates, info
+        return self._seen(), *result(step, self.options, extra_steps)
 
     def close(self) -> None:
         """Release the simulator, if this environment took it from PALAESTRA_CONFIG; safe to repeat."""
