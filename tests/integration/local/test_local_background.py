@@ -50,6 +50,12 @@ run = pathlib.Path(os.environ["PALAESTRA_RUN"])
 (run / "model.zip").touch()
 (run / "summary.json").write_text('{"steps": 7, "success_rate": 0.5, "faults": 2}')
 """
+FAIL = """\
+import os, pathlib, sys
+run = pathlib.Path(os.environ["PALAESTRA_RUN"])
+(run / "summary.json").write_text('{"steps": 7}')
+sys.exit(1)
+"""
 NOTEBOOK = """\
 import os, sys, time
 import palaestra
@@ -94,6 +100,22 @@ def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
     again = palaestra.run(job(END), runs=tmp_path)
     assert again.result(PATIENCE_S) == result
     assert "finished already" in again.log.read_text()
+
+
+def test_a_result_is_not_that_of_an_earlier_run(job, tmp_path):
+    """A run that cannot begin writes no outcome, and the earlier one may have had the same exit code."""
+    with palaestra.run(job(FAIL), runs=tmp_path) as run:
+        first = run.result(PATIENCE_S)
+    logs = run.directory / "logs"
+    logs.rename(run.directory / "earlier logs")
+    logs.touch()
+
+    with palaestra.run(job(FAIL), runs=tmp_path) as run:
+        second = run.result(PATIENCE_S)
+
+    assert (first.exit_code, first.steps) == (1, 7)
+    assert (second.exit_code, second.steps) == (1, None)
+    assert str(logs) in second.reason
 
 
 def test_two_runs_at_the_same_time_are_stopped_with_a_checkpoint(job, tmp_path):

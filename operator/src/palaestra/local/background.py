@@ -168,7 +168,7 @@ class Run:
         code = self._process.returncode
         code = KILLED if code < 0 else code
         outcome = Outcome.of(self.directory)
-        if outcome is None or outcome.exit_code != code:  # it wrote none; that of an earlier run is there
+        if outcome is None or outcome.exit_code != code:  # it wrote none; an earlier run may have
             last = self.log.read_text(errors="replace").splitlines()[-1:]
             outcome = Outcome(exit_code=code, reason="".join(last))
         policy = self.directory / "model.zip"

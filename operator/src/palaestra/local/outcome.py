@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Self
 
-from palaestra.local.files import write
+from palaestra.local.files import storage, write
 from palaestra_protocol.pod.status import SuccessInterval
 
 FILE = "outcome.json"
@@ -45,6 +45,17 @@ class Outcome:
             StorageFailed: it cannot be written.
         """
         write(run_directory / FILE, json.dumps(asdict(self), indent=1).encode() + b"\n")
+
+    @staticmethod
+    def forget(run_directory: Path) -> None:
+        """Remove the result of an earlier run in this directory.
+
+        Raises:
+            StorageFailed: it cannot be removed.
+        """
+        path = run_directory / FILE
+        with storage(path):
+            path.unlink(missing_ok=True)
 
     @classmethod
     def of(cls, run_directory: Path) -> Self | None:
