@@ -1,8 +1,7 @@
-"""Checking what a job says of its algorithm, and making the model.
+"""Check the algorithm of a job, and make the model.
 
 Hyperparameters are keyword arguments of the class and are checked against its signature, names and values,
-so a mistake is found before a simulator is started. Whatever a TrainingJob sets takes the place of a default,
-one by one.
+so a mistake is found before a simulator is started. Each value that a job sets replaces one default.
 """
 
 from __future__ import annotations

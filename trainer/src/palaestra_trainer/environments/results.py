@@ -1,4 +1,4 @@
-"""What a step returns, the same in every task: reward, end of the episode and info."""
+"""The result of a step, the same in every task: reward, end of the episode and info."""
 
 from __future__ import annotations
 

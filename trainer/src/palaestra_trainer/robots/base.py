@@ -63,7 +63,7 @@ class RobotinoAbc(RobotAbc, Omnidrive, Localization, Distances, Bumper):
 
 
 class Scene(ABC):
-    """What can be arranged in a simulation, and nowhere else.
+    """Arranges episodes, which is possible in a simulation only.
 
     An episode begins in three steps: `begin` puts everything back to its place, `layout` returns where that
     is, and `place` puts the robot on a free place.
@@ -138,7 +138,7 @@ class SceneWrapper(Scene):
 
 
 class JointScene(ABC):
-    """What can be arranged in the simulation of a robot with joints."""
+    """Arranges the joints of a simulated robot."""
 
     @abstractmethod
     def set_joint(self, name: str, position: float) -> None:

@@ -8,7 +8,7 @@ from palaestra_trainer.errors import SimulatorDead
 
 
 class Mortal:
-    """What dies at some of its steps, and lives again after `restart`.
+    """A thing that dies at some of its steps, and lives again after `restart`.
 
     Args:
         deaths: numbers of the steps, counted from 1 over its whole life, at which it dies.
