@@ -39,6 +39,12 @@ while True:
     signal.sigwait([signal.SIGTERM])
     sys.exit(75)
 """
+REFUSE = """\
+import os, pathlib, sys
+word = '{"step": 0, "reason": "ConfigurationWrong: gama: is not known; did you mean gamma?"}'
+pathlib.Path(os.environ["PALAESTRA_TERMINATION_LOG"]).write_text(word)
+sys.exit(2)
+"""
 START = """\
 import os, pathlib, yaml
 from palaestra_trainer.launching.sidecar import Sidecar
@@ -149,6 +155,20 @@ def test_fresh_begins_anew_and_keeps_the_old_run(desk):
     assert code == 0
     assert "finished already" not in out
     assert (desk.run_directory.parent / "0.old-1" / "summary.json").exists()
+
+
+def test_a_wrong_job_is_corrected_without_fresh(desk):
+    """Nothing was trained. What the trainer wrote is set aside, with its logs."""
+    desk.write(REFUSE)
+    refused, _ = desk.run()
+    desk.write(ASK, seed=7)
+
+    code, out = desk.run()
+
+    assert (refused, code) == (2, 0), out
+    aside = desk.run_directory.parent / "0.old-1"
+    assert f"{desk.run_directory}: the run that was there is now {aside}" in out
+    assert (aside / "logs" / "trainer.log").exists()
 
 
 def test_a_second_run_of_the_same_directory_is_refused(desk, eventually):

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import uuid
+from dataclasses import replace
 
 import pytest
 import yaml
@@ -60,6 +61,64 @@ def test_a_changed_job_is_refused_with_every_changed_field(directory):
     lines = str(refused.value).splitlines()
     assert lines[:2] == ["spec.seed: was 1, is 2", "spec.simulators[0].name: was 'a', is 'b'"]
     assert "--fresh" in lines[2]
+
+
+WRONG = Outcome(exit_code=2, reason="ConfigurationWrong: gama: is not known", steps=0)
+
+
+def test_a_job_that_was_wrong_before_its_first_step_may_be_corrected(directory):
+    """A typing error costs nothing: nothing was trained that another job could spoil."""
+    WRONG.keep(directory)
+
+    rundir.refuse_another_job(directory, record(seed=2))
+
+    assert rundir.is_correction(directory, record(seed=2))
+
+
+def test_a_wrong_job_that_runs_again_unchanged_is_no_correction(directory):
+    """The mistake may have been mended in a file of the user's own; the run stays where it is."""
+    WRONG.keep(directory)
+
+    assert not rundir.is_correction(directory, record())
+
+
+@pytest.mark.parametrize(
+    "outcome",
+    [
+        None,
+        replace(WRONG, steps=7),
+        replace(WRONG, steps=None),
+        replace(WRONG, exit_code=1),
+        replace(WRONG, exit_code=75),
+    ],
+    ids=["killed", "steps", "a program of one's own", "failed", "interrupted"],
+)
+def test_a_run_that_may_have_trained_is_never_corrected(directory, outcome):
+    """Its steps belong to the job as it was."""
+    if outcome is not None:
+        outcome.keep(directory)
+
+    with pytest.raises(Refused, match=r"^spec.seed: was 1, is 2\n"):
+        rundir.refuse_another_job(directory, record(seed=2))
+    assert not rundir.is_correction(directory, record(seed=2))
+
+
+def test_a_run_with_a_checkpoint_is_never_corrected(directory):
+    """Its newest attempt was refused, not those before."""
+    WRONG.keep(directory)
+    (directory / "checkpoints" / "5000").mkdir(parents=True)
+
+    with pytest.raises(Refused, match="holds a run of the job as it was"):
+        rundir.refuse_another_job(directory, record(seed=2))
+
+
+def test_a_run_that_begins_has_no_outcome_of_the_one_before(directory):
+    """If it is killed, nothing says that it ended at step 0."""
+    WRONG.keep(directory)
+
+    rundir.prepare(directory, record())
+
+    assert Outcome.of(directory) is None
 
 
 @pytest.mark.parametrize(

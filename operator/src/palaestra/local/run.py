@@ -106,7 +106,8 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Ou
     record = rundir.record_of(job)
     with rundir.locked(path, options.lock), HeldPorts() as held:
         ports = chosen_ports(held, job, options)
-        if options.fresh and (aside := rundir.set_aside(path)):
+        anew = options.fresh or rundir.is_correction(path, record)
+        if anew and (aside := rundir.set_aside(path)):
             say(f"{path}: the run that was there is now {aside}")
         rundir.refuse_another_job(path, record)
         before = Outcome.of(path)

@@ -4,7 +4,7 @@
                                     and what the trainer writes: checkpoints/, tensorboard/, ...
     <dir>/<job name>/<replica>.lock held by the runner that uses the directory
     <dir>/<job name>/<replica>.log  the output of a runner in the background
-    <dir>/<job name>/<replica>.old-<n>/   what --fresh has set aside; no run is ever deleted
+    <dir>/<job name>/<replica>.old-<n>/   what --fresh or a correction has set aside; no run is ever deleted
 
 The uid of a job on a laptop is derived from this path. So it is the same for every `palaestra run` of one
 directory, and different for two directories, without a file that could be lost.
@@ -29,6 +29,8 @@ from palaestra.api.tree import fields_of, walk
 from palaestra.errors import SpecErrors
 from palaestra.local.errors import Refused
 from palaestra.local.files import make_folder, storage, write
+from palaestra.local.outcome import FILE, Outcome
+from palaestra_protocol.pod.status import ExitCode
 
 RECORD = "job.yaml"
 _INDEX = re.compile(r"\[[0-9]+\]")
@@ -110,17 +112,46 @@ def refuse_another_job(directory: Path, record: Record) -> None:
     """Compare a job with the record of the run in the directory.
 
     Raises:
-        Refused: they differ in fields that a run cannot change; one line for each field.
+        Refused: they differ in fields that a run cannot change, and this is no correction; one line for each
+            field.
     """
-    try:
-        before = yaml.safe_load((directory / RECORD).read_bytes())
-    except FileNotFoundError:
-        return
-    if changes := tuple(changed_fields(_completed(before), record)):
+    changes = _changes(directory, record)
+    if changes and not _learned_nothing(directory):
         raise Refused(
             "\n".join(changes) + f"\n{directory}: holds a run of the job as it was; "
             "change the file back, give the job another name, or begin anew with --fresh"
         )
+
+
+def is_correction(directory: Path, record: Record) -> bool:
+    """Return whether a job differs from that of a run which ended at step 0 because its job was wrong.
+
+    The directory has to be set aside then: the trainer has kept the wrong hyperparameters there.
+    """
+    return bool(_changes(directory, record)) and _learned_nothing(directory)
+
+
+def _changes(directory: Path, record: Record) -> tuple[str, ...]:
+    """Return the changed fields that a run cannot change; () without a run in the directory."""
+    try:
+        before = yaml.safe_load((directory / RECORD).read_bytes())
+    except FileNotFoundError:
+        return ()
+    return tuple(changed_fields(_completed(before), record))
+
+
+def _learned_nothing(directory: Path) -> bool:
+    """Return whether the trainer refused the job of a run at step 0, and the run has no checkpoint.
+
+    A program of the user's own that reports no step may have trained.
+    """
+    outcome, checkpoints = Outcome.of(directory), directory / "checkpoints"
+    return (
+        outcome is not None
+        and outcome.exit_code == ExitCode.CONFIGURATION
+        and outcome.steps == 0
+        and not (checkpoints.exists() and any(checkpoints.iterdir()))
+    )
 
 
 def changed_fields(before: Record, now: Record) -> Iterator[str]:
@@ -146,11 +177,13 @@ def _completed(record: Any) -> Record:
 
 
 def prepare(directory: Path, record: Record) -> None:
-    """Create the directory and write the record of its job.
+    """Create the directory, write the record of its job and remove the outcome of an earlier run.
 
     Raises:
         StorageFailed: it cannot be written.
     """
+    with storage(directory):
+        (directory / FILE).unlink(missing_ok=True)
     write(directory / RECORD, yaml.safe_dump(dict(record), sort_keys=False).encode())
 
 
