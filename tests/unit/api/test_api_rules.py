@@ -293,6 +293,8 @@ KEPT = {
         "trainer.environment.options": {"actions": "continuous"},
     },
     "an algorithm of one's own": {"trainer.algorithm.name": "my_lab.learning:Ours"},
+    "a robot that ships": {"trainer.robot": "EPuck"},
+    "a robot of one's own": {"trainer.robot": "my_lab.robots:Ours"},
     "SAC in a task that we do not know": {
         "trainer.algorithm.name": "SAC",
         "trainer.environment.id": "mine:Hall-v1",

@@ -18,6 +18,8 @@ SENTENCES = [
     ({"trainer.algorithm.name": "TD4"},
      ('spec.trainer.algorithm.name: "TD4" is not an algorithm; '
      "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, REINFORCE or module:Class")),
+    ({"trainer.robot": "Robotinoo"},
+     'spec.trainer.robot: "Robotinoo" is not a robot; use Robotino, TurtleBot3Burger, EPuck or module:Class'),
     ({"trainer.algorithm.policy": "my policy"},
      ('spec.trainer.algorithm.policy: "my policy" is not a policy; '
      "write MlpPolicy, CnnPolicy, MultiInputPolicy or module:Class")),

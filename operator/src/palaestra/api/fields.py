@@ -50,11 +50,12 @@ ALGORITHMS = (
     "RecurrentPPO",
     "REINFORCE",
 )
+ROBOTS = ("Robotino", "TurtleBot3Burger", "EPuck")
 CLASS = "[A-Za-z_][A-Za-z0-9_.]*:[A-Za-z_][A-Za-z0-9_]*"
 ALGORITHM = f"^({'|'.join(ALGORITHMS)}|{CLASS})$"
 POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
 CLASS_NAME = f"^{CLASS}$"
-ROBOT_CLASS = "^[A-Za-z_][A-Za-z0-9_.]*(:[A-Za-z_][A-Za-z0-9_]*)?$"
+ROBOT = f"^({'|'.join(ROBOTS)}|{CLASS})$"
 POLICY_FILE = "^(/.+|[A-Za-z0-9_][-A-Za-z0-9._]*(/[A-Za-z0-9_][-A-Za-z0-9._]*)*)[.]zip$"
 ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
 
@@ -83,7 +84,7 @@ PATTERNS: dict[str, tuple[str, str]] = {
         "the id of an environment",
         "write it as in gymnasium's registry, such as MoveToTargetEnv-v0",
     ),
-    ROBOT_CLASS: ("the class of a robot", "name one that ships, such as Robotino, or write module:Class"),
+    ROBOT: ("a robot", f"use {', '.join(ROBOTS)} or module:Class"),
 }
 
 # The pods' names, hash included, have to be DNS labels of at most 63 characters.

@@ -12,7 +12,7 @@ from palaestra.api.fields import (
     ENVIRONMENT_ID,
     POLICY,
     POLICY_FILE,
-    ROBOT_CLASS,
+    ROBOT,
     Count,
     FreeObject,
     Image,
@@ -237,7 +237,7 @@ class Trainer(ApiModel):
     environment: Task = Task()
     """The task, a gymnasium environment."""
 
-    robot: Annotated[str, Field(min_length=1, max_length=128, pattern=ROBOT_CLASS)] | None = None
+    robot: Annotated[str, Field(min_length=1, max_length=128, pattern=ROBOT)] | None = None
     """Class of the robot in the world: `Robotino`, `TurtleBot3Burger`, `EPuck`, or `module:Class`, a
     `SimulatedRobot` that the trainer can import; absent: `Robotino`."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gymnasium
 import pytest
 
+from palaestra.api.fields import ROBOTS
 from palaestra_trainer.configuration import Environment
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.errors import ConfigurationError, MissingCapability
@@ -32,6 +33,11 @@ def module(tmp_path, monkeypatch):
 def test_a_robot_that_ships_has_a_short_name(name):
     """Each of the names is that of its class."""
     assert robot_class(name).__name__ == name
+
+
+def test_a_job_may_name_each_robot_that_ships():
+    """The API, which imports no trainer, refuses all other names that are no module:Class."""
+    assert set(ROBOTS) == set(SHIPPED)
 
 
 def test_a_robot_of_your_own_is_named_by_its_module(module):
