@@ -145,10 +145,13 @@ def test_an_environment_that_refuses_its_arguments_is_a_mistake_of_the_configura
     assert "Hall-v0 cannot be created (the hall is too small)" in refused(made, Strict)
 
 
-@pytest.mark.parametrize("name", ["Nowhere-v0", "no_such_module:Hall-v0"])
-def test_an_unknown_environment_is_refused(name):
+@pytest.mark.parametrize(
+    ("name", "fact"),
+    [("Nowhere-v0", "cannot be created"), ("no_such_module:Hall-v0", "cannot be imported")],
+)
+def test_an_unknown_environment_is_refused(name, fact):
     """Whether its name or its module is wrong."""
-    with pytest.raises(ConfigurationError, match=f"environment.id: {name} cannot be created"):
+    with pytest.raises(ConfigurationError, match=f"environment.id: {name} {fact}"):
         make_environment(Environment(id=name), *fake_arena())
 
 

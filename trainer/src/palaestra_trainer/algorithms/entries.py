@@ -21,7 +21,8 @@ from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-from palaestra_trainer.algorithms import her, noise, own
+from palaestra_trainer import own
+from palaestra_trainer.algorithms import her, noise
 from palaestra_trainer.algorithms.reinforce import REINFORCE
 from palaestra_trainer.algorithms.rows import with_valid_rows
 from palaestra_trainer.algorithms.signatures import parameters

@@ -13,7 +13,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 
-from palaestra_trainer.algorithms import own
+from palaestra_trainer import own
 from palaestra_trainer.algorithms.entries import Entry
 from palaestra_trainer.configuration import Algorithm, Cnn, nearest
 from palaestra_trainer.errors import ConfigurationError

@@ -17,7 +17,7 @@ from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn, optim
 
-from palaestra_trainer.algorithms import own
+from palaestra_trainer import own
 from palaestra_trainer.algorithms.schedules import schedule_of
 from palaestra_trainer.algorithms.signatures import types
 from palaestra_trainer.configuration import nearest

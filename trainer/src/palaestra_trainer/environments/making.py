@@ -6,7 +6,6 @@ before a simulator starts.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -15,10 +14,10 @@ from gymnasium.envs.registration import (
     EnvSpec,
     find_highest_version,
     get_env_id,
-    load_env_creator,
     parse_env_id,
 )
 
+from palaestra_trainer import own
 from palaestra_trainer.arguments import Arguments
 from palaestra_trainer.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.environments.checking import held
@@ -95,12 +94,12 @@ def _mistakes(wanted: Environment, taken: Arguments, given: set[str]) -> Iterato
 def _spec(name: str) -> EnvSpec:
     """Return the registration of a name in the syntax of `gymnasium.make`."""
     module, _, registered = name.rpartition(":")
+    if module:
+        own.module_named(module, f"environment.id: {name}")
     try:
-        if module:
-            importlib.import_module(module)
         space, plain, version = parse_env_id(registered)
         return gymnasium.spec(get_env_id(space, plain, version or find_highest_version(space, plain)))
-    except (gymnasium.error.Error, ImportError) as error:
+    except gymnasium.error.Error as error:
         raise ConfigurationError(
             f"environment.id: {name} cannot be created ({error}); use a registered name, "
             "or module:name with the module that registers it"
@@ -109,15 +108,12 @@ def _spec(name: str) -> EnvSpec:
 
 def _creator(name: str, spec: EnvSpec) -> Callable[..., Any]:
     """Return the class or function that creates the environment."""
-    try:
-        creator = (
-            load_env_creator(spec.entry_point) if isinstance(spec.entry_point, str) else spec.entry_point
+    creator = spec.entry_point
+    if isinstance(creator, str):
+        found: Callable[..., Any] = own.object_named(
+            creator, f"environment.id: the entry point {creator} of {name}"
         )
-    except (AttributeError, ImportError) as error:
-        raise ConfigurationError(
-            f"environment.id: the entry point {spec.entry_point} of {name} does not exist ({error}); "
-            "correct its registration"
-        ) from error
+        return found
     if creator is None:
         raise ConfigurationError(f"environment.id: {name} is registered without entry_point; add one")
     return creator

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
-
+from palaestra_trainer import own
 from palaestra_trainer.configuration import nearest
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.robots.base import RobotAbc
@@ -22,19 +21,12 @@ def robot_class(name: str) -> type[SimulatedRobot]:
     Raises:
         ConfigurationError: there is no such class, or it is no robot that a simulator could have.
     """
-    if ":" not in name and name not in SHIPPED:
+    if name not in SHIPPED and not own.names_class(name):
         raise ConfigurationError(
             f"trainer.robot: {name} is not known; {nearest(name, list(SHIPPED))}, "
             "or name a class of your own as module:Class"
         )
-    module, _, attribute = SHIPPED.get(name, name).partition(":")
-    try:
-        found = getattr(importlib.import_module(module), attribute)
-    except (AttributeError, ImportError, ValueError) as error:
-        raise ConfigurationError(
-            f"trainer.robot: {name} cannot be imported ({error}); "
-            "correct the name, or put the module on PYTHONPATH"
-        ) from error
+    found = own.object_named(SHIPPED.get(name, name), f"trainer.robot: {name}")
     if not (isinstance(found, type) and issubclass(found, SimulatedRobot)):
         kind = "a RobotAbc that no simulator has" if _is_robot(found) else "not a RobotAbc"
         raise ConfigurationError(

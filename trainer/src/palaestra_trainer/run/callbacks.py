@@ -15,7 +15,7 @@ from typing import Any
 import structlog
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
-from palaestra_trainer.algorithms import own
+from palaestra_trainer import own
 from palaestra_trainer.arguments import Arguments
 from palaestra_trainer.configuration import Callback
 from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError

@@ -1,0 +1,79 @@
+"""Code of a job's author: robots, environments, algorithms, policies and their parts, callbacks.
+
+A job names a class as `module:Class`. The module is imported from where Python finds it: the image, or
+PYTHONPATH. An import runs the author's code, which may raise anything, so every exception becomes a
+ConfigurationError with the name, the fact and the remedy.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from types import ModuleType
+from typing import Any
+
+from palaestra_trainer.errors import ConfigurationError
+
+NAME = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+
+
+def names_class(value: Any) -> bool:
+    """Return whether a value is text of the form `module:Class`."""
+    return isinstance(value, str) and NAME.fullmatch(value) is not None
+
+
+def class_named(name: str, field: str, base: type[Any]) -> type[Any]:
+    """Return the class that `name` names, a subclass of `base`.
+
+    Args:
+        name: `module:Class`.
+        field: field of the job, for messages.
+        base: the class that it must be a subclass of.
+
+    Raises:
+        ConfigurationError: it cannot be imported, or is not such a class.
+    """
+    found = object_named(name, f"{field}: {name}")
+    if not (isinstance(found, type) and issubclass(found, base)):
+        raise ConfigurationError(
+            f"{field}: {name} is no subclass of {base.__name__}; name a class that is one"
+        )
+    return found
+
+
+def object_named(name: str, subject: str) -> Any:
+    """Return the object that `name` names.
+
+    Args:
+        name: `module:object`.
+        subject: the subject of messages: a field of the job, and what it names.
+
+    Raises:
+        ConfigurationError: it cannot be imported.
+    """
+    module, _, attribute = name.partition(":")
+    found = module_named(module, subject)
+    try:
+        return getattr(found, attribute)
+    except Exception as error:  # a module may import its parts here
+        raise _refusal(subject, error, "correct the name") from error
+
+
+def module_named(name: str, subject: str) -> ModuleType:
+    """Return the module of a name; `subject` as in `object_named`.
+
+    Raises:
+        ConfigurationError: it cannot be imported.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        remedy = "install its package in the image, or add its folder to PYTHONPATH"
+        raise _refusal(subject, error, remedy) from error
+    except (Exception, SystemExit) as error:  # whatever the author's code raises; a script may exit
+        remedy = f"correct the module: python -c 'import {name}' shows the line"
+        raise _refusal(subject, error, remedy) from error
+
+
+def _refusal(subject: str, error: BaseException, remedy: str) -> ConfigurationError:
+    return ConfigurationError(f"{subject} cannot be imported ({type(error).__name__}: {error}); {remedy}")
