@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
 
 import pytest
 
 from palaestra_trainer.algorithms import check
+from palaestra_trainer.arguments import named, takes_any
 from palaestra_trainer.configuration import Algorithm, Callback, Environment
 from palaestra_trainer.environments.making import creator_of, keywords
 from palaestra_trainer.errors import ConfigurationError
@@ -83,3 +85,16 @@ def test_a_name_that_the_module_lacks_is_to_be_corrected(written):
 
     with pytest.raises(ConfigurationError, match=r"has no attribute 'Own'\); correct the name$"):
         robot_class(f"{module}:Own")
+
+
+def test_an_argument_may_be_given_by_name_if_python_takes_it_by_name():
+    """So the options of environments and callbacks are checked alike, as are hyperparameters."""
+
+    def made(first, /, second, *others, third=3, **rest):
+        del first, second, others, third, rest
+
+    signature = inspect.signature(made)
+
+    assert list(named(signature)) == ["second", "third"]
+    assert takes_any(signature)
+    assert not takes_any(inspect.signature(lambda second: second))

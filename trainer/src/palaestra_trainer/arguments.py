@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from palaestra_trainer.configuration import nearest
@@ -20,10 +20,10 @@ class Arguments:
     """
 
     def __init__(self, taker: Callable[..., Any], name: str) -> None:
-        parameters = inspect.signature(taker).parameters.values()
+        signature = inspect.signature(taker)
         self._name = name
-        self._named = {parameter.name: parameter for parameter in parameters if parameter.kind in _NAMED}
-        self._any = any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters)
+        self._named = named(signature)
+        self._any = takes_any(signature)
 
     def accepts(self, name: str) -> bool:
         """Return whether an argument of this name may be given."""
@@ -46,3 +46,13 @@ class Arguments:
         for name, parameter in self._named.items():
             if parameter.default is inspect.Parameter.empty and name not in given:
                 yield f"{field}.{name}: {self._name} needs this argument; set it, or give it a default"
+
+
+def named(signature: inspect.Signature) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of a signature that can be given by name, without those of its `**kwargs`."""
+    return {name: found for name, found in signature.parameters.items() if found.kind in _NAMED}
+
+
+def takes_any(signature: inspect.Signature) -> bool:
+    """Return whether a signature accepts every name, by `**kwargs`."""
+    return any(found.kind is inspect.Parameter.VAR_KEYWORD for found in signature.parameters.values())

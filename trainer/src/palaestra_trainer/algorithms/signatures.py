@@ -8,15 +8,15 @@ from typing import Any, get_type_hints
 
 from stable_baselines3.common.vec_env import VecEnv
 
-_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+from palaestra_trainer.arguments import named, takes_any
 
 
 def parameters(cls: type[object]) -> Mapping[str, inspect.Parameter]:
     """Return the named parameters of a class by name, with those that its `**kwargs` pass on."""
     found: dict[str, inspect.Parameter] = {}
     for constructor in _constructors(cls):
-        named = inspect.signature(constructor).parameters.values()
-        found |= {it.name: it for it in named if it.kind in _NAMED and it.name not in found}
+        these = named(inspect.signature(constructor))
+        found |= {name: parameter for name, parameter in these.items() if name not in found}
     return found
 
 
@@ -35,8 +35,7 @@ def _constructors(cls: type[object]) -> Iterator[Any]:
         if constructor is None:
             continue
         yield constructor
-        kinds = {it.kind for it in inspect.signature(constructor).parameters.values()}
-        if inspect.Parameter.VAR_KEYWORD not in kinds:
+        if not takes_any(inspect.signature(constructor)):
             return
 
 
