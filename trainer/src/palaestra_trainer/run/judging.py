@@ -1,7 +1,8 @@
 """An environment without a simulator, which computes the rewards of goals for hindsight experience replay.
 
 The collecting environments cannot do it: their simulators may be restarting in other threads while the
-algorithm learns. The environment gets the fake robot that ships, and is never reset or stepped.
+algorithm learns. The environment gets a robot of the job's class that is never connected, and is never reset
+or stepped. The environments of simulators are made with such robots too, so what fits them fits here.
 """
 
 from __future__ import annotations
@@ -10,23 +11,33 @@ from typing import Any
 
 import gymnasium
 
-from palaestra_trainer.configuration import Environment
+from palaestra_trainer.configuration import DEFAULT_ROBOT, Configuration
 from palaestra_trainer.environments.making import make_environment
 from palaestra_trainer.episodes.vec_env import COMPUTE_REWARD
 from palaestra_trainer.errors import ConfigurationError
-from palaestra_trainer.testing import fake_seeing
+from palaestra_trainer.robots.choosing import robot_class
+from palaestra_trainer.robots.simulated import SimulatedScene
+from palaestra_trainer.webots import Attached, Webots
+from palaestra_trainer.webots.offers import withdraw
+
+_NAME = (
+    "judge"  # no simulator has it; an environment that asks for readings gets SimulatorDead with this name
+)
 
 
-def make_judge(wanted: Environment) -> gymnasium.Env[Any, Any]:
+def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
     """Return an environment of a job whose `compute_reward` may be called at any time.
 
     Raises:
-        ConfigurationError: it cannot be made with the fake robot, or has no `compute_reward`.
+        ConfigurationError: it does not fit the job's robot, or has no `compute_reward`.
     """
-    judge = make_environment(wanted, *fake_seeing())
+    webots = Webots(_NAME, wanted.simulators[0].world, launcher=Attached())
+    withdraw(webots)
+    robot = robot_class(wanted.robot or DEFAULT_ROBOT)(webots)
+    judge = make_environment(wanted.environment, robot, SimulatedScene(webots, robot))
     if not callable(getattr(judge.unwrapped, COMPUTE_REWARD, None)):
         raise ConfigurationError(
-            f"environment.id: {wanted.id} has no {COMPUTE_REWARD}, which HerReplayBuffer needs; add it as in "
-            "gymnasium-robotics, or remove replay_buffer_class"
+            f"environment.id: {wanted.environment.id} has no {COMPUTE_REWARD}, which HerReplayBuffer needs; "
+            "add it as in gymnasium-robotics, or remove replay_buffer_class"
         )
     return judge

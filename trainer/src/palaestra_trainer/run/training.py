@@ -213,7 +213,7 @@ class Attempt:
         """Return a new model with its environment; no simulator has to be up."""
         use_threads(self._around.environment)
         wanted = self._configuration
-        judge = make_judge(wanted.environment) if her.wanted(self._algorithm) else None
+        judge = make_judge(wanted) if her.wanted(self._algorithm) else None
         env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
         stack.callback(env.close)
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
