@@ -2,11 +2,13 @@
 
 import gymnasium
 import pytest
+import yaml
 from gymnasium.utils.env_checker import check_env
 
 import palaestra_trainer.environments
 from palaestra_trainer.errors import Paused, SimulatorDead
-from palaestra_trainer.webots import Webots
+from palaestra_trainer.simulators.offered import offered_simulator
+from palaestra_trainer.webots import Attached, Webots
 
 NAME = "MoveToTargetEnv-v0"
 WRAPPED = "ignore:.*different from the unwrapped version"
@@ -74,6 +76,27 @@ def test_an_environment_of_another_robot_finds_it_in_the_facade_of_the_program()
         webots.close()
 
     assert env.observation_space.contains(first)
+
+
+@pytest.mark.usefixtures("nothing_configured")
+def test_the_robot_in_a_facade_is_that_of_the_job(tmp_path, monkeypatch):
+    """A job's own program may create the facade; the job says what robot is in its world."""
+    job = {
+        "job": "j",
+        "environment": {"id": "Navigate-v0"},
+        "robot": "EPuck",
+        "steps": 1,
+        "simulators": [{"name": "collect-0", "group": "collect", "index": 0, "role": "Collect"}],
+    }
+    (tmp_path / "training.yaml").write_text(yaml.safe_dump(job))
+    monkeypatch.setenv("PALAESTRA_CONFIG", str(tmp_path / "training.yaml"))
+    webots = Webots("epuck", "desk.wbt", launcher=Attached())
+
+    place = offered_simulator("court")
+
+    assert place.webots is webots
+    assert type(place.robot).__name__ == "EPuck"
+    webots.close()
 
 
 @pytest.fixture
