@@ -90,7 +90,7 @@ def difference(name, collectors, wanted, step, way):
 def interrupt(run, step, way):
     """Begin a run, and end it once it is past a step: asked, as by Ctrl-C, or killed without a word."""
     with run:
-        run.wait_for_step(step)
+        run.wait_for_step(step, LONGEST_S)
         if way == KILLED:
             send(run.trainer(), signal.SIGKILL)
 
