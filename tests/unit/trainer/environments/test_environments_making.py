@@ -135,14 +135,50 @@ def test_all_options_that_do_not_fit_are_reported_at_once(made):
     ]
 
 
-def test_an_environment_that_refuses_its_arguments_is_a_mistake_of_the_configuration(made):
-    """Trying again would refuse them again."""
+@pytest.mark.parametrize("error", [ValueError, RuntimeError, AttributeError, OSError])
+def test_an_environment_whose_constructor_raises_is_a_mistake_of_the_configuration(made, error):
+    """Trying again would raise again, whatever the error is; its author needs the line."""
 
     class Strict(Hall):
         def __init__(self, robot, scene):
-            raise ValueError("the hall is too small")
+            raise error("the hall is too small")
 
-    assert "Hall-v0 cannot be created (the hall is too small)" in refused(made, Strict)
+    fact = f"Hall-v0 cannot be created ({error.__name__}: the hall is too small, in {__file__} line "
+
+    assert fact in refused(made, Strict)
+
+
+def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configuration(made):
+    """A constructor may ask a robot that is connected; another simulator may answer."""
+
+    class Asking(Hall):
+        def __init__(self, robot, scene):
+            raise SimulatorDead("collect-0", "its connections were closed")
+
+    with pytest.raises(SimulatorDead):
+        made(Asking)
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("gone + 1", "NameError: name 'gone' is not defined, in {file} line 1"),
+        ("import gone", "ModuleNotFoundError: No module named 'gone', in {file} line 1"),
+        ("def f(:", "SyntaxError: invalid syntax (hall.py, line 1)"),
+    ],
+)
+def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_configuration(
+    monkeypatch, tmp_path, text, fact
+):
+    """An import runs the user's code, which may raise anything."""
+    file = tmp_path / "hall.py"
+    file.write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    with pytest.raises(ConfigurationError) as refusal:
+        make_environment(Environment(id="hall:Hall-v0"), *fake_arena())
+
+    assert f"hall:Hall-v0 cannot be created ({fact.format(file=file)}" in str(refusal.value)
 
 
 @pytest.mark.parametrize(
@@ -333,6 +369,11 @@ def test_a_simulator_s_fault_passes(made):
         (spaces.Box(-1.0, 1.0, ()), np.float32(0.5), ""),
         (spaces.Discrete(3), 3, "3"),
         (spaces.Dict({"a": spaces.Discrete(2)}), {"a": 1}, ""),
+        (PAIR, {"a": 1, "image": np.zeros((36, 36, 1))}, "image: dtype float64, not uint8"),
+        (PAIR, {"a": 2, "image": np.zeros((36, 36, 1), np.uint8)}, "a: 2"),
+        (PAIR, {"a": 1, "b": 1}, "the keys a, b, not a, image"),
+        (PAIR, np.zeros(2), "a ndarray"),
+        (spaces.MultiBinary(40), np.zeros(41, np.int8), "shape (41,), not (40,)"),
     ],
 )
 def test_a_mismatch_is_described_in_words(space, observation, fact):

@@ -8,6 +8,7 @@ learner reports them as divergence.
 from __future__ import annotations
 
 import inspect
+import re
 import threading
 import warnings
 from collections.abc import Callable
@@ -144,16 +145,35 @@ class _Returned(gymnasium.Env[Any, Any]):
 
 def mismatch(space: spaces.Space[Any], observation: Any) -> str:
     """Return why an observation does not belong to its space, as text; "" if it does."""
+    if isinstance(space, spaces.Dict):
+        return _mismatch_of_dict(space, observation)
     if isinstance(space, spaces.Box):
         return _mismatch_of_box(space, observation)
-    return "" if space.contains(observation) else repr(observation)
+    if space.contains(observation):
+        return ""
+    return _mismatch_of_shape(space, observation) or repr(observation)
+
+
+def _mismatch_of_dict(space: spaces.Dict, observation: Any) -> str:
+    if not isinstance(observation, dict):
+        return _kind(observation)
+    if observation.keys() != space.keys():
+        return f"the keys {', '.join(map(str, observation))}, not {', '.join(space)}"
+    facts = ((key, mismatch(part, observation[key])) for key, part in space.items())
+    return "; ".join(f"{key}: {fact}" for key, fact in facts if fact)
+
+
+def _mismatch_of_shape(space: spaces.Space[Any], observation: Any) -> str:
+    """Return how the shape differs; "" if it does not, or if there is none."""
+    shape = getattr(observation, "shape", space.shape)
+    return "" if shape == space.shape else f"shape {shape}, not {space.shape}"
 
 
 def _mismatch_of_box(space: spaces.Box, observation: Any) -> str:
     if not isinstance(observation, np.ndarray | np.generic):
         return _kind(observation)
-    if observation.shape != space.shape:
-        return f"shape {observation.shape}, not {space.shape}"
+    if fact := _mismatch_of_shape(space, observation):
+        return fact
     if observation.dtype != space.dtype:
         return f"dtype {observation.dtype}, not {space.dtype}"
     numbers = np.asarray(observation)
@@ -173,7 +193,12 @@ def _objections(check: Callable[..., Any], returned: _Returned) -> list[str]:
             check(returned, **arguments)
         except (AssertionError, gymnasium.error.Error) as error:
             return [str(error)]
-    return [str(warning.message) for warning in caught]
+    return [_plain(str(warning.message)) for warning in caught]
+
+
+def _plain(warning: str) -> str:
+    """Return the text of one of gymnasium's warnings without its color and its level."""
+    return re.sub(r"^(\x1b\[\d+m)?WARN: |\x1b\[\d+m", "", warning)
 
 
 def _kind(result: Any) -> str:
@@ -183,5 +208,7 @@ def _kind(result: Any) -> str:
 
 
 def _finite(value: Any) -> bool:
-    numbers = np.asarray(value) if not isinstance(value, dict) else np.zeros(1)
+    if isinstance(value, dict):
+        return all(map(_finite, value.values()))
+    numbers = np.asarray(value)
     return numbers.dtype.kind != "f" or bool(np.isfinite(numbers).all())
