@@ -12,7 +12,7 @@ import re
 from types import ModuleType
 from typing import Any
 
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.errors import ConfigurationError, fact_of
 
 NAME = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -71,9 +71,8 @@ def module_named(name: str, subject: str) -> ModuleType:
         remedy = "install its package in the image, or add its folder to PYTHONPATH"
         raise _refusal(subject, error, remedy) from error
     except (Exception, SystemExit) as error:  # whatever the author's code raises; a script may exit
-        remedy = f"correct the module: python -c 'import {name}' shows the line"
-        raise _refusal(subject, error, remedy) from error
+        raise _refusal(subject, error, "correct the module") from error
 
 
 def _refusal(subject: str, error: BaseException, remedy: str) -> ConfigurationError:
-    return ConfigurationError(f"{subject} cannot be imported ({type(error).__name__}: {error}); {remedy}")
+    return ConfigurationError(f"{subject} cannot be imported ({fact_of(error)}); {remedy}")

@@ -14,10 +14,11 @@ from gymnasium import spaces
 from palaestra_trainer.configuration import Environment
 from palaestra_trainer.environments.checking import mismatch
 from palaestra_trainer.environments.making import keywords, make_environment
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 from palaestra_trainer.testing import fake_arena
 
 NAME = "Hall-v0"
+PAIR = spaces.Dict({"a": spaces.Discrete(2), "image": spaces.Box(0, 255, (36, 36, 1), np.uint8)})
 
 
 class Hall(gymnasium.Env):
@@ -287,7 +288,7 @@ class TextReward(Hall):
         (NoSeed, ["expected reset(self, *, seed=None, options=None)", "got reset()"]),
         (NoInfo, ["returns (observation, info)", "got a ndarray"]),
         (OldStep, ["(observation, reward, terminated, truncated, info)", "got a tuple of 4"]),
-        (NumberAsEnd, ["`terminated` signal to be a boolean", "float"]),
+        (NumberAsEnd, ["got Expects `terminated` signal to be a boolean", "<class 'float'>;"]),
         (NoSpace, ["expected an observation_space of gymnasium.spaces", "NoneType"]),
         (Wide, ["shape (3,), not (2,)"]),
         (Listed, ["from reset an observation of Box", "got a list"]),
@@ -335,6 +336,22 @@ def test_numbers_that_are_not_finite_are_left_to_the_learner(made, number):
     class Divided(Hall):
         seen = (number, 0.0)
         reward = number
+
+    env = made(Divided)
+
+    env.reset(seed=1)
+    env.step(0)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_numbers_in_a_dict_that_are_not_finite_are_left_to_the_learner(made, number):
+    """Its message names the key; gymnasium's does not."""
+
+    class Divided(Hall):
+        observation_space = spaces.Dict({"a": Hall.observation_space})
+
+        def observe(self):
+            return {"a": np.array([number, 0.0], np.float32)}
 
     env = made(Divided)
 

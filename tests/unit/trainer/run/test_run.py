@@ -242,12 +242,12 @@ def test_a_summary_says_what_the_wall_clock_went_into(play, job, directory):
 
 
 def test_an_unexpected_error_ends_with_1_and_stops_every_simulator(play, job, last_word):
-    """A bug must not leave processes behind."""
+    """A bug must not leave processes behind, and its line must be found without the log."""
     bug = {"collect-0": {"steps": {20: ZeroDivisionError("a bug")}}}
     code, members = play(job(), bug)
 
     assert code == 1
-    assert last_word().reason == "Unexpected: ZeroDivisionError: a bug"
+    assert last_word().reason.startswith("Unexpected: ZeroDivisionError: a bug, in /")
     assert all(member.log[-1] == "stop" for member in members.values())
 
 

@@ -21,7 +21,7 @@ from palaestra_trainer import own
 from palaestra_trainer.arguments import Arguments
 from palaestra_trainer.configuration import DEFAULT_REWARD, Environment
 from palaestra_trainer.environments.checking import held
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.errors import ConfigurationError, TrainerError, fact_of
 from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.robots.capabilities import require
 
@@ -40,11 +40,12 @@ def make_environment(wanted: Environment, robot: RobotAbc, scene: Scene) -> gymn
     try:
         # `held` replaces gymnasium's wrapper, whose warnings would not end the run.
         env = gymnasium.make(wanted.id, disable_env_checker=True, **arguments)
-    except ConfigurationError:
+    except TrainerError:
         raise
-    except (AssertionError, TypeError, ValueError) as error:
+    except Exception as error:  # the constructor is the user's code, which may raise anything
         raise ConfigurationError(
-            f"environment.id: {wanted.id} cannot be created ({error}); fix it, or change environment.options"
+            f"environment.id: {wanted.id} cannot be created ({fact_of(error)}); "
+            "fix it, or change environment.options"
         ) from error
     return held(env, wanted.id)
 

@@ -18,7 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from palaestra_trainer import own
 from palaestra_trainer.arguments import Arguments
 from palaestra_trainer.configuration import Callback
-from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError
+from palaestra_trainer.errors import CallbackFailed, ConfigurationError, TrainerError, fact_of
 
 log = structlog.get_logger(__name__)
 
@@ -163,5 +163,5 @@ def _made(field: str, cls: type[BaseCallback], callback: Callback) -> BaseCallba
         return cls(**callback.options)
     except Exception as error:  # a constructor of the job's author may raise anything
         raise ConfigurationError(
-            f"{field}: {callback.name} refuses its arguments ({type(error).__name__}: {error}); change them"
+            f"{field}: {callback.name} refuses its arguments ({fact_of(error)}); change them"
         ) from error

@@ -22,6 +22,7 @@ from palaestra_trainer.errors import (
     MasterLost,
     SimulatorFault,
     SimulatorHung,
+    fact_of,
 )
 from palaestra_trainer.waiting.interruption import Interrupted
 
@@ -68,7 +69,7 @@ def end_of(error: BaseException) -> End:
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
         where = error.filename or "the run directory"
         return End(UNEXPECTED, "StorageFull", f"{where}: disk full; free some space")
-    return End(UNEXPECTED, "Unexpected", f"{type(error).__name__}: {error}")
+    return End(UNEXPECTED, "Unexpected", fact_of(error))
 
 
 def write_last_word(
