@@ -28,17 +28,26 @@ import traceback
 from typing import ClassVar, Literal
 
 FaultKind = Literal["dead", "hung", "wrong_data"]
-_BETWEEN = ("palaestra_trainer", "importlib", "gymnasium")  # they import and call the code of a job's author
+# They call the code of a job's author, or are called by it: their lines do not say what to change.
+_LIBRARIES = {
+    "gymnasium",
+    "importlib",
+    "numpy",
+    "palaestra_trainer",
+    "sb3_contrib",
+    "stable_baselines3",
+    "torch",
+}
 
 
 def fact_of(error: BaseException) -> str:
     """Return class, text and line of an error that the code of a job's author raised."""
     fact = f"{type(error).__name__}: {error}"
-    packages = (
+    frames = (
         (frame.f_globals.get("__name__", "").partition(".")[0], frame.f_code.co_filename, line)
         for frame, line in traceback.walk_tb(error.__traceback__)
     )
-    lines = [f"{file} line {line}" for package, file, line in packages if package not in _BETWEEN]
+    lines = [f"{file} line {line}" for package, file, line in frames if package not in _LIBRARIES]
     return f"{fact}, in {lines[-1]}" if lines else fact
 
 

@@ -63,6 +63,27 @@ class Doubled(FlattenExtractor):
         return 2.0 * super().forward(observations)
 
 
+class Picky(FlattenExtractor):
+    """It wants a Dict."""
+
+    def __init__(self, observation_space):
+        observation_space["sensors"]
+
+
+class Hasty(FlattenExtractor):
+    """It asks for what is not there yet."""
+
+    def __init__(self, observation_space):
+        self.missing
+
+
+class Lost(FlattenExtractor):
+    """It asks for a key that its table lacks."""
+
+    def __init__(self, observation_space):
+        {}["units"]
+
+
 class OwnPolicy(ActorCriticPolicy):
     """The usual policy."""
 
@@ -188,7 +209,8 @@ def test_a_class_that_makes_its_own_buffer_is_refused(lab, make, name, buffer):
     wanted = Algorithm(name=name, hyperparameters=hyperparameters)
     check(wanted)
 
-    with pytest.raises(ConfigurationError, match=f"creates its own {buffer}, which learns from rows that a"):
+    fact = rf"^algorithm\.name: {name.partition(':')[2]} creates its own {buffer}, which learns from rows"
+    with pytest.raises(ConfigurationError, match=fact):
         make(wanted)
 
 
@@ -239,6 +261,25 @@ def test_a_policy_that_the_observation_does_not_fit_is_refused(make):
     """Stable-Baselines3 says so by an assertion."""
     with pytest.raises(ConfigurationError, match="algorithm: PPO refuses its hyperparameters or the envir"):
         make(Algorithm(name="PPO", policy="CnnPolicy", hyperparameters=ROLLOUTS))
+
+
+@pytest.mark.parametrize(
+    ("extractor", "fact"),
+    [
+        ("Picky", "TypeError: 'Box' object is not subscriptable"),
+        ("Hasty", "AttributeError: 'Hasty' object has no attribute 'missing'"),
+        ("Lost", "KeyError: 'units'"),
+    ],
+)
+def test_a_part_of_a_policy_whose_constructor_raises_is_refused_with_its_line(lab, make, extractor, fact):
+    """Trying again would raise again."""
+    parts = {"features_extractor_class": f"my_lab:{extractor}"}
+    wanted = Algorithm(name="PPO", hyperparameters=ROLLOUTS | {"policy_kwargs": parts})
+
+    with pytest.raises(ConfigurationError) as refusal:
+        make(wanted)
+
+    assert f"the environment's spaces ({fact}, in {lab / 'my_lab.py'} line " in str(refusal.value)
 
 
 POINTS = [[0, 0.01], [0.5, 0.002], [0.75, 0.004]]

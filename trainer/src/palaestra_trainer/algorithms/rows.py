@@ -65,7 +65,7 @@ class OffPolicyRows(ValidRowsCounted, OffPolicyAlgorithm):
     """An off-policy algorithm that stores valid rows, and ends at its number of steps.
 
     Raises:
-        TypeError: it creates its own kind of replay buffer, in which invalid rows would be stored.
+        ConfigurationError: it creates its own kind of replay buffer, in which invalid rows would be stored.
     """
 
     def _setup_model(self) -> None:
@@ -95,7 +95,7 @@ class OnPolicyRows(ValidRowsCounted, OnPolicyAlgorithm):
     """An on-policy algorithm whose rollouts mask invalid rows.
 
     Raises:
-        TypeError: it creates its own kind of rollout buffer, in which nothing would be masked.
+        ConfigurationError: it creates its own kind of rollout buffer, in which nothing would be masked.
     """
 
     def _masked(self) -> ValidRolloutBuffer:
@@ -159,8 +159,8 @@ def with_valid_rows(cls: type[BaseAlgorithm]) -> type[BaseAlgorithm]:
     return cast("type[BaseAlgorithm]", made)
 
 
-def _creates_its_own(model: BaseAlgorithm, buffer: Any) -> TypeError:
-    return TypeError(
-        f"{type(model).__name__} creates its own {type(buffer).__name__}, which learns from rows that "
-        "a fault spoiled; use an algorithm with a buffer of Stable-Baselines3"
+def _creates_its_own(model: BaseAlgorithm, buffer: Any) -> ConfigurationError:
+    return ConfigurationError(
+        f"algorithm.name: {type(model).__name__} creates its own {type(buffer).__name__}, which learns from "
+        "rows that a fault spoiled; use an algorithm with a buffer of Stable-Baselines3"
     )

@@ -20,7 +20,7 @@ from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
 from palaestra_trainer.algorithms.images import with_channels_first, with_network
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.configuration import Algorithm, Device, nearest
-from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.errors import ConfigurationError, fact_of
 
 
 def check(algorithm: Algorithm) -> Entry:
@@ -108,9 +108,12 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         )
     try:
         return entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
-    except (AssertionError, TypeError, ValueError) as error:
-        # Stable-Baselines3 checks values and spaces by assertions.
+    except ConfigurationError:
+        raise
+    except (AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # Stable-Baselines3 checks values and spaces by assertions; a policy of the job's author, or a part
+        # of one, may raise anything. A RuntimeError may be a device without memory, which a retry may have.
         raise ConfigurationError(
             f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
-            f"({error}); change them, or use another algorithm"
+            f"({fact_of(error)}); change them, or use another algorithm"
         ) from error
