@@ -26,7 +26,9 @@ def sweep(tmp_path: Path) -> Callable[..., Sweep]:
     return make
 
 
-def figures(*curves: dict[int, float], ended: bool = True, succeeded: bool = True) -> Figures:
+def figures(
+    *curves: dict[int, float], ended: bool = True, succeeded: bool = True, reason: str = ""
+) -> Figures:
     """Return the figures of a trial whose runs have these success rates by step."""
     return Figures.of(
         tuple(
@@ -36,6 +38,7 @@ def figures(*curves: dict[int, float], ended: bool = True, succeeded: bool = Tru
                 ),
                 ended=ended,
                 succeeded=succeeded,
+                reason=reason,
             )
             for curve in curves
         )

@@ -35,7 +35,10 @@ class Stage:
         ended = self.looks[trial.number] == trial.job.spec.trainer.steps
         if ended:
             self._active.discard(trial.number)
-        return figures({1: 0.5}, ended=ended, succeeded=trial.number not in self._fails)
+        failed = trial.number in self._fails
+        return figures(
+            {1: 0.5}, {1: 0.25}, ended=ended, succeeded=not failed, reason="Diverged: NaN" if failed else ""
+        )
 
     def prune(self, trial):
         """Make room."""
@@ -60,6 +63,13 @@ def test_trials_run_in_order_as_many_as_there_is_room_for(sweep, tmp_path) -> No
     )
     assert reported[0] == "s-0: trainer.steps = 3"
     assert reported.index("s-1: complete") < reported.index("s-2: trainer.steps = 2")
+
+
+def test_a_trial_that_failed_says_why(sweep, tmp_path) -> None:
+    """A reason of several seeds once: the person should not search the logs of every run."""
+    _, _, reported = carried_out(sweep, tmp_path, fails={2})
+
+    assert [line for line in reported if "failed" in line] == ["s-2: failed; Diverged: NaN"]
 
 
 def test_a_second_time_only_trials_that_failed_are_begun(sweep, tmp_path) -> None:

@@ -60,7 +60,7 @@ def carry_out(search: Search, place: Place, folder: Path, report: Callable[[str]
             if figures.state is not State.RUNNING:
                 ledger.note(folder, trial.number, figures)
                 search.learn(trial, figures)
-                report(f"{trial.name}: {figures.state}")
+                report("; ".join([f"{trial.name}: {figures.state}", *figures.reasons()]))
                 del active[trial.number]
 
 

@@ -127,6 +127,7 @@ class Here:
             success_rate=None if outcome is None else outcome.success_rate,
             ended=not underway,
             succeeded=outcome is not None and outcome.finished,
+            reason="" if outcome is None else outcome.reason,
         )
 
 

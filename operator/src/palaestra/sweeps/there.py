@@ -124,4 +124,5 @@ class There:
             success_rate=rate,
             ended=status.phase in TERMINAL,
             succeeded=status.phase is Phase.SUCCEEDED,
+            reason=status.message or "",
         )

@@ -39,12 +39,16 @@ class Point:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFigures:
-    """One run of a trial: its evaluations in order, and its result by objective; None: none yet."""
+    """One run of a trial: its evaluations in order, and its result by objective; None: none yet.
+
+    `reason` says how it ended; empty: it has not, or nothing is known.
+    """
 
     curve: tuple[Point, ...] = ()
     success_rate: float | None = None
     ended: bool = False
     succeeded: bool = False
+    reason: str = ""
 
     def at(self, step: int, objective: Objective) -> float | None:
         """Return the newest figure at a step; None if there is none yet, or the curve ends before."""
@@ -84,6 +88,11 @@ class Figures:
             return cls(state=State.RUNNING, runs=runs)
         done = all(run.succeeded for run in runs)
         return cls(state=State.COMPLETE if done else State.FAILED, runs=runs)
+
+    def reasons(self) -> tuple[str, ...]:
+        """Return why runs failed, each reason once."""
+        failed = (run for run in self.runs if run.ended and not run.succeeded)
+        return tuple(dict.fromkeys(run.reason for run in failed if run.reason))
 
     def values(self, objective: Objective) -> tuple[float, ...]:
         """Return the known results, one a seed."""
