@@ -135,6 +135,13 @@ def test_a_callback_that_returns_false_ends_training_ordinarily(
     assert events(seen, "note", "end") == [kept]
 
 
+def test_a_run_that_a_callback_ended_does_not_say_that_all_steps_are_done(play, with_callbacks, last_word):
+    """Its result and its status are read by people who did not read the log."""
+    play(with_callbacks({"stop_at": 55}))
+
+    assert last_word().reason == "Completed: the training is complete"
+
+
 def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
     play, job, with_callbacks, directory, tmp_path
 ):

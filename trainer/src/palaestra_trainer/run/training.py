@@ -55,7 +55,7 @@ from palaestra_trainer.waiting.interruption import Interruption
 log = structlog.get_logger(__name__)
 
 MakeMembers = Callable[[Configuration], Sequence[Member]]
-DONE = End(ExitCode.DONE, "Completed", "all steps are done")
+DONE = End(ExitCode.DONE, "Completed", "the training is complete")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
