@@ -30,12 +30,12 @@ FIELDS = {
     "environment.id": lambda module: keywords(Environment(id=f"{module}:Own-v0")),
 }
 BROKEN = {
-    "raise RuntimeError('no display')": "(RuntimeError: no display); correct the module: python -c 'import ",
-    "class Own(": "(SyntaxError: '(' was never closed",
-    "import sys; sys.exit('usage: own FILE')": "(SystemExit: usage: own FILE); correct the module",
+    "raise RuntimeError('no display')": "(RuntimeError: no display, in {file} line 1); correct the module",
+    "class Own(": "(SyntaxError: '(' was never closed ({name}, line 1)); correct the module",
+    "import sys; sys.exit('no file')": "(SystemExit: no file, in {file} line 1); correct the module",
     "import no_such_package": (
-        "(ModuleNotFoundError: No module named 'no_such_package'); install its package in the image, "
-        "or add its folder to PYTHONPATH"
+        "(ModuleNotFoundError: No module named 'no_such_package', in {file} line 1); "
+        "install its package in the image, or add its folder to PYTHONPATH"
     ),
 }
 
@@ -55,15 +55,16 @@ def written(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("source", BROKEN)
 @pytest.mark.parametrize("field", FIELDS)
-def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_job(written, field, source):
-    """Whatever it raises: exit code 2 with field, fact and remedy, not a retry or a silent end."""
+def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_job(written, tmp_path, field, source):
+    """Whatever it raises: exit code 2 with field, fact, line and remedy, not a retry or a silent end."""
     module = written(source)
 
     with pytest.raises(ConfigurationError) as refusal:
         FIELDS[field](module)
 
     assert f"{field}: {module}:Own" in str(refusal.value)
-    assert f"cannot be imported {BROKEN[source]}" in str(refusal.value)
+    fact = BROKEN[source].format(file=tmp_path / f"{module}.py", name=f"{module}.py")
+    assert f"cannot be imported {fact}" in str(refusal.value)
 
 
 def test_an_entry_point_that_cannot_be_imported_is_a_mistake_of_the_job(written):

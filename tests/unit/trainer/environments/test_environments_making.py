@@ -161,28 +161,6 @@ def test_a_fault_of_a_simulator_in_a_constructor_is_no_mistake_of_the_configurat
 
 
 @pytest.mark.parametrize(
-    ("text", "fact"),
-    [
-        ("gone + 1", "NameError: name 'gone' is not defined, in {file} line 1"),
-        ("import gone", "ModuleNotFoundError: No module named 'gone', in {file} line 1"),
-        ("def f(:", "SyntaxError: invalid syntax (hall.py, line 1)"),
-    ],
-)
-def test_a_module_that_cannot_be_imported_is_a_mistake_of_the_configuration(
-    monkeypatch, tmp_path, text, fact
-):
-    """An import runs the user's code, which may raise anything."""
-    file = tmp_path / "hall.py"
-    file.write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
-
-    with pytest.raises(ConfigurationError) as refusal:
-        make_environment(Environment(id="hall:Hall-v0"), *fake_arena())
-
-    assert f"hall:Hall-v0 cannot be created ({fact.format(file=file)}" in str(refusal.value)
-
-
-@pytest.mark.parametrize(
     ("name", "fact"),
     [("Nowhere-v0", "cannot be created"), ("no_such_module:Hall-v0", "cannot be imported")],
 )

@@ -82,14 +82,6 @@ def test_what_is_no_class_of_a_robot_is_refused_before_anything_starts(module, n
     assert str(refusal.value).startswith(fact)
 
 
-def test_a_robot_whose_module_raises_an_error_is_refused(module):
-    """An import runs the user's code, which may raise anything."""
-    module("class MyBot(Robotino): pass\n")
-
-    with pytest.raises(ConfigurationError, match=r"mybots:MyBot cannot be imported \(NameError: .* line 1\)"):
-        robot_class("mybots:MyBot")
-
-
 @pytest.fixture
 def sorting():
     """An environment that needs joints; it is forgotten at the end."""

@@ -218,7 +218,7 @@ def test_a_run_may_resume_with_other_callbacks(play, job, with_callbacks):
         ("{module}:Unfinished", {}, "{module}:Unfinished has no _on_step; add this method"),
         ("{module}:Notes", {"stopat": 1}, "options.stopat: {module}:Notes has no such argument; did you"),
         ("{module}:Demanding", {}, "options.threshold: {module}:Demanding needs this argument; set it"),
-        ("{module}:Notes", {"word": ""}, "refuses its arguments (ValueError: a word is needed); change them"),
+        ("{module}:Notes", {"word": ""}, "refuses its arguments (ValueError: a word is needed, in "),
     ],
 )
 def test_a_wrong_callback_is_refused_with_field_fact_and_remedy(module, name, options, fact):
