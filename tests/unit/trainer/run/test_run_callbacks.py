@@ -18,6 +18,8 @@ from palaestra_trainer.run_directory import RunDirectory, read_lines
 MODULE = """
     from stable_baselines3.common.callbacks import BaseCallback
 
+    from palaestra_trainer.errors import SimulatorDead
+
     SEEN = []
 
 
@@ -40,6 +42,8 @@ MODULE = """
 
         def _on_training_end(self):
             SEEN.append((self.word, "end", self.model.num_timesteps))
+            if self.fail_at_end == "fault":
+                raise SimulatorDead("collect-0", "connection refused")
             if self.fail_at_end:
                 raise RuntimeError("no such file")
 
@@ -181,6 +185,29 @@ def test_an_error_at_the_end_is_reported_too(play, with_callbacks, last_word, se
     assert code == 1
     assert "raised RuntimeError: no such file" in last_word().reason
     assert events(seen, "second", "end") == [100]
+
+
+def test_a_fault_at_the_end_of_a_callback_neither_skips_the_others_nor_hides_the_first_error(
+    play, with_callbacks, last_word, seen
+):
+    """A callback that still uses a simulator at its end may meet a fault; the first error is the cause."""
+    ends = ({"fail_at_end": "fault"}, {"word": "second", "fail_at_end": True}, {"word": "third"})
+
+    play(with_callbacks(*ends))
+    reason = last_word().reason
+    play(with_callbacks({"word": "breaks", "fail_at": 5}, *ends, steps=200))
+
+    assert reason == "SimulatorUnavailable: collect-0: connection refused"
+    assert last_word().reason.endswith("raised RuntimeError: no such plot")
+    assert events(seen, "second", "end") == [100, 104]
+    assert events(seen, "third", "end") == [100, 104]
+
+
+def test_every_error_at_the_end_is_in_the_log(play, with_callbacks, capsys):
+    """The reason of the run names only the first one."""
+    play(with_callbacks({"fail_at_end": "fault"}, {"word": "second", "fail_at_end": True}))
+
+    assert "raised RuntimeError: no such file" in capsys.readouterr().out
 
 
 def test_a_callback_begins_anew_when_a_run_resumes(play, with_callbacks, last_word, seen):

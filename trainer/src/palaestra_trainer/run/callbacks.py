@@ -69,24 +69,26 @@ class JobCallbacks(CallbackList):
         """Call `_on_training_end` of each callback, if training has begun.
 
         Raises:
-            CallbackFailed: one of them raised an error; the others were called too.
+            TrainerError: the first error of a callback. The others were called too; their errors are logged.
         """
-        failed: list[CallbackFailed] = []
-        for callback in self._named if self._begun else ():
-            try:
-                callback.on_training_end()
-            except CallbackFailed as error:
-                failed.append(error)
+        failed = self._end_each()
+        _log(failed[1:])
         if failed:
             raise failed[0]
 
-    def end_after(self, error: BaseException) -> None:
-        """Do the same after an error, which a failure of a callback must not hide: it is logged."""
-        try:
-            self.end()
-        except CallbackFailed as failed:
-            if not isinstance(error, CallbackFailed):
-                log.exception("callback failed after the end of training", fact=str(failed))
+    def end_after_error(self) -> None:
+        """Do the same after an error, which a failure of a callback must not hide: each is logged."""
+        _log(self._end_each())
+
+    def _end_each(self) -> Sequence[TrainerError]:
+        """Return the errors in the order in which the callbacks raised them."""
+        failed: list[TrainerError] = []
+        for callback in self._named if self._begun else ():
+            try:
+                callback.on_training_end()
+            except TrainerError as error:
+                failed.append(error)
+        return failed
 
     def _on_training_start(self) -> None:
         self._begun = True
@@ -132,6 +134,11 @@ class _Named(CallbackList):
     def _call(self, method: Callable[[], Any]) -> Any:
         with _naming(self.name):
             return method()
+
+
+def _log(failed: Iterable[TrainerError]) -> None:
+    for error in failed:
+        log.error("callback failed after the end of training", fact=str(error), exc_info=error)
 
 
 @contextmanager

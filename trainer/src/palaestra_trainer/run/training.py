@@ -294,8 +294,8 @@ class Attempt:
     def _learn_with_callbacks(self, model: BaseAlgorithm, conductor: Conductor) -> None:
         try:
             self._learn(model, conductor)
-        except BaseException as error:
-            self._callbacks.end_after(error)
+        except BaseException:
+            self._callbacks.end_after_error()
             raise
         self._callbacks.end()
 
