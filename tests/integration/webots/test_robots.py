@@ -12,7 +12,9 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.testing import check_robot, check_scene
 from palaestra_trainer.testing.fake_burger import COURT
 from palaestra_trainer.testing.fake_scene import arena as fake_floor
-from palaestra_trainer.webots import Webots
+from palaestra_trainer.webots import FLOOR, Webots
+from palaestra_trainer.webots.services import Services
+from palaestra_trainer.webots.surroundings import Surroundings
 
 START, TARGET = Pose(0.0, 0.0, 1.0), (1.0, 0.0)
 FITTED = b"""
@@ -40,6 +42,19 @@ FITTED = b"""
       endPoint Solid { name "right finger" }
     }
 """
+
+
+class Noting(Services):
+    """Services of a running simulator that note which ones were asked for."""
+
+    def __init__(self, node_name):
+        super().__init__(node_name)
+        self.asked = []
+
+    def get(self, path, type_name):
+        """Note the path."""
+        self.asked.append(path)
+        return super().get(path, type_name)
 
 
 @pytest.fixture
@@ -193,3 +208,16 @@ def test_a_world_without_a_floor_is_refused(running):
 
     with pytest.raises(WorldMisfit, match="the world has no floor; give a Solid"):
         scene.layout()
+
+
+def test_only_what_looks_different_when_turned_is_asked_for_its_orientation(arena):
+    """Each call of a reset counts: a layout has a floor with two corners, which no heading changes."""
+    services = Noting(arena.webots.supervisor.node_name)
+    try:
+        things = Surroundings(services).read()
+    finally:
+        services.close()
+
+    turned = [thing for thing in things if thing.name != FLOOR and not thing.shapes[0].radius_m]
+    assert len(turned) < len(things) - 1
+    assert services.asked.count("supervisor/node/get_orientation") == len(turned)

@@ -32,7 +32,7 @@ class Shape(NamedTuple):
 
 
 class Thing(NamedTuple):
-    """A solid: DEF name or "", where it is, rotation about z, and its shapes."""
+    """A solid: DEF name or "", where it is, rotation about z (0 for the floor), and its shapes."""
 
     name: str
     place: Vector
@@ -121,6 +121,8 @@ class Surroundings:
         return self._value(known.translation, "vec3f")
 
     def _heading(self, known: _Known) -> float:
+        if known.name == FLOOR:
+            return 0.0  # a layout has its sides along the axes of the world
         if all(shape.radius_m and shape.center[:2] == (0.0, 0.0) for shape in known.shapes):
             return 0.0  # it looks the same from every side
         orientation = self._ask("supervisor/node/get_orientation", "node_get_orientation", node=known.node)
