@@ -2,7 +2,7 @@
 
 import pytest
 
-from palaestra.sweeps.suggesting import Suggested
+from palaestra.sweeps.suggesting import JOURNAL, Suggested
 from palaestra.sweeps.trial import Figures, State
 from tests.unit.sweeps.conftest import figures
 
@@ -56,6 +56,24 @@ def test_an_interrupted_search_suggests_its_running_trial_again_under_its_number
     assert again.next() is None
     assert len({tuple(trial.changes.values()) for trial in again.known}) == 4
     assert [trial.number for trial in again.known] == [0, 1, 2, 3]
+
+
+def test_a_kill_at_any_moment_of_a_restart_loses_no_trial(search, tmp_path) -> None:
+    """The journal is cut after each of the writes that the restart made."""
+    first, journal = search(trials=2), tmp_path / JOURNAL
+    done, running = first.next(), first.next()
+    first.learn(done, figures({5: 0.9}))
+    kept = len(journal.read_text().splitlines())
+    search(trials=2).next()
+    lines = journal.read_text().splitlines(keepends=True)
+
+    for end in range(kept, len(lines) + 1):
+        journal.write_text("".join(lines[:end]))
+        again = search(trials=2)
+        known = again.known
+        assert again.next() == running, f"after {end - kept} of {len(lines) - kept} writes"
+        assert known == again.known == [done, running]
+        assert again.next() is None
 
 
 def test_a_trial_that_fails_or_has_no_figure_has_no_value(search) -> None:

@@ -35,11 +35,8 @@ class Suggested:
         self._reported: dict[int, set[int]] = {}
         self._known: dict[int, Trial] = {}
         for old in self._study.get_trials(deepcopy=False):
-            self._know(old.user_attrs.get(NUMBER), old.params)
-        for running in self._study.get_trials(states=(TrialState.RUNNING,)):
-            self._study.tell(running.number, state=TrialState.FAIL)
-            if running.params:
-                self._study.enqueue_trial(running.params, user_attrs=running.user_attrs)
+            self._know(old.user_attrs.get(NUMBER), _values(old))
+        self._suggest_again()
 
     @property
     def known(self) -> Sequence[Trial]:
@@ -72,6 +69,16 @@ class Suggested:
             self._study.tell(asked, value)
         else:
             self._study.tell(asked, state=TrialState.FAIL)
+
+    def _suggest_again(self) -> None:
+        """Enqueue each trial that was running; one without a number was never begun, and is dropped."""
+        waits = self._study.get_trials(states=(TrialState.WAITING,))
+        enqueued = {old.user_attrs.get(NUMBER) for old in waits}
+        for running in self._study.get_trials(states=(TrialState.RUNNING,)):
+            # In this order, a kill between the two writes leaves both trials, and the next start ends one.
+            if running.user_attrs.get(NUMBER) not in {None, *enqueued}:
+                self._study.enqueue_trial(_values(running), user_attrs=running.user_attrs)
+            self._study.tell(running.number, state=TrialState.FAIL)
 
     def _report(self, trial: Trial, figures: Figures) -> None:
         """Report the medians over the seeds that are new."""
@@ -108,6 +115,11 @@ def _study(sweep: Sweep, folder: Path) -> optuna.Study:
     seed = sweep.spec.seed + len(study.get_trials(deepcopy=False))
     study.sampler = optuna.samplers.TPESampler(seed=seed, n_startup_trials=wanted.startup_trials)
     return study
+
+
+def _values(trial: optuna.trial.FrozenTrial) -> dict[str, Any]:
+    """Return the values of a trial, with those that Optuna will use when an enqueued one begins."""
+    return {**trial.system_attrs.get("fixed_params", {}), **trial.params}
 
 
 def _space(values: Distribution) -> BaseDistribution:
