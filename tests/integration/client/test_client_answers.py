@@ -1,6 +1,7 @@
 """What commands make of answers that a real API server gives seldom; a scripted one gives them here."""
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import yaml
@@ -14,9 +15,10 @@ from palaestra.doctor import Site
 from palaestra.doctor.installation import leads
 from palaestra.given import data_of
 from palaestra.sweeps.model import LABEL
-from palaestra.sweeps.there import There
+from palaestra.sweeps.there import QUIET_LOOKS, There
 from palaestra.sweeps.trial import State, Trial
-from tests.integration.apiserver.server import raw, refusal, reply, serving, stream
+from tests.integration.apiserver.server import hang_up, raw, refusal, reply, serving, stream
+from tests.waiting import eventually
 
 JOB = "apiVersion: palaestra.dev/v1alpha1\nkind: TrainingJob\nmetadata: {name: trial}\nspec: {}\n"
 NAMED = {"name": "trial-x7k2p", "namespace": "robots", "uid": "0d1f"}
@@ -28,6 +30,7 @@ WAITS = {
     "since": "2026-01-31T12:00:05Z",
 }
 WHY = "ImagePull since 2026-01-31T12:00:05Z: container trainer: image a:1 cannot be pulled"
+PATIENCE_S = 30.0
 NO_RIGHT = 'trainingjobs.palaestra.dev is forbidden: User "me" cannot list resource "trainingjobs" in ...'
 NO_ROOM = "trainingjobs.palaestra.dev is forbidden: exceeded quota: few, requested: 1, used: 1, limited: 1"
 
@@ -299,7 +302,7 @@ def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
     script.calls = [refusal(404, "NotFound"), reply(201, stored), reply(obj={"metadata": {}, "items": []})]
 
     with Client(kubeconfig=kubeconfig) as client:
-        place = There(client, "s", 1, look_s=0.01)
+        place = There(client, "s", 1, print, look_s=0.01)
         place.begin(trial)
         full = not place.has_room()
         place.wait()
@@ -310,6 +313,31 @@ def test_a_trial_whose_job_was_deleted_makes_room_for_the_next(server, trial):
     assert place.has_room()
 
 
+def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
+    """Otherwise the command looks as if it hung; a moment without an answer is no news."""
+    script, kubeconfig = server
+    none = reply(obj={"metadata": {}, "items": []})
+    away = [refusal(503, "ServiceUnavailable")] * (QUIET_LOOKS - 1)
+    script.calls = [*away, none, *away, hang_up]
+    said = []
+
+    with Client(kubeconfig=kubeconfig) as client, ThreadPoolExecutor(1) as pool:
+        place = There(client, "s", 1, said.append, look_s=0.01)
+        place.wait()
+        quiet = list(said)
+        waited = pool.submit(place.wait)
+        eventually(lambda: len(script.asked) > 4 * QUIET_LOOKS, PATIENCE_S)
+        script.calls = [none]
+        waited.result(PATIENCE_S)
+        place.wait()
+
+    assert quiet == []
+    assert len(said) == 2
+    assert said[0].startswith("the API server has given no status for a while (")
+    assert said[0].endswith("); the trials run on without this command, which asks again")
+    assert said[1] == "the API server answers again"
+
+
 @pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])
 def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers):
     """A person and the sweep may both find that it is not worth going on."""
@@ -317,7 +345,7 @@ def test_a_trial_whose_job_somebody_deletes_can_be_pruned(server, trial, answers
     script.calls = [*answers, refusal(404, "NotFound")]
 
     with Client(kubeconfig=kubeconfig) as client:
-        There(client, "s", 1).prune(trial)
+        There(client, "s", 1, print).prune(trial)
 
     assert [asked.method for asked in script.asked] == ["GET", "DELETE"][: 1 + len(answers)]
 

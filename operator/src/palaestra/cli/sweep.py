@@ -109,7 +109,7 @@ def _there(client: Client, options: argparse.Namespace) -> int:
     sweep = _loaded(options.file)
     folder = options.dir.absolute() / sweep.metadata.name
     default = None if sweep.spec.optuna is None else SEARCHED_AT_ONCE
-    place = There(client, sweep.metadata.name, options.at_once or default)
+    place = There(client, sweep.metadata.name, options.at_once or default, _say)
     with _begun(sweep, place, folder) as search:
         carry_out(search, place, folder, _say)
         return _shown(search, place, sweep, folder)

@@ -4,8 +4,9 @@ They need no command that runs. This one creates them, reads their status, and d
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from itertools import count
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
@@ -18,6 +19,7 @@ from palaestra.sweeps.trial import Figures, Point, RunFigures, State, Trial
 
 LOOK_S = 5.0  # the operator writes a status every 30 s at most
 DELETED_S = 300.0
+QUIET_LOOKS = 6  # looks in vain before a line says so: half a minute at least
 
 
 class NotOfThisSweep(ClientError):
@@ -31,13 +33,22 @@ class There:
         client: of the cluster and namespace.
         sweep: its name.
         at_once: trials at the same time; None: all, and the queue decides.
+        report: is called with a line when the API server has been away for a while, and when it is back.
         look_s: seconds between two looks.
     """
 
-    def __init__(self, client: Client, sweep: str, at_once: int | None, look_s: float = LOOK_S) -> None:
+    def __init__(
+        self,
+        client: Client,
+        sweep: str,
+        at_once: int | None,
+        report: Callable[[str], object],
+        look_s: float = LOOK_S,
+    ) -> None:
         self._client = client
         self._selector = f"{LABEL}={sweep}"
         self._at_once = at_once
+        self._report = report
         self._look_s = look_s
         self._begun: set[int] = set()
         self._jobs: Mapping[str, TrainingJob] = {}
@@ -81,14 +92,21 @@ class There:
 
     def wait(self) -> None:
         """Return after some seconds with the newest status of every job; ask a busy API server again."""
-        while True:
+        for look in count(1):
             time.sleep(self._look_s)
             try:
                 self._jobs = {job.metadata.name: job for job in self._client.list(self._selector)}
             except ApiError as error:
                 if not error.retryable:
                     raise
+                if look == QUIET_LOOKS:
+                    self._report(
+                        f"the API server has given no status for a while ({error}); "
+                        "the trials run on without this command, which asks again"
+                    )
             else:
+                if look > QUIET_LOOKS:
+                    self._report("the API server answers again")
                 return
 
     def look(self, trial: Trial) -> Figures:
