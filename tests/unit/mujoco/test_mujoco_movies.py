@@ -2,6 +2,7 @@
 
 import math
 import shutil
+import subprocess
 import sys
 from fractions import Fraction
 
@@ -75,6 +76,33 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
     assert np.abs(moved).max() > 5.0
     assert list(tmp_path.iterdir()) == [path]
     assert (simulation.movies.ready, simulation.movies.failed) == (True, False)
+
+
+def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
+    """Nobody sees a hidden file. What another simulator writes now, or of another movie, stays."""
+    path = tmp_path / "drive.mp4"
+    code = f"""if True:
+        import os, signal
+        from palaestra_sim.mujoco.film import MujocoFilm
+        from palaestra_sim.scene.movies import Movie
+        names = [f"{tmp_path}/{{name}}.mp4" for name in ("drive", "drive-2")]
+        films = [MujocoFilm(Movie(path=it, size={SIZE}, quality=100, acceleration=1)) for it in names]
+        os.kill(os.getpid(), signal.SIGKILL)"""
+    subprocess.run([sys.executable, "-c", code], check=False, timeout=60)
+    other = Simulation.load(WORLD.encode(), MujocoPhysics(), "world", Mode.FAST)
+    left = {*tmp_path.iterdir()}
+    other.movies.start(movie(path))
+    underway = {*tmp_path.iterdir()} - left
+
+    simulation.movies.start(movie(path))
+    for each in (simulation, other):
+        each.step(40)
+        each.movies.stop()
+
+    assert len(left) == 2
+    assert len(underway) == 1
+    assert {*tmp_path.iterdir()} == {path, *(each for each in left if each.name.startswith(".drive-2"))}
+    assert not other.movies.failed
 
 
 def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):

@@ -1,15 +1,19 @@
 """The file of a movie: H.264 in MP4, encoded by PyAV, which is loaded for the first movie.
 
-It is written under another name beside its own, and gets its name when it is whole.
+It is written under a hidden name beside its own, and gets its name when it is whole. The simulator that writes
+it holds a lock on it. So a hidden file without a lock is from a simulator that was killed, and the next movie of
+the same name removes it.
 """
 
 from __future__ import annotations
 
+import fcntl
+import glob
 import os
 import tempfile
 import weakref
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +26,7 @@ from palaestra_sim.seam import UnsimulatedError
 _CODEC: Final = "libx264"
 _WORST, _STEPS = 51, 41  # of the constant rate factor: the quality 100 has 10
 _PUBLIC: Final = 0o644
+_UNFINISHED: Final = ".unfinished"
 
 
 class MujocoFilm:
@@ -35,12 +40,10 @@ class MujocoFilm:
     def __init__(self, movie: Movie) -> None:
         self._av = _library()
         self._movie = movie
-        path = Path(movie.path)
-        number, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=".mp4")
-        os.close(number)
-        self._name = name
-        self._abandoned = weakref.finalize(self, Path(name).unlink, missing_ok=True)
-        self._container: Any = self._av.open(name, "w")
+        _remove_stale(Path(movie.path))
+        lock, self._name = _new_file(Path(movie.path))
+        self._abandoned = weakref.finalize(self, _abandon, lock, self._name)
+        self._container: Any = self._av.open(self._name, "w", format="mp4")
         self._stream: Any = self._container.add_stream(_CODEC, rate=movie.frames_s)
         self._stream.width, self._stream.height = movie.size
         self._stream.pix_fmt = "yuv420p"
@@ -62,7 +65,7 @@ class MujocoFilm:
             self._container.close()
         Path(self._name).chmod(_PUBLIC)
         Path(self._name).replace(self._movie.path)
-        self._abandoned.detach()
+        self._abandoned()
 
     def _encode(self, frame: Any) -> None:
         self._container.mux(self._stream.encode(frame))
@@ -74,6 +77,31 @@ class MujocoFilm:
             yield
         except self._av.FFmpegError as error:
             raise OSError(error.errno, error.strerror) from error
+
+
+def _new_file(path: Path) -> tuple[int, str]:
+    """Return the descriptor that holds the lock of a new hidden file, and the file's name."""
+    while True:
+        lock, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}-", suffix=_UNFINISHED)
+        with suppress(OSError):  # a file system without locks: nothing is removed there either
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        if os.fstat(lock).st_nlink:
+            return lock, name
+        os.close(lock)  # another simulator removed it before it was locked
+
+
+def _abandon(lock: int, name: str) -> None:
+    """Remove a hidden file, if it still has this name, and its lock."""
+    Path(name).unlink(missing_ok=True)
+    os.close(lock)
+
+
+def _remove_stale(path: Path) -> None:
+    """Remove the hidden files of a movie that no simulator writes any more."""
+    for stale in path.parent.glob(f".{glob.escape(path.name)}-*{_UNFINISHED}"):
+        with suppress(OSError), stale.open("rb+") as file:  # locked, or removed meanwhile
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            stale.unlink()
 
 
 def _library() -> Any:
