@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import signal
+import sys
+import types
 from typing import Any, ClassVar
 
 import pytest
@@ -107,3 +110,46 @@ def test_a_tracker_whose_library_is_missing_is_refused_by_name(tracker):
 
     with pytest.raises(ConfigurationError, match=f"No module named '{library}'.*; install its package"):
         make_callbacks([Callback(name=f"palaestra_trainer.trackers.{tracker}")])
+
+
+class UnreachableService(types.ModuleType):
+    """Stands in for the library of W&B, which is not installed; its service is away at the end."""
+
+    Settings = staticmethod(dict)
+
+    def init(self, settings, **_):
+        """Return the run, which is this module."""
+        self.settings = settings
+        return self
+
+    def define_metric(self, *_, **__):
+        """Do nothing."""
+
+    def finish(self):
+        """Wait in vain, as the library does with a deadline; without one it would not return."""
+        assert self.settings["finish_timeout"] > 0
+        assert self.settings["finish_timeout_raises"]
+        raise TimeoutError("Timed out finishing run.")
+
+
+@pytest.fixture
+def wandb_away(monkeypatch):
+    """Return the tracker's class with that library; neither module outlives the test."""
+    name = "palaestra_trainer.trackers.wandb"
+    monkeypatch.setitem(sys.modules, "wandb", UnreachableService("wandb"))
+    monkeypatch.setitem(sys.modules, name, None)
+    del sys.modules[name]
+    return importlib.import_module(name).Wandb
+
+
+def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory, capsys):
+    """The grace period is shorter than the library's patience; its files are in the run directory."""
+    tracker = wandb_away(mode="online")
+    directory.path.mkdir(exist_ok=True)
+    tracker.begin(directory, {"job": "corridor", "replica": 0})
+
+    tracker.end()
+
+    said = capsys.readouterr().out
+    assert "W&B has not received all data of the run" in said
+    assert f"wandb sync {directory.path}/wandb/run-*" in said

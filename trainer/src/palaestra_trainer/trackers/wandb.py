@@ -6,14 +6,19 @@ import secrets
 from collections.abc import Mapping
 from typing import Any
 
+import structlog
 import wandb
 
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.trackers.tracker import Tracker, known_run, remember_run, title_of
 
+log = structlog.get_logger(__name__)
+
 NAME = "wandb"
 MODES = ("offline", "online")
+# What waits for simulators and the checkpoint leave of the default grace period; see `waiting.patience`.
+FINISH_S = 5
 
 
 class Wandb(Tracker):
@@ -38,6 +43,7 @@ class Wandb(Tracker):
         if run is None:
             run = secrets.token_hex(4)
             remember_run(directory, NAME, run)
+        self._directory = directory
         self._run = wandb.init(
             project=self._project,
             entity=self._entity,
@@ -49,7 +55,13 @@ class Wandb(Tracker):
             config=dict(configuration),
             dir=str(directory.path),
             # The log of the run is the pod's; a program of git may be missing.
-            settings=wandb.Settings(console="off", disable_git=True, silent=True),
+            settings=wandb.Settings(
+                console="off",
+                disable_git=True,
+                silent=True,
+                finish_timeout=FINISH_S,
+                finish_timeout_raises=True,
+            ),
         )
         self._run.define_metric("step")
         self._run.define_metric("*", step_metric="step")
@@ -60,5 +72,12 @@ class Wandb(Tracker):
         self._run.log({**scalars, "step": step}, step=self._step)
 
     def end(self) -> None:
-        """Write what is still buffered, and end W&B's process."""
-        self._run.finish()
+        """Write what is still buffered, upload it for some seconds, and end W&B's process."""
+        try:
+            self._run.finish()
+        except TimeoutError:
+            log.warning(
+                "W&B has not received all data of the run",
+                waited_s=FINISH_S,
+                remedy=f"wandb sync {self._directory.path}/wandb/run-*",
+            )
