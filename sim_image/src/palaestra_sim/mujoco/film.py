@@ -1,8 +1,8 @@
 """The file of a movie: H.264 in MP4, encoded by PyAV, which is loaded for the first movie.
 
-It is written under a hidden name beside its own, and gets its name when it is whole. The simulator that writes
-it holds a lock on it. So a hidden file without a lock is from a simulator that was killed, and the next movie of
-the same name removes it.
+It is written under a hidden name beside its own, and gets its name when it is whole. The simulator that
+writes it holds a lock on it. So a hidden file without a lock is from a simulator that was killed, and the
+next movie of the same name removes it.
 """
 
 from __future__ import annotations
