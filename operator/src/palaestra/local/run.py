@@ -115,7 +115,6 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Ou
             say(f"{job.metadata.name}-{replica}: finished already; --fresh begins anew")
             _tell(before, path)
             return before
-        Outcome.forget(path)
         rundir.prepare(path, record)
         planned = plan(job, layout(path.parent, options, ports), mounted={replica: ()}).replicas[replica]
         say(f"{planned.job['metadata']['name']}: {path} (logs in {path / 'logs'})")

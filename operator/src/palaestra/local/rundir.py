@@ -29,7 +29,7 @@ from palaestra.api.tree import fields_of, walk
 from palaestra.errors import SpecErrors
 from palaestra.local.errors import Refused
 from palaestra.local.files import make_folder, storage, write
-from palaestra.local.outcome import FILE, Outcome
+from palaestra.local.outcome import Outcome
 from palaestra_protocol.pod.status import ExitCode
 
 RECORD = "job.yaml"
@@ -182,8 +182,7 @@ def prepare(directory: Path, record: Record) -> None:
     Raises:
         StorageFailed: it cannot be written.
     """
-    with storage(directory):
-        (directory / FILE).unlink(missing_ok=True)
+    Outcome.forget(directory)
     write(directory / RECORD, yaml.safe_dump(dict(record), sort_keys=False).encode())
 
 
