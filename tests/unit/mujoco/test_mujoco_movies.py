@@ -79,7 +79,7 @@ def test_a_movie_shows_the_robot_drive_in_the_time_of_the_simulation(simulation,
 
 
 def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path):
-    """Nobody sees a hidden file. What another simulator writes now, or of another movie, stays."""
+    """It keeps the hidden files of other movies, and those that another simulator is writing."""
     path = tmp_path / "drive.mp4"
     code = f"""if True:
         import os, signal

@@ -30,12 +30,12 @@ class Arguments:
         return self._any or name in self._named
 
     def mistakes(self, field: str, options: Iterable[str], others: Iterable[str] = ()) -> Iterator[str]:
-        """Yield field, fact and remedy of each option that is not accepted, and of each argument that lacks.
+        """Yield field, fact and remedy of each unknown option and of each missing argument.
 
         Args:
             field: the field of the job with the options.
             options: the names of the arguments that the job gives.
-            others: the names of those that are given too.
+            others: the names of the arguments that come from elsewhere.
         """
         known = list(self._named)
         for name in options:

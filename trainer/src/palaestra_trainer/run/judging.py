@@ -20,9 +20,8 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Attached, Webots
 from palaestra_trainer.webots.offers import withdraw
 
-_NAME = (
-    "judge"  # no simulator has it; an environment that asks for readings gets SimulatorDead with this name
-)
+# No simulator has this name. An environment that asks for readings gets SimulatorDead with it.
+_NAME = "judge"
 
 
 def make_judge(wanted: Configuration) -> gymnasium.Env[Any, Any]:
