@@ -11,19 +11,26 @@ from tests.integration.webots.interface_player import plain, request_of
 class RoscppClient:
     """Calls and listens with the classes that gencpp made; a context, which ends the process.
 
+    Args:
+        program: its path.
+        environment: of its process.
+        log: the file that gets the errors that roscpp logs.
+
     Attributes:
         digests: the md5 of each type, in the program.
     """
 
-    def __init__(self, program, environment):
-        self._process = subprocess.Popen(
-            [program],
-            env=environment,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+    def __init__(self, program, environment, log):
+        with log.open("w") as errors:
+            self._process = subprocess.Popen(
+                [program],
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+            )
+        self._errors = log.open()
         self._topics = {}
         self._tell("types")
         self.digests = dict(line.split() for line in self._lines())
@@ -34,14 +41,15 @@ class RoscppClient:
     def __exit__(self, *_):
         self._process.kill()
         self._process.communicate()
+        self._errors.close()
 
     def call(self, path, type_name, request):
-        """Return the answer of a service, or that it failed, once it can be reached."""
+        """Return the answer of a service once it can be reached, or what roscpp logged of the failure."""
         service = roslib.message.get_service_class(type_name)
         self._tell("call", type_name, path, _bytes_of(request_of(service, request)).hex())
         result, _, answer = self._line().partition(" ")
         if result != "answered":
-            return {"failed": result}
+            return {"failed": self._errors.read() or "no error was logged"}
         return plain(service._response_class().deserialize(bytes.fromhex(answer)))
 
     def listen(self, topic, type_name):

@@ -47,7 +47,7 @@ def of_rospy(plan_, environment, _folder):
 
 def of_roscpp(plan_, environment, folder):
     """Return what the client with roscpp gets, and the `digests` of its types."""
-    with RoscppClient(program(folder.parent / "roscpp"), environment) as client:
+    with RoscppClient(program(folder.parent / "roscpp"), environment, folder / "errors.log") as client:
         return {**play(plan_, client), "digests": client.digests}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import textwrap
 
@@ -163,16 +164,16 @@ def test_a_run_that_a_callback_ended_is_prolonged_as_if_it_had_not(
     assert digests[0] == digests[1]
 
 
-def test_an_error_of_a_callback_ends_the_run_with_its_name_and_a_checkpoint(
+def test_an_error_of_a_callback_ends_the_run_with_its_name_its_line_and_a_checkpoint(
     play, with_callbacks, directory, last_word, module, seen
 ):
-    """A retry may help, for example if a server was down."""
+    """A retry may help, for example if a server was down; the line says where the author looks."""
     code, members = play(with_callbacks({"fail_at": 55}))
 
     assert code == 1
-    assert last_word().reason == (
-        f"CallbackFailed: callback {module}:Notes: raised RuntimeError: no such plot"
-    )
+    error, place = last_word().reason.split(", in ")
+    assert error == f"CallbackFailed: callback {module}:Notes: raised RuntimeError: no such plot"
+    assert re.fullmatch(rf"\S+/{module}.py line \d+", place)
     assert checkpoint.newest(directory.checkpoints).manifest.step == 52
     assert members["collect-0"].log[-1] == "stop"
     assert events(seen, "note", "end") == [52]
@@ -198,7 +199,7 @@ def test_a_fault_at_the_end_of_a_callback_neither_skips_the_others_nor_hides_the
     play(with_callbacks({"word": "breaks", "fail_at": 5}, *ends, steps=200))
 
     assert reason == "SimulatorUnavailable: collect-0: connection refused"
-    assert last_word().reason.endswith("raised RuntimeError: no such plot")
+    assert "raised RuntimeError: no such plot" in last_word().reason
     assert events(seen, "second", "end") == [100, 104]
     assert events(seen, "third", "end") == [100, 104]
 

@@ -11,6 +11,7 @@ import types
 from typing import Any, ClassVar
 
 import pytest
+from structlog.testing import capture_logs
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from palaestra_trainer.configuration import Callback
@@ -142,14 +143,16 @@ def wandb_away(monkeypatch):
     return importlib.import_module(name).Wandb
 
 
-def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory, capsys):
+def test_wandb_that_cannot_upload_in_time_ends_with_a_warning_and_the_remedy(wandb_away, directory):
     """The grace period is shorter than the library's patience; its files are in the run directory."""
     tracker = wandb_away(mode="online")
     directory.path.mkdir(exist_ok=True)
     tracker.begin(directory, {"job": "corridor", "replica": 0})
 
-    tracker.end()
+    with capture_logs() as lines:
+        tracker.end()
 
-    said = capsys.readouterr().out
-    assert "W&B has not received all data of the run" in said
-    assert f"wandb sync {directory.path}/wandb/run-*" in said
+    (line,) = lines
+    assert line["log_level"] == "warning"
+    assert line["event"] == "W&B has not received all data of the run"
+    assert line["remedy"] == f"wandb sync {directory.path}/wandb/run-*"

@@ -148,7 +148,7 @@ def _naming(name: str) -> Iterator[None]:
     except TrainerError:
         raise  # a fault, a signal: not the callback's
     except Exception as error:  # whatever code of the job's author raises
-        raise CallbackFailed(f"callback {name}: raised {type(error).__name__}: {error}") from error
+        raise CallbackFailed(f"callback {name}: raised {fact_of(error)}") from error
 
 
 def _refuse(mistakes: Iterable[str]) -> None:
