@@ -9,8 +9,9 @@ import pytest
 
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_protocol.ros.tcpros import FrameReader, decode_header, encode_header, frame
-from palaestra_sim.ros import LATER
+from palaestra_sim.ros import LATER, links
 from palaestra_trainer.ros import Master
+from tests.integration.ros.conftest import DEADLINE_S
 from tests.waiting import eventually
 
 ASK = b"\x01"
@@ -70,11 +71,37 @@ def test_the_answer_header_tells_the_type(peer, dial):
 def test_a_client_that_does_not_ask_for_more_is_hung_up_on(peer, dial):
     """Without `persistent` a connection serves one call."""
     connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
-    connection.sendall(frame(ASK))
+    connection.sendall(frame(ASK) * 2)
 
     assert read_exactly(connection, 1) == b"\x01"
     assert struct.unpack("<d", read_frame(connection)) == (1.25,)
     assert connection.recv(1) == b""
+
+
+def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
+    """Roscpp drops an answer that it has not read yet when the server closes (ros/ros_comm#1976)."""
+    monkeypatch.setattr(links, "LINGER_S", DEADLINE_S)
+    connection, _ = dial(**service_header(peer, "get_time", "webots_ros/get_float"))
+    connection.sendall(frame(ASK))
+    read_exactly(connection, 1)
+    read_frame(connection)
+    peer.do(lambda: None)  # the node has done all that follows an answer
+
+    connection.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        connection.recv(1)
+
+
+def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, dial):
+    """A picture is longer than the buffers of a connection."""
+    text = "x" * 20_000_000
+    peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": text}))
+    connection, _ = dial(**service_header(peer, "get_text", "webots_ros/get_string"))
+    connection.sendall(frame(ASK))
+    peer.do(lambda: None)
+
+    assert read_exactly(connection, 1) == b"\x01"
+    assert len(read_frame(connection)) == struct.calcsize("<I") + len(text)
 
 
 def test_two_requests_in_one_packet_are_both_answered(peer, dial):

@@ -155,6 +155,9 @@ class _Answers:
     def send_newest(self, data: bytes) -> None:
         self.link.send_newest(data)
 
+    def finish(self) -> None:
+        self.link.finish()
+
     def close(self) -> None:
         self.link.close()
 
@@ -192,6 +195,9 @@ class _Messages:
             self._node.later(ruling.delay_s, lambda: self._send_late(data))
         else:
             self.link.send_newest(data)
+
+    def finish(self) -> None:
+        self.link.finish()
 
     def close(self) -> None:
         self.link.close()

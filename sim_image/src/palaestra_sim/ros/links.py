@@ -14,6 +14,9 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
+# A client hangs up in a millisecond; one that reads to the end of the connection waits for this.
+LINGER_S = 1.0
+
 
 class Endpoint(Protocol):
     """The receiver of a connection after its header has been read."""
@@ -43,6 +46,10 @@ class Connection(Protocol):
         """Send `data`; while the peer does not read, keep only the newest."""
         ...
 
+    def finish(self) -> None:
+        """Take nothing more, and close it once the peer has, or after some seconds."""
+        ...
+
     def close(self) -> None:
         """Close it; safe to repeat."""
         ...
@@ -55,22 +62,65 @@ class Refused(Exception):
 Greet = Callable[["Link", Mapping[str, str]], Endpoint]
 
 
+class Lingering:
+    """The connections that are finished; closes each after one to two times LINGER_S.
+
+    All have one timer, because a client without a persistent connection may call a thousand times a second.
+    """
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop = loop
+        self._new: set[Link] = set()
+        self._old: set[Link] = set()
+
+    def add(self, link: Link) -> None:
+        """Close `link` in time."""
+        if not (self._new or self._old):
+            self._loop.later(LINGER_S, self._close_old)
+        self._new.add(link)
+
+    def discard(self, link: Link) -> None:
+        """Forget a link that is closed."""
+        self._new.discard(link)
+        self._old.discard(link)
+
+    def _close_old(self) -> None:
+        for link in list(self._old):
+            link.close()
+        self._old, self._new = self._new, set()
+        if self._old:
+            self._loop.later(LINGER_S, self._close_old)
+
+
 class Link:
     """A connection from accept to close; `greet` turns its header into an endpoint."""
 
-    __slots__ = ("_endpoint", "_frames", "_greet", "_loop", "_newest", "_socket", "_unsent", "closed")
+    __slots__ = (
+        "_endpoint",
+        "_finished",
+        "_frames",
+        "_greet",
+        "_lingering",
+        "_loop",
+        "_newest",
+        "_socket",
+        "_unsent",
+        "closed",
+    )
 
-    def __init__(self, loop: Loop, connection: socket.socket, greet: Greet) -> None:
+    def __init__(self, loop: Loop, connection: socket.socket, greet: Greet, lingering: Lingering) -> None:
         connection.setblocking(False)
         for option in sockets.OPTIONS:
             connection.setsockopt(*option)
         self._loop = loop
         self._socket = connection
         self._greet = greet
+        self._lingering = lingering
         self._frames = FrameReader()
         self._endpoint: Endpoint | None = None
         self._unsent: bytes | memoryview = b""
         self._newest: bytes | None = None
+        self._finished = False
         self.closed = False
         loop.watch(connection, self._ready)
 
@@ -88,11 +138,21 @@ class Link:
         else:
             self._write(data)
 
+    def finish(self) -> None:
+        """Send what is left, take nothing more, and close the connection once the peer has, or in seconds.
+
+        Roscpp drops an answer that it has not read yet when the server closes (ros/ros_comm#1976).
+        """
+        if not self.closed:
+            self._finished = True
+            self._lingering.add(self)
+
     def close(self) -> None:
         """Close the connection; safe to repeat."""
         if self.closed:
             return
         self.closed = True
+        self._lingering.discard(self)
         self._loop.forget(self._socket)
         self._socket.close()
         if self._endpoint is not None:
@@ -142,7 +202,7 @@ class Link:
             for payload in self._frames.feed(data):
                 if self._endpoint is None:
                     self._endpoint = self._greet(self, decode_header(payload))
-                elif not self.closed:
+                elif not (self.closed or self._finished):
                     self._endpoint.receive(payload)
         except (Refused, FramingError) as error:
             self._write(encode_header({"error": str(error)}))

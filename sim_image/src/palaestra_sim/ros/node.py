@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
 from palaestra_protocol.ros.tcpros import encode_header, frame
-from palaestra_sim.ros.links import Connection, Endpoint, Link, Refused
+from palaestra_sim.ros.links import Connection, Endpoint, Lingering, Link, Refused
 from palaestra_sim.ros.loop import Loop
 from palaestra_sim.ros.master import Master, MasterUnreachable, SlaveApi, bind_address, host_name
 from palaestra_sim.ros.topics import Publisher, Topic
@@ -49,6 +49,7 @@ class RosNode:
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, Topic] = {}
         self._links: set[Connection] = set()
+        self._lingering = Lingering(loop)
         self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
         self._connected = 0
         self._waiting: deque[tuple[ServiceEnd, bytes]] = deque()
@@ -189,7 +190,7 @@ class RosNode:
             connection, _ = self._listener.accept()
         except OSError:
             return  # the peer has disconnected already
-        self._links.add(Link(self._loop, connection, self._greet))
+        self._links.add(Link(self._loop, connection, self._greet, self._lingering))
 
     def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         if "service" in header:
@@ -289,4 +290,4 @@ class ServiceEnd:
     def _send(self, data: bytes) -> None:
         self._link.send(data)
         if not self._persistent:
-            self._link.close()
+            self._link.finish()
