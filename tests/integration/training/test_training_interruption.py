@@ -1,4 +1,4 @@
-"""Signals that come before a run listens for them."""
+"""Signals that come before a run listens for them, or after its end."""
 
 import subprocess
 import sys
@@ -10,6 +10,14 @@ with leaving_when_asked():
     os.kill(os.getpid(), signal.SIGTERM)
 """
 
+ASKED_AT_EXIT = """
+import atexit, os, signal
+from palaestra_trainer.waiting.interruption import leaving_when_asked
+atexit.register(os.kill, os.getpid(), signal.SIGTERM)
+with leaving_when_asked():
+    pass
+"""
+
 
 def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
     """Its imports take seconds; an eviction in them must not count as a failure of the trainer."""
@@ -19,3 +27,10 @@ def test_a_trainer_that_is_asked_to_end_before_its_run_begins_was_interrupted():
 
     assert ended.returncode == 75, ended.stderr
     assert "nothing was started" in ended.stderr
+
+
+def test_a_trainer_that_is_asked_to_end_after_its_run_keeps_its_exit_code():
+    """Python needs a second to exit; a finished run must not count as one that was killed."""
+    ended = subprocess.run([sys.executable, "-c", ASKED_AT_EXIT], capture_output=True, text=True, check=False)
+
+    assert ended.returncode == 0, ended.stderr

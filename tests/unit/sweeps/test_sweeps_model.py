@@ -21,8 +21,8 @@ def test_the_job_is_inline_or_a_file_beside_the_sweep(sweep, tmp_path):
 @pytest.mark.parametrize(
     ("spec", "problem"),
     [
-        ({}, "spec: needs matrix or random; give one of them"),
-        ({**MATRIX, **RANDOM}, "spec: needs matrix or random; give one of them"),
+        ({}, "spec: needs either matrix or random; give one of them"),
+        ({**MATRIX, **RANDOM}, "spec: needs either matrix or random; give one of them"),
         (
             {**MATRIX, "trials": 3},
             "spec.trials: is the number of random trials; give it with random, and only there",

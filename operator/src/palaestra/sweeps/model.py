@@ -115,7 +115,7 @@ class SweepSpec(ApiModel):
     rules = (
         Rule(
             holds=lambda spec: bool(spec.matrix) != bool(spec.random),
-            message="needs matrix or random; give one of them",
+            message="needs either matrix or random; give one of them",
         ),
         Rule(
             field="trials",

@@ -5,11 +5,13 @@ boundary with a checkpoint, or, while simulators start, at once and without a
 checkpoint, because there is nothing to save. The handler itself raises nothing,
 because it may run while a lock is released. Waits that are under way may last
 `patience.LEFT_S` seconds more. A second signal ends the process at once, and so
-does a signal that arrives before the run listens.
+does a signal that arrives before the run listens. After the run's end, while
+Python exits, signals are ignored.
 """
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -40,14 +42,21 @@ def leaving_when_asked() -> Iterator[None]:
     """Let a signal end the process at once as interrupted, except while an `Interruption` listens.
 
     It covers the seconds of imports. Without it the signal would kill the process, or, if the process is the
-    first of a container, have no effect, although there is nothing to save yet.
+    first of a container, have no effect, although there is nothing to save yet. While Python exits, a signal
+    has no effect, because it would replace the exit code of the run.
     """
+    atexit.register(_ignore)
     before = {number: signal.signal(number, _leave) for number in SIGNALS}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _ignore() -> None:
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _leave(number: int, frame: FrameType | None) -> None:
