@@ -147,7 +147,7 @@ def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tupl
 
 def _tell(outcome: Outcome, path: Path) -> None:
     if outcome.exit_code == ExitCode.INTERRUPTED:
-        place = "before a step was counted" if outcome.steps is None else f"at step {outcome.steps}"
+        place = "before it trained" if outcome.steps is None else f"at step {outcome.steps}"
         say(f"interrupted {place}; the same command goes on from there")
     elif outcome.exit_code == KILLED:
         say("killed; the same command goes on from the newest checkpoint")
