@@ -11,6 +11,7 @@ from palaestra.api import validate
 from palaestra.cli import main
 from palaestra.client import NotInstalled
 from palaestra.cluster import connect
+from palaestra.cluster.errors import Unreachable
 from palaestra.doctor import Site
 from palaestra.doctor.installation import leads
 from palaestra.given import data_of
@@ -318,11 +319,12 @@ def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
     script, kubeconfig = server
     none = reply(obj={"metadata": {}, "items": []})
     away = [refusal(503, "ServiceUnavailable")] * (QUIET_LOOKS - 1)
-    script.calls = [*away, none, *away, hang_up]
+    script.calls = [none, *away, none, *away, hang_up]
     said = []
 
     with Client(kubeconfig=kubeconfig) as client, ThreadPoolExecutor(1) as pool:
         place = There(client, "s", 1, said.append, look_s=0.01)
+        place.wait()
         place.wait()
         quiet = list(said)
         waited = pool.submit(place.wait)
@@ -333,9 +335,39 @@ def test_a_sweep_reports_an_api_server_that_is_away_once_and_its_return(server):
 
     assert quiet == []
     assert len(said) == 2
-    assert said[0].startswith("the API server has given no status for a while (")
+    assert said[0].startswith("the API server has not answered for a while (")
     assert said[0].endswith("); the trials run on without this command, which asks again")
     assert said[1] == "the API server answers again"
+
+
+def test_a_sweep_begins_and_prunes_trials_although_the_api_server_is_away_meanwhile(server, trial):
+    """An upgrade of the control plane takes minutes, and a search takes days."""
+    script, kubeconfig = server
+    stored = {**data_of(trial.job), "metadata": {"name": "s-0", "uid": "u", "labels": {LABEL: "s"}}}
+    away, gone = refusal(503, "ServiceUnavailable"), refusal(404, "NotFound")
+    script.calls = [
+        *[reply(obj={"metadata": {}, "items": []}), away, gone, away, reply(obj=stored), reply(obj=stored)],
+        *[away, reply(obj=stored), away, gone],
+    ]
+
+    with Client(kubeconfig=kubeconfig) as client:
+        place = There(client, "s", 1, print, look_s=0.01)
+        place.wait()
+        place.begin(trial)
+        place.prune(trial)
+
+    methods = " ".join(asked.method for asked in script.asked)
+    assert methods == "GET GET GET PATCH GET PATCH GET GET DELETE GET"
+    assert place.has_room()
+
+
+def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, trial):
+    """The kubeconfig may be the wrong one, and nobody would wait for that."""
+    script, kubeconfig = server
+    script.calls = [hang_up]
+
+    with Client(kubeconfig=kubeconfig) as client, pytest.raises(Unreachable):
+        There(client, "s", 1, print, look_s=0.01).begin(trial)
 
 
 @pytest.mark.parametrize("answers", [[], [reply(obj={"metadata": NAMED})]], ids=["before", "meanwhile"])

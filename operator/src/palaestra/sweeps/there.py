@@ -6,20 +6,23 @@ They need no command that runs. This one creates them, reads their status, and d
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from itertools import count
+from typing import TypeVar
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import TERMINAL, Phase, ReplicaStatus
 from palaestra.client import Client, ClientError, NoSuchJob
 from palaestra.client.waiting import current
-from palaestra.cluster import ApiError
+from palaestra.cluster.errors import Gone, ServerError, TooManyRequests, Unreachable
 from palaestra.errors import PalaestraError
 from palaestra.sweeps.model import LABEL
 from palaestra.sweeps.trial import Figures, Point, RunFigures, State, Trial
 
 LOOK_S = 5.0  # the operator writes a status every 30 s at most
 DELETED_S = 300.0
+AWAY = (Gone, ServerError, TooManyRequests, Unreachable)
 QUIET_LOOKS = 6  # looks in vain before a line says so: half a minute at least
+
+Answer = TypeVar("Answer")
 
 
 class NotOfThisSweep(ClientError):
@@ -50,6 +53,7 @@ class There:
         self._at_once = at_once
         self._report = report
         self._look_s = look_s
+        self._answered = False
         self._begun: set[int] = set()
         self._jobs: Mapping[str, TrainingJob] = {}
         self._curves: dict[tuple[int, int], tuple[Point, ...]] = {}
@@ -76,38 +80,16 @@ class There:
 
         Raises:
             NotOfThisSweep: a job of this name is not of the sweep.
+            ApiError: the API server refuses it, or gives no answer to the first request of this command.
         """
-        try:
-            found = self._client.get(trial.name)
-        except NoSuchJob:
-            pass
-        else:
-            if found.metadata.labels.get(LABEL) != trial.job.metadata.labels[LABEL]:
-                raise NotOfThisSweep(
-                    f"job {trial.name}: exists in namespace {self._client.namespace}, not of this sweep; "
-                    "give the sweep another name"
-                )
-        self._client.apply(trial.job)
+        self._answer_of(lambda: self._create(trial))
         self._begun.add(trial.number)
 
     def wait(self) -> None:
         """Return after some seconds with the newest status of every job; ask a busy API server again."""
-        for look in count(1):
-            time.sleep(self._look_s)
-            try:
-                self._jobs = {job.metadata.name: job for job in self._client.list(self._selector)}
-            except ApiError as error:
-                if not error.retryable:
-                    raise
-                if look == QUIET_LOOKS:
-                    self._report(
-                        f"the API server has given no status for a while ({error}); "
-                        "the trials run on without this command, which asks again"
-                    )
-            else:
-                if look > QUIET_LOOKS:
-                    self._report("the API server answers again")
-                return
+        time.sleep(self._look_s)
+        jobs = self._answer_of(lambda: self._client.list(self._selector))
+        self._jobs = {job.metadata.name: job for job in jobs}
 
     def look(self, trial: Trial) -> Figures:
         """Return the figures of a trial by the status of its job; a job that was deleted has failed."""
@@ -125,8 +107,46 @@ class There:
     def prune(self, trial: Trial) -> None:
         """Delete the job of a trial, if it exists, and wait until its pods are gone."""
         self._begun.discard(trial.number)
+        self._answer_of(lambda: self._delete(trial))
+
+    def _create(self, trial: Trial) -> None:
+        with suppress(NoSuchJob):
+            found = self._client.get(trial.name)
+            if found.metadata.labels.get(LABEL) != trial.job.metadata.labels[LABEL]:
+                raise NotOfThisSweep(
+                    f"job {trial.name}: exists in namespace {self._client.namespace}, not of this sweep; "
+                    "give the sweep another name"
+                )
+        self._client.apply(trial.job)
+
+    def _delete(self, trial: Trial) -> None:
         with suppress(NoSuchJob):
             self._client.delete(trial.name, deadline_s=DELETED_S)
+
+    def _answer_of(self, ask: Callable[[], Answer]) -> Answer:
+        """Return the answer of the API server; once it has answered, ask again while it is away.
+
+        A server that has never answered may be the wrong one, so its first error is raised.
+        """
+        looks = 0
+        while True:
+            try:
+                answer = ask()
+                break
+            except AWAY as error:
+                if not self._answered:
+                    raise
+                looks += 1
+                if looks == QUIET_LOOKS:
+                    self._report(
+                        f"the API server has not answered for a while ({error}); "
+                        "the trials run on without this command, which asks again"
+                    )
+            time.sleep(self._look_s)
+        self._answered = True
+        if looks >= QUIET_LOOKS:
+            self._report("the API server answers again")
+        return answer
 
     def _figures(self, trial: Trial, status: ReplicaStatus) -> RunFigures:
         """Return the figures of a replica; each change of them is a point of its curve."""
