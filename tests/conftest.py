@@ -1,10 +1,11 @@
-"""In which order tests run, on how many threads, that no unit test is about time, and what is skipped."""
+"""How tests run: their order, threads, time in unit tests, what is skipped, and the format of the log."""
 
 import gc
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 
 import pytest
+import structlog
 from hypothesis import HealthCheck, settings
 
 from tests.control_plane.programs import REQUIRED, NoPrograms
@@ -38,6 +39,14 @@ def pytest_runtest_setup() -> Generator[None]:
 def pytest_runtest_call() -> Generator[None]:
     """Skip it too where a test asks for them itself."""
     return (yield from _skipped_without_programs())
+
+
+@pytest.fixture(autouse=True)
+def logs_as_before() -> Iterator[None]:
+    """Let no test read another's format of the log: programs that run in a test's process set it."""
+    before = structlog.get_config()
+    yield
+    structlog.configure(**before)
 
 
 def _skipped_without_programs() -> Generator[None]:

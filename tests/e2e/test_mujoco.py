@@ -20,7 +20,7 @@ SIMULATORS = [
 ]
 TRAINER = {
     "steps": 600,
-    "evaluation": {"everySteps": 300, "episodes": 1},
+    "evaluation": {"everySteps": 300, "episodes": 1, "confirmEpisodes": 2},
     "checkpoint": {"everySteps": 300, "keep": 2},
 }
 SEEING_STEPS = 256

@@ -21,7 +21,7 @@ BUILD_S, LOAD_S = 600, 300
 # One rollout and one episode: the page's laptop part, tests/integration/run, learns the task.
 SHORT = {
     "steps": 256,
-    "evaluation": {"everySteps": 256, "episodes": 1},
+    "evaluation": {"everySteps": 256, "episodes": 1, "confirmEpisodes": 2},
     "checkpoint": {"everySteps": 256, "keep": 2},
 }
 WHOSE = "import corridor, os; print(os.getuid(), os.stat(corridor.__file__).st_uid, corridor.__cached__)"

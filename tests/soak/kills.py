@@ -46,7 +46,7 @@ def job():
     return make_job(
         algorithm=LITTLE_DQN,
         steps=1_000_000,
-        evaluation={"everySteps": 500, "episodes": 2},
+        evaluation={"everySteps": 500, "episodes": 2, "confirmEpisodes": 2},
         checkpoint={"everySteps": CHECKPOINT_STEPS, "keep": 3},
     )
 

@@ -74,6 +74,6 @@ def job(fault, algorithm, ending):
         environment=EPISODE,
         algorithm=algorithm,
         steps=STEPS,
-        evaluation={"everySteps": STEPS // 2, "episodes": 2},
+        evaluation={"everySteps": STEPS // 2, "episodes": 2, "confirmEpisodes": 10},
         checkpoint={"everySteps": STEPS // 2, "keep": 2},
     )

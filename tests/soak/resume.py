@@ -103,7 +103,7 @@ def job(name, collectors):
         environment={"id": "MoveToTargetEnv-v0"} | continuous,
         algorithm={"name": name, "hyperparameters": ALGORITHMS[name]},
         steps=STEPS,
-        evaluation={"everySteps": 300, "episodes": 3},
+        evaluation={"everySteps": 300, "episodes": 3, "confirmEpisodes": 3},
         checkpoint={"everySteps": 150, "keep": 3},
     )
 

@@ -20,7 +20,7 @@ from tests.soak.jobs import example
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 FEW = {
     "steps": 600,
-    "evaluation": {"everySteps": 300, "episodes": 2},
+    "evaluation": {"everySteps": 300, "episodes": 2, "confirmEpisodes": 2},
     "checkpoint": {"everySteps": 200, "keep": 2},
 }
 

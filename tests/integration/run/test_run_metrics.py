@@ -26,7 +26,7 @@ def texts(tmp_path_factory):
         environment={"id": "MoveToTargetEnv-v0", "options": {"max_steps": 20}},
         algorithm=LITTLE_DQN,
         steps=50_000,
-        evaluation={"everySteps": 300, "episodes": 2},
+        evaluation={"everySteps": 300, "episodes": 2, "confirmEpisodes": 2},
         checkpoint={"everySteps": 200, "keep": 2},
     )
     with LocalRun(tmp_path_factory.mktemp("run"), job) as run:

@@ -8,7 +8,10 @@ from tests.local_run import is_running, running
 from tests.soak import recovery
 from tests.soak.jobs import LITTLE_DQN, make_job
 
-SELDOM = {"evaluation": {"everySteps": 500_000, "episodes": 1}, "checkpoint": {"everySteps": 500_000}}
+SELDOM = {
+    "evaluation": {"everySteps": 500_000, "episodes": 1, "confirmEpisodes": 1},
+    "checkpoint": {"everySteps": 500_000},
+}
 READY = {"collect-0": "ready", "collect-1": "ready", "evaluate-0": None}
 
 

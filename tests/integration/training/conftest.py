@@ -11,7 +11,6 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-import structlog
 import yaml
 
 from palaestra_trainer.configuration import load
@@ -79,8 +78,7 @@ def play(fakes, tmp_path, monkeypatch, capsys):
         code = training.run(load(job), RunDirectory(tmp_path / "run"), make_members)
         return code, capsys.readouterr().err
 
-    yield attempt
-    structlog.reset_defaults()
+    return attempt
 
 
 @pytest.fixture

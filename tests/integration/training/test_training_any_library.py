@@ -141,7 +141,7 @@ def test_ctrl_c_ends_everything_that_was_started(stubs):
     with subprocess.Popen(
         [sys.executable, "-c", LOOP], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as program:
-        assert program.stdout.readline() == "steps\n"
+        assert "steps\n" in iter(program.stdout.readline, "")  # after what it logs on a busy machine
         started = [pid for pid, _ in below(program.pid) if pid != program.pid]
         program.send_signal(signal.SIGINT)
         _, said = program.communicate(timeout=PATIENCE_S)

@@ -192,11 +192,9 @@ def test_a_stall_while_nobody_waits_for_simulators_is_the_trainer_s(progress, ca
 
 @pytest.fixture
 def log(capsys):
-    """Return a logger that is configured as a trainer's; afterwards it is as it was."""
-    before = structlog.get_config()
+    """Return a logger that is configured as a trainer's."""
     configure_logs()
     yield structlog.get_logger("tests")
-    structlog.configure(**before)
     capsys.readouterr()
 
 
