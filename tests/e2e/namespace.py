@@ -20,7 +20,8 @@ EXAMPLES = Path(__file__).parents[2] / "manifests/examples"
 RESTRICTED = {"pod-security.kubernetes.io/enforce": "restricted"}
 LOOK_EVERY_S = 0.5
 # For what takes 10 s and for a tiny training, on a busy machine whose operator is killed again and again.
-SHORT_S, LONG_S = 180.0, 360.0
+# A pod may wait until the pods of other tests leave room on the only node: five minutes on a slow machine.
+SHORT_S, LONG_S = 180.0, 900.0
 JOB = "palaestra.dev/job"
 NAME_BYTES = 40
 

@@ -5,7 +5,7 @@ import pytest
 from tests.e2e.jobs import WAIT
 from tests.e2e.namespace import LONG_S, named
 
-pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(1200)]
 
 GONE = ("trainingjobs", "jobs", "pods", "configmaps", "networkpolicies")
 NOWHERE = {"nodeSelector": {"palaestra.dev/nowhere": "true"}}

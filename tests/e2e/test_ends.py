@@ -4,7 +4,7 @@ import pytest
 
 from tests.e2e.namespace import LONG_S, named
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(1200)
 
 INTERRUPTED_ONCE = (
     "test -e $PALAESTRA_RUN/seen && exit 0; mkdir -p $PALAESTRA_RUN; touch $PALAESTRA_RUN/seen; exit 75"

@@ -12,7 +12,7 @@ from tests.e2e.namespace import OPERATOR, SYSTEM, named
 from tests.e2e.own_image import ARCHIVES
 from tests.e2e.own_image import archives as built
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(1200)
 
 MOST_MB = {"stub": 500, "mujoco": 700, "operator": 200, "trainer": 2500, "notebook": 2500}
 LABEL = "org.opencontainers.image."

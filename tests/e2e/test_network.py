@@ -12,7 +12,7 @@ from tests.e2e.askers import LISTEN, Asker, plain_pod
 from tests.e2e.jobs import WAIT, make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SHORT_S, SYSTEM, NeverHeld, named, trains
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(1200)
 
 STATUS, HEALTH, CONTROL, MASTER = 9090, 7200, 7100, 11311
 OPEN = {STATUS, HEALTH, HEALTH + 31}

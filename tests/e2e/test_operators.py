@@ -10,7 +10,7 @@ from tests.e2e.jobs import WAIT
 from tests.e2e.long_run import kill_operator, make_killable, operators
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, named, statuses
 
-pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 
 NEXT_IMAGE = os.environ.get("PALAESTRA_E2E_NEXT_OPERATOR", "palaestra-operator:next")
 TRAINER_IMAGE = f"palaestra-trainer:{version('palaestra')}"

@@ -17,7 +17,7 @@ from tests.e2e.audit import recorded
 from tests.e2e.namespace import OPERATOR, SYSTEM
 from tests.e2e.tour import tour
 
-pytestmark = [pytest.mark.looks_back, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.looks_back, pytest.mark.timeout(1200)]
 
 TRIAL = "palaestra-trial"
 UNSEEN = {

@@ -5,7 +5,7 @@ import pytest
 from tests.e2e.jobs import make_claim
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 
-pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(1200)]
 
 SECRETS_ROLE = "palaestra-job-secrets"
 FOR_JOBS = {"metadata": {"labels": {"palaestra.dev/for-jobs": "true"}}}

@@ -28,7 +28,7 @@ def test_a_pod_that_asks_for_more_is_refused_here(namespace):
 
 @pytest.mark.beside
 @pytest.mark.after_the_kills
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
     """All that a person asks of a run that has ended, without a look into its pod."""
     namespace.apply(job("tiny"))
@@ -50,7 +50,7 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
 
 
 @pytest.mark.beside
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_a_pod_ends_with_its_trainer(namespace, job):
     """Simulators and ROS master are not what anybody waits for, nor a preempted node's grace."""
     namespace.apply(job("ends", script=ENDS_WHEN_ALL_IS_UP))
@@ -67,7 +67,7 @@ def moment(terminated):
 
 
 @pytest.mark.beside
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_no_container_can_write_its_image_or_speak_to_the_cluster(namespace, job):
     """A person who may create TrainingJobs, but no pods, must gain no other right by it."""
     namespace.apply(job("waits", script=WAIT))

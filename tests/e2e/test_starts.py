@@ -7,7 +7,7 @@ from tests.e2e.askers import IMAGE
 from tests.e2e.jobs import LITTLE, SMALL, WAIT
 from tests.e2e.namespace import LONG_S
 
-pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(1200)]
 
 FOR_JOBS = {"palaestra.dev/for-jobs": "true"}
 CRASHES = {"env": [{"name": "PYTHONHOME", "value": "/nowhere"}]}

@@ -5,7 +5,7 @@ import pytest
 from tests.e2e.namespace import LONG_S
 from tests.strangers import DRIVE, rover
 
-pytestmark = [pytest.mark.beside, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.beside, pytest.mark.timeout(1200)]
 
 STOPPED = "stopped at 0[.]4[0-9] -?0[.]00 .* turned by 1[12][0-9] degrees"
 SCRIPT = 'said=$(python3 -c "$PROGRAM") || exit; echo "$said"; grep -qE "$STOPPED" <<<"$said"'

@@ -10,7 +10,7 @@ import pytest
 from tests.e2e.jobs import make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(1200)
 
 COMMAND_S = 180
 # A program in the place of the training: writes what a run leaves, says so, and stays while it is to.
