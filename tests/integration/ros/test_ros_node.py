@@ -1,5 +1,6 @@
 """The stub's node on the wire, as programs that are not ours would use it."""
 
+import gc
 import os
 import socket
 import struct
@@ -164,6 +165,21 @@ def test_noise_on_the_port_disturbs_nobody(peer, dial):
     _, header = dial(**service_header(peer, "double", "webots_ros/set_float"))
 
     assert "error" not in header
+
+
+def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
+    """A client of another release asks again every few seconds, for days."""
+    before, count = links_there(), 5
+    for _ in range(count):
+        _, answer = dial(**service_header(peer, "double", "webots_ros/get_float"))
+        assert "error" in answer
+
+    eventually(lambda: links_there() < before + count)  # the loop holds the last one that it has called
+
+
+def links_there():
+    """Return how many connections of nodes this process holds, open or closed."""
+    return sum(isinstance(each, links.Link) for each in gc.get_objects())
 
 
 def test_requests_wait_while_the_controller_is_blocked(peer, dial):

@@ -3,12 +3,14 @@
 import math
 import select
 import threading
+import xmlrpc.client
 
 import pytest
 
 from palaestra_trainer.errors import SimulatorHung, WrongData
 from palaestra_trainer.ros import RosService, RosSubscriber
 from tests.integration.stub_faults.conftest import DEADLINE_S
+from tests.waiting import eventually
 
 PERIOD_MS = 192
 SLOW_MS = 3000  # so long that what does not wait for it comes before, on a busy machine
@@ -173,3 +175,18 @@ def test_two_clients_are_served_after_a_slow_step(connected):
 
     assert answers == [pytest.approx(PERIOD_MS / 1000)] * 2
     assert step.finish().success
+
+
+def test_a_subscriber_that_has_gone_is_listed_no_more(connected, master):
+    """`rosnode info` of a stub with faults showed every subscriber that it has ever had."""
+    connected("lost:topic=ir1/value,every=20")
+    with xmlrpc.client.ServerProxy(master) as names:
+        node = xmlrpc.client.ServerProxy(names.lookupNode("/test", "/robotino")[2])
+    with node:
+        before = node.getBusInfo("/test")[2]
+        subscriber = RosSubscriber("/robotino/ir1/value", "sensor_msgs/Range")
+        subscriber.connect()
+        eventually(lambda: len(node.getBusInfo("/test")[2]) == len(before) + 1)
+        subscriber.close()
+
+        eventually(lambda: node.getBusInfo("/test")[2] == before)

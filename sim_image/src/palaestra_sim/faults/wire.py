@@ -68,10 +68,6 @@ class FaultyNode(RosNode):
         if not self._held_steps:
             super().take_waiting()
 
-    def dropped(self, link: Connection) -> None:
-        """Forget a connection that is closed."""
-        super().dropped(link.link if isinstance(link, _Answers | _Messages) else link)
-
     def receive(self, path: str, answers: _Answers, pass_on: Callable[[], None]) -> None:
         """Take a request from a link, and forward, delay or drop it by the ruling of the course."""
         ruling = self._failing.course.request(self.name, path)

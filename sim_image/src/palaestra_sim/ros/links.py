@@ -93,12 +93,21 @@ class Lingering:
 
 
 class Link:
-    """A connection from accept to close; `greet` turns its header into an endpoint."""
+    """A connection from accept to close.
+
+    Args:
+        loop: watches its socket.
+        connection: the socket, accepted.
+        greet: turns the header into an endpoint.
+        lingering: closes it in time once it is finished.
+        gone: called when it is closed, also before its header was read.
+    """
 
     __slots__ = (
         "_endpoint",
         "_finished",
         "_frames",
+        "_gone",
         "_greet",
         "_lingering",
         "_loop",
@@ -108,7 +117,14 @@ class Link:
         "closed",
     )
 
-    def __init__(self, loop: Loop, connection: socket.socket, greet: Greet, lingering: Lingering) -> None:
+    def __init__(
+        self,
+        loop: Loop,
+        connection: socket.socket,
+        greet: Greet,
+        lingering: Lingering,
+        gone: Callable[[Link], None],
+    ) -> None:
         connection.setblocking(False)
         for option in sockets.OPTIONS:
             connection.setsockopt(*option)
@@ -116,6 +132,7 @@ class Link:
         self._socket = connection
         self._greet = greet
         self._lingering = lingering
+        self._gone = gone
         self._frames = FrameReader()
         self._endpoint: Endpoint | None = None
         self._unsent: bytes | memoryview = b""
@@ -155,6 +172,7 @@ class Link:
         self._lingering.discard(self)
         self._loop.forget(self._socket)
         self._socket.close()
+        self._gone(self)
         if self._endpoint is not None:
             self._endpoint.lost()
 

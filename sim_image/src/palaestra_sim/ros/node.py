@@ -48,7 +48,7 @@ class RosNode:
         self._master = Master(master_uri, f"/{name}")
         self._services: dict[str, tuple[ServiceType, Handler]] = {}
         self._topics: dict[str, Topic] = {}
-        self._links: set[Connection] = set()
+        self._links: set[Link] = set()
         self._lingering = Lingering(loop)
         self._subscribers: dict[Connection, list[Any]] = {}  # entries of getBusInfo
         self._connected = 0
@@ -190,7 +190,7 @@ class RosNode:
             connection, _ = self._listener.accept()
         except OSError:
             return  # the peer has disconnected already
-        self._links.add(Link(self._loop, connection, self._greet, self._lingering))
+        self._links.add(Link(self._loop, connection, self._greet, self._lingering, self._links.discard))
 
     def _greet(self, link: Connection, header: Mapping[str, str]) -> Endpoint:
         if "service" in header:
@@ -236,12 +236,7 @@ class RosNode:
         self._connected += 1
         caller = header.get("callerid", "")
         self._subscribers[link] = [self._connected, caller, "o", "TCPROS", topic.name, True]
-        return topic.connect(link, self.dropped)
-
-    def dropped(self, link: Connection) -> None:
-        """Forget a connection that is closed."""
-        self._links.discard(link)
-        self._subscribers.pop(link, None)
+        return topic.connect(link, self._subscribers.pop)
 
 
 def _check_md5(header: Mapping[str, str], type_name: str, md5: str) -> None:
@@ -284,8 +279,7 @@ class ServiceEnd:
         self._send(b"\1" + self._service.response.frame(fields))
 
     def lost(self) -> None:
-        """Let the node forget the connection."""
-        self._node.dropped(self._link)
+        """Do nothing: an answer to a connection that is closed is dropped."""
 
     def _send(self, data: bytes) -> None:
         self._link.send(data)

@@ -36,7 +36,7 @@ class Topic:
         self.publishers = 0
         self._last: bytes | None = None
 
-    def connect(self, link: Connection, dropped: Callable[[Connection], None]) -> Endpoint:
+    def connect(self, link: Connection, dropped: Callable[[Connection], object]) -> Endpoint:
         """Take a subscriber, with the last message if the topic is latched."""
         self.links.append(link)
         if self._last is not None:
@@ -56,7 +56,7 @@ class _SubscriberEnd:
 
     __slots__ = ("_dropped", "_link", "_topic")
 
-    def __init__(self, topic: Topic, link: Connection, dropped: Callable[[Connection], None]) -> None:
+    def __init__(self, topic: Topic, link: Connection, dropped: Callable[[Connection], object]) -> None:
         self._topic = topic
         self._link = link
         self._dropped = dropped
