@@ -362,7 +362,7 @@ def test_a_sweep_begins_and_prunes_trials_although_the_api_server_is_away_meanwh
 
 
 def test_a_sweep_refuses_an_api_server_that_does_not_answer_at_first(server, trial):
-    """The kubeconfig may be the wrong one, and nobody would wait for that."""
+    """The kubeconfig may name a cluster that does not exist, so the command fails at once."""
     script, kubeconfig = server
     script.calls = [hang_up]
 

@@ -14,7 +14,7 @@ from palaestra_protocol.ros import sockets
 from palaestra_protocol.ros.tcpros import FrameReader, FramingError, decode_header, encode_header
 from palaestra_sim.ros.loop import Loop
 
-# A client hangs up in a millisecond; one that reads to the end of the connection waits for this.
+# Long enough for roscpp and rospy to close first. A client that reads until the end waits for it.
 LINGER_S = 1.0
 
 
