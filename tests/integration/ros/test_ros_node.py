@@ -4,6 +4,7 @@ import gc
 import os
 import socket
 import struct
+import threading
 import xmlrpc.client
 
 import pytest
@@ -16,6 +17,7 @@ from tests.integration.ros.conftest import DEADLINE_S
 from tests.waiting import eventually
 
 ASK = b"\x01"
+LONG_TEXT = "x" * 20_000_000  # longer than the buffers of a connection
 
 
 @pytest.fixture
@@ -94,15 +96,48 @@ def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
 
 
 def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, dial):
-    """A picture is longer than the buffers of a connection."""
-    text = "x" * 20_000_000
-    peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": text}))
+    """A picture of a camera may be that long."""
+    peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": LONG_TEXT}))
     connection, _ = dial(**service_header(peer, "get_text", "webots_ros/get_string"))
     connection.sendall(frame(ASK))
     peer.do(lambda: None)
 
     assert read_exactly(connection, 1) == b"\x01"
-    assert len(read_frame(connection)) == struct.calcsize("<I") + len(text)
+    assert len(read_frame(connection)) == struct.calcsize("<I") + len(LONG_TEXT)
+
+
+@pytest.fixture
+def ask_for_much(peer, dial, monkeypatch):
+    """Returns a client's connection, after the first byte of an answer that is longer than its buffers."""
+    monkeypatch.setattr(links, "LINGER_S", 0.01)
+    peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": LONG_TEXT}))
+    connection, _ = dial(**service_header(peer, "get_text", "webots_ros/get_string"))
+
+    def ask():
+        connection.sendall(frame(ASK))
+        assert read_exactly(connection, 1) == b"\x01"
+        return connection
+
+    return ask
+
+
+def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
+    """The time to close begins when all is sent: a client may read over a slow network."""
+    connection, later = ask_for_much(), threading.Event()
+    peer.do(lambda: peer.node.later(10 * links.LINGER_S, later.set))
+    assert later.wait(DEADLINE_S)
+
+    assert len(read_frame(connection)) == struct.calcsize("<I") + len(LONG_TEXT)
+
+
+def test_a_node_keeps_nothing_for_a_client_that_stops_reading(ask_for_much, monkeypatch):
+    """Else it keeps a picture for each client that was stopped in the middle of one."""
+    monkeypatch.setattr(links, "SEND_S", 0.01)
+    connection = ask_for_much()
+    eventually(lambda: all(link.closed for link in links_there()))
+
+    with pytest.raises(AssertionError, match="closed"):
+        read_frame(connection)
 
 
 def test_two_requests_in_one_packet_are_both_answered(peer, dial):
@@ -169,17 +204,17 @@ def test_noise_on_the_port_disturbs_nobody(peer, dial):
 
 def test_a_node_keeps_nothing_of_connections_that_it_has_refused(peer, dial):
     """A client of another release asks again every few seconds, for days."""
-    before, count = links_there(), 5
+    before, count = len(links_there()), 5
     for _ in range(count):
         _, answer = dial(**service_header(peer, "double", "webots_ros/get_float"))
         assert "error" in answer
 
-    eventually(lambda: links_there() < before + count)  # the loop holds the last one that it has called
+    eventually(lambda: len(links_there()) < before + count)  # the loop holds the last one that it has called
 
 
 def links_there():
-    """Return how many connections of nodes this process holds, open or closed."""
-    return sum(isinstance(each, links.Link) for each in gc.get_objects())
+    """Return the connections of nodes that this process holds, open or closed."""
+    return [each for each in gc.get_objects() if isinstance(each, links.Link)]
 
 
 def test_requests_wait_while_the_controller_is_blocked(peer, dial):

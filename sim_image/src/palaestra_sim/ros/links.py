@@ -17,6 +17,9 @@ from palaestra_sim.ros.loop import Loop
 # Long enough for roscpp and rospy to close first. A client that reads until the end waits for it.
 LINGER_S = 1.0
 
+# For a client that stops reading in the middle of a long answer.
+SEND_S = 60.0
+
 
 class Endpoint(Protocol):
     """The receiver of a connection after its header has been read."""
@@ -47,7 +50,7 @@ class Connection(Protocol):
         ...
 
     def finish(self) -> None:
-        """Take nothing more, and close it once the peer has, or after some seconds."""
+        """Take nothing more, and close it once the peer has, or some time after all was sent."""
         ...
 
     def close(self) -> None:
@@ -156,12 +159,17 @@ class Link:
             self._write(data)
 
     def finish(self) -> None:
-        """Send what is left, take nothing more, and close the connection once the peer has, or in seconds.
+        """Take nothing more, and close the connection once the peer has, or some time after all was sent.
 
         Roscpp drops an answer that it has not read yet when the server closes (ros/ros_comm#1976).
+        A long answer has SEND_S, so that a client that has stopped reading does not keep it in memory.
         """
-        if not self.closed:
-            self._finished = True
+        if self.closed:
+            return
+        self._finished = True
+        if self._unsent:
+            self._loop.later(SEND_S, self.close)
+        else:
             self._lingering.add(self)
 
     def close(self) -> None:
@@ -196,8 +204,11 @@ class Link:
         if not self._unsent and self._newest is not None:
             newest, self._newest = self._newest, None
             self._write(newest)
-        if not self._unsent and not self.closed:
-            self._loop.watch(self._socket, self._ready)
+        if self._unsent or self.closed:
+            return
+        self._loop.watch(self._socket, self._ready)
+        if self._finished:
+            self._lingering.add(self)
 
     def _ready(self) -> None:
         if self._unsent:
