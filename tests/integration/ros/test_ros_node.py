@@ -95,17 +95,6 @@ def test_a_client_hangs_up_before_the_node_does(peer, dial, monkeypatch):
         connection.recv(1)
 
 
-def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, dial):
-    """A picture of a camera may be that long."""
-    peer.do(lambda: peer.node.serve("get_text", "webots_ros/get_string", lambda _: {"value": LONG_TEXT}))
-    connection, _ = dial(**service_header(peer, "get_text", "webots_ros/get_string"))
-    connection.sendall(frame(ASK))
-    peer.do(lambda: None)
-
-    assert read_exactly(connection, 1) == b"\x01"
-    assert len(read_frame(connection)) == struct.calcsize("<I") + len(LONG_TEXT)
-
-
 @pytest.fixture
 def ask_for_much(peer, dial, monkeypatch):
     """Returns a client's connection, after the first byte of an answer that is longer than its buffers."""
@@ -119,6 +108,14 @@ def ask_for_much(peer, dial, monkeypatch):
         return connection
 
     return ask
+
+
+def test_an_answer_that_the_socket_cannot_take_at_once_arrives_whole(peer, ask_for_much):
+    """A picture of a camera may be that long."""
+    connection = ask_for_much()
+    peer.do(lambda: None)
+
+    assert len(read_frame(connection)) == struct.calcsize("<I") + len(LONG_TEXT)
 
 
 def test_a_client_that_reads_slowly_gets_the_whole_answer(peer, ask_for_much):
