@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from palaestra_trainer.compiler import defer_compiler
+from palaestra_trainer.deferred import defer_unused_imports
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -12,6 +15,9 @@ if TYPE_CHECKING:
     from palaestra_trainer.tolerant.players import Players
     from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
     from palaestra_trainer.tolerant.vector import TolerantVectorEnv
+
+defer_unused_imports()
+defer_compiler()
 
 
 def load_policy(run_or_zip: str | Path) -> Policy:

@@ -12,6 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from palaestra_protocol.imports import import_without, without_collections
+
+import_without("rich", "structlog")  # it would format tracebacks with it, which the log has as plain text
+
 import structlog
 
 from palaestra_protocol.numbers import whole
@@ -104,10 +108,11 @@ def train(arguments: Sequence[str] | None = None) -> int:
     except (TrainerError, OSError) as error:
         return _refuse(error)
     with leaving_when_asked():
-        # Imported here, so that a wrong configuration is reported at once, not after 3 s of imports.
-        from palaestra_trainer.run import training
-        from palaestra_trainer.simulators.connect import connect_members
-        from palaestra_trainer.telemetry import display
+        # Imported here, so that a wrong configuration is reported at once, not after seconds of imports.
+        with without_collections():
+            from palaestra_trainer.run import training
+            from palaestra_trainer.simulators.connect import connect_members
+            from palaestra_trainer.telemetry import display
 
         return training.run(
             configuration,
@@ -149,7 +154,8 @@ def export(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, metavar="FILE", help="default: RUN_DIR/policy.FORMAT")
     chosen = parser.parse_args(arguments)
     configure_logs()
-    from palaestra_trainer import exporting
+    with without_collections():
+        from palaestra_trainer import exporting
 
     try:
         written = exporting.export(chosen.run, chosen.to, chosen.output)
@@ -170,8 +176,9 @@ def _evaluate(folder: Path, episodes: int, stream: str) -> dict[str, Any]:
     in_pod = CONFIG_VARIABLE in os.environ
     if in_pod:
         configuration = configuration.model_copy(update={"simulators": load().simulators})
-    from palaestra_trainer.run.measuring import measure
-    from palaestra_trainer.simulators.connect import connect_here, connect_members
+    with without_collections():
+        from palaestra_trainer.run.measuring import measure
+        from palaestra_trainer.simulators.connect import connect_here, connect_members
 
     members = connect_members if in_pod else partial(connect_here, run=directory.path)
     return measure(configuration, directory.model, members, episodes=episodes, stream=stream)

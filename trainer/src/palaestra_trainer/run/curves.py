@@ -28,3 +28,11 @@ class Curves(Logger):
         for name, value in self._progress.scalars().items():
             self.record(name, value)
         super().dump(step)
+
+
+def hide_points(folder: Path, *, after: int) -> None:
+    """Write the mark by which TensorBoard hides the points of earlier files whose step is larger."""
+    from torch.utils.tensorboard.writer import SummaryWriter  # noqa: PLC0415 - most programs write no curves
+
+    with SummaryWriter(str(folder), purge_step=after + 1):
+        pass

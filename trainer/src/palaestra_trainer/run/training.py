@@ -17,7 +17,6 @@ import structlog
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.optim.optimizer import register_optimizer_step_pre_hook
-from torch.utils.tensorboard.writer import SummaryWriter
 
 from palaestra_protocol.pod.status import Cause, ExitCode, SuccessInterval, Termination
 from palaestra_trainer import algorithms, checkpoint
@@ -32,7 +31,7 @@ from palaestra_trainer.run.attempt import Run
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
 from palaestra_trainer.run.conductor import Conductor, Resumed
-from palaestra_trainer.run.curves import Curves
+from palaestra_trainer.run.curves import Curves, hide_points
 from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.judging import make_judge
 from palaestra_trainer.run.rejoining import rejoin
@@ -267,9 +266,7 @@ class Attempt:
         step, curves = self._progress.step, self._directory.tensorboard
         forget_after(self._directory, step)
         if curves.exists():
-            # In files older than this mark, TensorBoard hides points from this step on.
-            with SummaryWriter(str(curves), purge_step=step + 1):
-                pass
+            hide_points(curves, after=step)
 
     def _resume(self, model: BaseAlgorithm, env: SimulatorsVecEnv, found: Checkpoint) -> Resumed:
         """Bring model and simulators back to the state of the checkpoint."""

@@ -8,8 +8,6 @@ from types import TracebackType
 from typing import Protocol, Self, TextIO
 
 import structlog
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from palaestra_protocol.pod.status import TrainerStatus
 
@@ -96,13 +94,15 @@ class Bar(_Paced):
 
     def __init__(self, stream: TextIO | None = None) -> None:
         super().__init__()
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[figures]}"),
-            TimeRemainingColumn(),
-            console=Console(file=stream or sys.stderr),
+        from rich import console, progress  # noqa: PLC0415 - a run without a terminal needs no rich
+
+        self._bar = progress.Progress(
+            progress.TextColumn("{task.description}"),
+            progress.BarColumn(),
+            progress.MofNCompleteColumn(),
+            progress.TextColumn("{task.fields[figures]}"),
+            progress.TimeRemainingColumn(),
+            console=console.Console(file=stream or sys.stderr),
             refresh_per_second=2,
         )
         self._task = self._bar.add_task("starting", total=None, figures="")

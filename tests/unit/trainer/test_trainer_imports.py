@@ -1,0 +1,86 @@
+"""What a trainer imports at its start: each attempt of each pod pays for it."""
+
+import json
+import subprocess
+import sys
+
+IMPORT = """
+import json, sys
+import palaestra_trainer.cli, palaestra_trainer.run.training, palaestra_trainer.simulators.connect
+imported = sorted(sys.modules)
+"""
+USE = """
+from stable_baselines3.common import callbacks, logger, monitor
+folder = sys.argv[1]
+log = logger.configure(folder, ["csv", "tensorboard"])
+log.record("figure", 7.0)
+log.record("hyperparameters", logger.HParam({"gamma": 0.9}, {"figure": 7.0}), exclude="csv")
+log.dump(1)
+log.close()
+monitor.Monitor(__import__("gymnasium").make("CartPole-v1"), folder).reset()
+read = logger.read_csv(folder + "/progress.csv")
+results = monitor.load_results(folder)
+import pandas
+bar = callbacks.tqdm(total=3, disable=True)
+used = list(read["figure"]), isinstance(results, pandas.DataFrame), type(bar).__module__
+"""
+
+
+def _run(program: str, *arguments: object):
+    command = [sys.executable, "-c", program, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_a_trainer_imports_no_library_before_it_uses_it(tmp_path):
+    """pandas, Matplotlib, TensorBoard and rich were 40 % of its start; where they are used they work."""
+    imported, used = _run(IMPORT + USE + "print(json.dumps([imported, used]))", tmp_path)
+
+    assert "stable_baselines3.common.logger" in imported
+    unused = {"matplotlib", "mlflow", "onnx", "optuna", "pandas", "rich", "tensorboard", "uv", "wandb"}
+    assert unused.intersection(imported) == set()
+    assert used == [[7.0], True, "tqdm.rich"]
+    assert list(tmp_path.glob("events.out.tfevents.*"))
+
+
+OPTIMIZE = """
+import json, sys
+import palaestra_trainer, torch
+module = torch.nn.Linear(2, 1)
+optimizer = torch.optim.Adam(module.parameters())
+def learn():
+    optimizer.zero_grad()
+    module(torch.ones(3, 2)).sum().backward()
+    optimizer.step()
+learn()
+before = "sympy" in sys.modules
+"""
+COMPILE = """
+compiled = torch.compile(lambda x: x + 1, backend="eager")(torch.ones(1)).item()
+learn()
+answer = getattr(torch.optim.Optimizer.zero_grad.__wrapped__, "__dynamo_disable")
+real = type(torch._dynamo).__name__ == "module" and torch._dynamo is sys.modules["torch._dynamo"]
+print(json.dumps([before, compiled, real, hasattr(answer, "_torchdynamo_disable")]))
+"""
+
+
+def test_an_optimizer_brings_no_compiler_before_a_program_compiles():
+    """It was a third of a trainer's start; what PyTorch keeps from being compiled is still kept from it."""
+    assert _run(OPTIMIZE + COMPILE) == [False, 2.0, True, True]
+
+
+def test_a_part_of_the_compiler_can_be_imported_first():
+    """A part that was executed twice would have its state twice."""
+    program = OPTIMIZE + "import torch._dynamo.config as part\nfrom torch._dynamo import optimize\n"
+
+    assert _run(program + "print(json.dumps(part is torch._dynamo.config))") is True
+
+
+def test_a_library_that_a_user_imports_first_is_the_real_one_everywhere():
+    """A stand-in beside the library itself would be a second object of the same name."""
+    first = "import matplotlib.figure, pandas\n"
+    same = "logger.matplotlib is matplotlib, logger.pandas is pandas"
+    program = first + IMPORT + f"from stable_baselines3.common import logger\nprint(json.dumps([{same}]))"
+
+    assert _run(program) == [True, True]
