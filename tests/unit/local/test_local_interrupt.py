@@ -70,3 +70,27 @@ def test_a_run_that_a_person_ends_has_not_expired(signals):
 
     assert told == ["stop", "kill"][:signals]
     assert not interrupt.expired
+
+
+@pytest.fixture(params=[signal.SIGINT, signal.SIGHUP], ids=lambda number: number.name)
+def ignored(request):
+    """A signal that is ignored, as this process would inherit it."""
+    before = signal.signal(request.param, signal.SIG_IGN)
+    yield request.param
+    signal.signal(request.param, before)
+
+
+def test_a_signal_that_was_ignored_at_the_start_stays_ignored(ignored):
+    """Scripts ignore SIGINT for background programs, nohup ignores SIGHUP; SIGTERM still ends the run."""
+
+    async def play():
+        interrupt, target = Interrupt(), Target()
+        interrupt.pass_to(target)
+        with interrupt.listening():
+            os.kill(os.getpid(), ignored)
+            os.kill(os.getpid(), signal.SIGTERM)
+            await target.next()
+        return interrupt
+
+    assert asyncio.run(play()).signals == 1
+    assert signal.getsignal(ignored) is signal.SIG_IGN

@@ -1,12 +1,25 @@
-"""End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends it too."""
+"""End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends it too.
+
+A signal that was ignored when the program started stays ignored: SIGINT of a command in the background of a
+script, SIGHUP under nohup. SIGTERM always ends a run.
+"""
 
 import asyncio
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def obeyed(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
+    """Return those of the signals that may get a handler: SIGTERM, and those that are not ignored."""
+    return [
+        number
+        for number in numbers
+        if number is signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN
+    ]
 
 
 class Stoppable(Protocol):
@@ -44,15 +57,16 @@ class Interrupt:
 
     @contextmanager
     def listening(self, deadline_s: float | None = None) -> Iterator[None]:
-        """Handle SIGINT, SIGTERM and SIGHUP while the block runs; stop the target at the deadline."""
+        """Handle the signals while the block runs; stop the target at the deadline."""
         loop = asyncio.get_running_loop()
+        numbers = obeyed(SIGNALS)
         timer = None if deadline_s is None else loop.call_later(deadline_s, self._expire)
-        for number in SIGNALS:
+        for number in numbers:
             loop.add_signal_handler(number, self._came)
         try:
             yield
         finally:
-            for number in SIGNALS:
+            for number in numbers:
                 loop.remove_signal_handler(number)
             if timer is not None:
                 timer.cancel()

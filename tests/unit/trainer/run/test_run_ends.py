@@ -100,6 +100,19 @@ def test_the_handler_that_was_set_before_is_set_again():
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_a_sigint_that_was_ignored_at_the_start_stays_ignored():
+    """Scripts ignore it for what they start in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with Interruption() as interruption:
+            os.kill(os.getpid(), signal.SIGINT)
+            interruption.check()
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+            assert signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_stall_is_reported_and_ends_the_process():
     """After the deadline, not before, and with its own code."""
     left, words = threading.Event(), []

@@ -6,7 +6,8 @@ checkpoint, because there is nothing to save. The handler itself raises nothing,
 because it may run while a lock is released. Waits that are under way may last
 `patience.LEFT_S` seconds more. A second signal ends the process at once, and so
 does a signal that arrives before the run listens. After the run's end, while
-Python exits, signals are ignored.
+Python exits, signals are ignored. A SIGINT that was ignored when the program
+started, as in the background of a script, stays ignored.
 """
 
 from __future__ import annotations
@@ -29,6 +30,11 @@ HURRY = "a second signal ends at once"
 Check = Callable[[], None]
 
 
+def _obeyed() -> list[signal.Signals]:
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    return [signal.SIGTERM] if ignored else [*SIGNALS]
+
+
 def go_on() -> None:
     """Do nothing."""
 
@@ -46,7 +52,7 @@ def leaving_when_asked() -> Iterator[None]:
     has no effect, because it would replace the exit code of the run.
     """
     atexit.register(_ignore)
-    before = {number: signal.signal(number, _leave) for number in SIGNALS}
+    before = {number: signal.signal(number, _leave) for number in _obeyed()}
     try:
         yield
     finally:
@@ -78,7 +84,7 @@ class Interruption:
 
     def __enter__(self) -> Self:
         """Install the signal handlers."""
-        self._before = {number: signal.signal(number, self._note) for number in SIGNALS}
+        self._before = {number: signal.signal(number, self._note) for number in _obeyed()}
         return self
 
     def __exit__(
@@ -101,7 +107,7 @@ class Interruption:
         del frame
         self.requested = signal.Signals(number)
         patience.end()
-        for later in SIGNALS:
+        for later in self._before:
             signal.signal(later, signal.SIG_DFL)
         # Not by a logger: this may run while the logger writes a line.
         os.write(2, f"{self.requested.name}: ending; {HURRY}\n".encode())
