@@ -7,19 +7,14 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
+from palaestra.cli.commands import COMMANDS
 from palaestra.cli.parsing import ALL_EXIT_CODES, CONTEXT, KUBECONFIG, NAMESPACE, WRONG_INPUT
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import KILLED, LocalError
+from palaestra_protocol.imports import import_without, without_collections
 from palaestra_sim.errors import SimError
 
 __all__ = ["main"]
-
-# Modules with commands, in the order of the help. The operator runs for months and imports only its own.
-COMMANDS = (
-    "run", "sweep", "exporting", "documents", "operator", "looking", "watching", "changing", "fetching",
-    "doctor", "trial",
-)  # fmt: skip
-OPERATOR = ["operator"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,19 +60,12 @@ def _parser(first: Sequence[str]) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"palaestra {version('palaestra')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    if first == OPERATOR:
-        _leave_out("rich", "structlog")
-    for name in OPERATOR if first == OPERATOR else COMMANDS:
-        import_module(f"palaestra.cli.{name}").add(commands)
+    named = COMMANDS.get(first[0]) if first else None
+    if named is None:
+        for name, each in COMMANDS.items():
+            commands.add_parser(name, help=each.summary)
+    else:
+        with without_collections():
+            import_without("rich", "structlog")  # structlog would format tracebacks with it
+            import_module(f"palaestra.cli.{named.module}").add(commands)
     return parser
-
-
-def _leave_out(part: str, module: str) -> None:
-    """Import a module as if its optional dependency `part` were not installed.
-
-    structlog imports rich (4 MiB with its own imports) only to format tracebacks on terminals.
-    """
-    if part not in sys.modules and module not in sys.modules:
-        sys.modules[part] = None  # type: ignore[assignment]  # so Python documents how to forbid an import
-        import_module(module)
-        del sys.modules[part]

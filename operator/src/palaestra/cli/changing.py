@@ -26,12 +26,12 @@ GONE_S = 300.0
 
 def add(commands: Commands) -> None:
     """Add the three commands."""
-    for name, work, summary, description in (
-        ("suspend", _suspend, "suspend jobs", SUSPEND),
-        ("resume", _resume, "resume suspended jobs", RESUME),
-        ("delete", _delete, "delete jobs", DELETE),
+    for name, work, description in (
+        ("suspend", _suspend, SUSPEND),
+        ("resume", _resume, RESUME),
+        ("delete", _delete, DELETE),
     ):
-        parser = cluster_command(commands, name, work, summary, description)
+        parser = cluster_command(commands, name, work, description)
         parser.add_argument("names", metavar="NAME", nargs="+", help="names of the jobs")
     parser.add_argument(
         "--timeout",

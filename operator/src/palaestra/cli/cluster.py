@@ -25,11 +25,9 @@ exit codes:
 Work = Callable[[Client, argparse.Namespace], int]
 
 
-def cluster_command(
-    commands: Commands, name: str, work: Work, summary: str, description: str
-) -> argparse.ArgumentParser:
+def cluster_command(commands: Commands, name: str, work: Work, description: str) -> argparse.ArgumentParser:
     """Return the parser of a new cluster command, with kubectl's options that choose the cluster."""
-    parser = command(commands, name, connected(work), summary, description, EXIT_CODES)
+    parser = command(commands, name, connected(work), description, EXIT_CODES)
     add_cluster(parser)
     return parser
 

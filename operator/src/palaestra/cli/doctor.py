@@ -20,7 +20,7 @@ WIDTH = 18
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "doctor", _doctor, "find out why jobs do not run", DOCTOR)
+    parser = cluster_command(commands, "doctor", _doctor, DOCTOR)
     parser.add_argument(
         "--operator-namespace",
         metavar="NS",

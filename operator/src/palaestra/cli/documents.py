@@ -39,7 +39,7 @@ def add(commands: Commands) -> None:
     """Add the three commands."""
     _add_plan(commands)
     _add_world(commands)
-    command(commands, "crd", _crd, "print the CustomResourceDefinition", CRD)
+    command(commands, "crd", _crd, CRD)
 
 
 def _plan(options: argparse.Namespace) -> int:
@@ -96,7 +96,7 @@ def _crd(options: argparse.Namespace) -> int:
 
 
 def _add_plan(commands: Commands) -> None:
-    parser = command(commands, "plan", _plan, "print the objects that a job needs", PLAN)
+    parser = command(commands, "plan", _plan, PLAN)
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     parser.add_argument(
         "--layout",
@@ -108,7 +108,7 @@ def _add_plan(commands: Commands) -> None:
 
 
 def _add_world(commands: Commands) -> None:
-    parser = command(commands, "world", _world, "print one simulator's own world", WORLD)
+    parser = command(commands, "world", _world, WORLD)
     parser.add_argument("file", metavar="FILE", type=Path, help="a world (.wbt, or .xml of MuJoCo)")
     parser.add_argument("--check", action="store_true", help="print what each simulator makes of it")
     parser.add_argument("--job", metavar="NAME", help="name of the job")

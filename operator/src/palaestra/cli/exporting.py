@@ -23,9 +23,7 @@ exit codes:
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = command(
-        commands, "export", _export, "write a policy as one file for other programs", EXPORT, EXIT_CODES
-    )
+    parser = command(commands, "export", _export, EXPORT, EXIT_CODES)
     parser.add_argument("run", metavar="RUN", type=Path, help="run directory, such as runs/<job>/<replica>")
     parser.add_argument(
         "--to",

@@ -20,7 +20,7 @@ create and delete pods and to run commands in them.
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "fetch", _fetch, "copy the results of a run", FETCH)
+    parser = cluster_command(commands, "fetch", _fetch, FETCH)
     parser.add_argument("name", metavar="NAME", help="name of the job")
     parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="number; default: 0")
     parser.add_argument("--dir", type=Path, default=Path("fetched"), help="target folder; default: fetched")

@@ -32,17 +32,17 @@ LOG_S = 86_400.0
 def add(commands: Commands) -> None:
     """Add the four commands."""
     _add_get(commands)
-    for name, work, summary, description in (
-        ("describe", _describe, "show a job in full", DESCRIBE),
-        ("events", _events, "list the events about a job", EVENTS),
+    for name, work, description in (
+        ("describe", _describe, DESCRIBE),
+        ("events", _events, EVENTS),
     ):
-        parser = cluster_command(commands, name, work, summary, description)
+        parser = cluster_command(commands, name, work, description)
         parser.add_argument("name", metavar="NAME", help="name of the job")
     _add_logs(commands)
 
 
 def _add_get(commands: Commands) -> None:
-    parser = cluster_command(commands, "get", _get, "list jobs", GET)
+    parser = cluster_command(commands, "get", _get, GET)
     parser.add_argument("name", metavar="NAME", nargs="?", help="name of one job; default: all jobs")
     parser.add_argument("-A", "--all-namespaces", action="store_true", help="jobs of all namespaces")
     parser.add_argument("-l", "--selector", metavar="LABELS", help="jobs with these labels: key=value,...")
@@ -52,7 +52,7 @@ def _add_get(commands: Commands) -> None:
 
 
 def _add_logs(commands: Commands) -> None:
-    parser = cluster_command(commands, "logs", _logs, "print the log of a container", LOGS)
+    parser = cluster_command(commands, "logs", _logs, LOGS)
     parser.add_argument("name", metavar="NAME", help="name of the job")
     parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="number; default: 0")
     parser.add_argument(

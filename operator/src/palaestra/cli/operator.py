@@ -25,7 +25,7 @@ NODE_LABEL = re.compile(rf"({DOMAIN})?{NAME}=({NAME})?")
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = command(commands, "operator", _operator, "reconcile the jobs of a cluster", OPERATOR)
+    parser = command(commands, "operator", _operator, OPERATOR)
     _add_looking(parser)
     parser.add_argument(
         "--leader-elect",

@@ -4,6 +4,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any, Protocol
 
+from palaestra.cli.commands import COMMANDS
+
 WRONG_INPUT = 2
 NAMESPACE = ("-n", "--namespace")
 CONTEXT, KUBECONFIG = "--context", "--kubeconfig"
@@ -43,14 +45,13 @@ def command(
     commands: Commands,
     name: str,
     function: Callable[[argparse.Namespace], int],
-    summary: str,
     description: str,
     exit_codes: str = EXIT_CODES,
 ) -> argparse.ArgumentParser:
     """Return the parser of a new command; `function` runs the command and returns its exit code."""
     parser = commands.add_parser(
         name,
-        help=summary,
+        help=COMMANDS[name].summary,
         description=description,
         epilog=exit_codes,
         formatter_class=argparse.RawDescriptionHelpFormatter,

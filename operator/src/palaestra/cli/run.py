@@ -13,13 +13,14 @@ RUN = """\
 Trains as the TrainingJob in FILE specifies, and writes <dir>/<job name>/<replica>/: checkpoints/,
 tensorboard/, evaluations.jsonl, model.zip, the source worlds, training.yaml and logs/. The same command
 resumes from the newest checkpoint. Replicas run one after another; --replica chooses one. Ctrl-C saves a
-checkpoint and exits; a second Ctrl-C exits at once.
+checkpoint and exits; a second Ctrl-C exits at once. SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP
+that was ignored at the start, as by nohup or in the background of a script, stays ignored.
 """
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = command(commands, "run", _run, "train on this machine", RUN)
+    parser = command(commands, "run", _run, RUN)
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     add_dir(parser)
     parser.add_argument("--replica", metavar="N", type=whole(), help="this replica only")

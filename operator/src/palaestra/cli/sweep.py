@@ -18,6 +18,7 @@ from palaestra.errors import PalaestraError, SpecErrors
 from palaestra.local import rundir
 from palaestra.local.errors import KILLED
 from palaestra.local.files import write
+from palaestra.local.interrupt import obeyed
 from palaestra.sweeps import expanding, ledger
 from palaestra.sweeps.carrying_out import Place, carry_out
 from palaestra.sweeps.here import Here
@@ -36,6 +37,7 @@ Trains the job of the Sweep in FILE with different values of some fields, each w
 every trial before it starts the first. Writes <dir>/<sweep>/: a run directory for each trial and seed,
 trials.jsonl, table.txt and curves.png. The same command skips trials that are complete and resumes the
 others. Ctrl-C saves a checkpoint of each run and exits; a second Ctrl-C exits at once.
+SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that was ignored at the start stays ignored.
 
 With --cluster, each trial is a TrainingJob with the label palaestra.dev/sweep=<sweep>; a queue of the job
 decides when it runs. Ctrl-C ends the command and leaves the jobs; the same command continues. Deletes the
@@ -53,7 +55,7 @@ exit codes:
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = command(commands, "sweep", _sweep, "train with different values and compare", SWEEP, EXIT_CODES)
+    parser = command(commands, "sweep", _sweep, SWEEP, EXIT_CODES)
     parser.add_argument("file", metavar="FILE", type=Path, help="a Sweep")
     add_dir(parser)
     parser.add_argument(
@@ -167,8 +169,8 @@ def _say(line: str) -> None:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Handle SIGTERM and SIGHUP like Ctrl-C."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
+    """Handle SIGTERM and SIGHUP like Ctrl-C, except a SIGHUP that is ignored, as under nohup."""
+    numbers = obeyed((signal.SIGTERM, signal.SIGHUP))
     before = [signal.signal(number, signal.default_int_handler) for number in numbers]
     try:
         yield

@@ -21,7 +21,7 @@ in time.
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "try", _try, "run a small job in a cluster as a test", TRY)
+    parser = cluster_command(commands, "try", _try, TRY)
     parser.add_argument("file", metavar="FILE", type=Path, help="a TrainingJob")
     parser.add_argument(
         "--within",

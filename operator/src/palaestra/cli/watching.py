@@ -27,7 +27,7 @@ WATCH_S = 604_800.0
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = cluster_command(commands, "watch", _watch, "show the progress of a job", WATCH)
+    parser = cluster_command(commands, "watch", _watch, WATCH)
     parser.add_argument("name", metavar="NAME", help="name of the job")
     parser.add_argument(
         "--timeout", metavar="S", type=seconds, default=WATCH_S, help="seconds to watch; default: a week"
