@@ -6,6 +6,7 @@ The wire is in `ros`; nothing here needs a socket.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, NamedTuple, Protocol
 
 from palaestra_sim.errors import SimError
@@ -66,6 +67,10 @@ class Node(Protocol):
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
         """Answer a service with what `handler` returns for a request, or later if that is LATER."""
+        ...
+
+    def together(self) -> AbstractContextManager[None]:
+        """Make the services and topics of a block known at its end, all at once and in their order."""
         ...
 
     def advertise(

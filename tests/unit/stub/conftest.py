@@ -8,6 +8,7 @@ import heapq
 import itertools
 import math
 from collections import deque
+from contextlib import nullcontext
 
 import pytest
 
@@ -82,6 +83,10 @@ class FakeNode:
         """Take a service, once."""
         assert path not in self.services, f"{path} served twice"
         self.services[path] = (service_type(type_name), handler)
+
+    def together(self):
+        """Do nothing: there is no master."""
+        return nullcontext()
 
     def advertise(self, path, type_name, *, latched=False, template=None, reading=""):
         """Return a publisher that keeps what it sends."""

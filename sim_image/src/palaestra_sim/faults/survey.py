@@ -136,6 +136,10 @@ class _Listener:
         self.services[path] = handler
         self.types[path] = type_name
 
+    def together(self) -> contextlib.AbstractContextManager[None]:
+        """Do nothing: nothing is registered."""
+        return contextlib.nullcontext()
+
     def advertise(
         self,
         path: str,

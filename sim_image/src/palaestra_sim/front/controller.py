@@ -95,8 +95,14 @@ class Controller:
 
     def start(self) -> None:
         """Advertise everything, `robot/get_device_list` last."""
+        self.node.blocked = lambda: self.blocked
+        with self.node.together():
+            self._advertise()
+        if self.robot.parts.node.flag("synchronization", True):
+            self._stepping.join(self.robot)
+
+    def _advertise(self) -> None:
         node = self.node
-        node.blocked = lambda: self.blocked
         self._log.open()
         self._serve(*self._log.table())
         model_name = node.advertise(_MODEL_NAME, "std_msgs/String", latched=True)
@@ -114,8 +120,6 @@ class Controller:
         if self._arguments.auto_publish:
             self._enable_all()
         self._serve(services.device_list())
-        if self.robot.parts.node.flag("synchronization", True):
-            self._stepping.join(self.robot)
 
     def close(self) -> None:
         """End: no step waits for this robot any more, and its services and topics are gone."""

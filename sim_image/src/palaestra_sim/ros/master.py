@@ -11,7 +11,8 @@ import os
 import socket
 import threading
 import xmlrpc.client
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from socketserver import ThreadingMixIn
 from typing import Any, Protocol
 from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
@@ -55,6 +56,7 @@ class Master:
         self._uri = uri
         self._node = node
         self._proxy = xmlrpc.client.ServerProxy(uri, transport=_Transport())
+        self._gathered: list[tuple[str, tuple[Any, ...]]] | None = None
 
     def call(self, method: str, *arguments: Any) -> Any:
         """Return the value of a call in the node's name.
@@ -62,9 +64,58 @@ class Master:
         Raises:
             MasterUnreachable: no answer, or an invalid one.
         """
+        return self._checked(method, self._sent(method, self._node, *arguments))
+
+    def tell(self, method: str, *arguments: Any) -> None:
+        """Make a call whose value does not matter: at once, or with others at the end of `together`.
+
+        Raises:
+            MasterUnreachable: as `call`.
+        """
+        if self._gathered is None:
+            self.call(method, *arguments)
+        else:
+            self._gathered.append((method, arguments))
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """Send what the block tells in one request, in its order: a robot has hundreds of services.
+
+        A master without `system.multicall` gets one call after another. If the block raises an error, nothing
+        is sent.
+
+        Raises:
+            MasterUnreachable: as `call`.
+        """
+        gathered = self._gathered = []
         try:
-            code, text, value = getattr(self._proxy, method)(self._node, *arguments)
+            yield
+        finally:
+            self._gathered = None
+        if not gathered:
+            return
+        calls = [{"methodName": method, "params": [self._node, *rest]} for method, rest in gathered]
+        try:
+            answers = self._sent("system.multicall", calls)
+        except MasterUnreachable as error:
+            if not isinstance(error.__cause__, xmlrpc.client.Fault):
+                raise
+            for method, rest in gathered:
+                self.call(method, *rest)
+            return
+        for (method, _), answer in zip(gathered, answers, strict=True):
+            self._checked(method, answer[0] if isinstance(answer, list) else [_FAILED, str(answer), 0])
+
+    def _sent(self, method: str, *arguments: Any) -> Any:
+        try:
+            return getattr(self._proxy, method)(*arguments)
         except (OSError, http.client.HTTPException, xmlrpc.client.Error, ValueError) as error:
+            raise MasterUnreachable(f"no ROS master at {self._uri}: {error}") from error
+
+    def _checked(self, method: str, answer: Any) -> Any:
+        try:
+            code, text, value = answer
+        except (TypeError, ValueError) as error:
             raise MasterUnreachable(f"no ROS master at {self._uri}: {error}") from error
         if code != _OK:
             raise MasterUnreachable(f"the ROS master refused {method}: {text}")

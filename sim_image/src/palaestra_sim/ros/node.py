@@ -11,6 +11,7 @@ import contextlib
 import socket
 from collections import deque
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, Final
 
 from palaestra_protocol.ros.rostypes import ServiceType, message_type, service_type
@@ -66,14 +67,18 @@ class RosNode:
         return path if path.startswith("/") else f"/{self.name}/{path}"
 
     def serve(self, path: str, type_name: str, handler: Handler) -> None:
-        """Answer a service, registered at once.
+        """Answer a service, registered at once, or at the end of `together`.
 
         Raises:
             MasterUnreachable: the master did not take the registration.
         """
         name = self.resolve(path)
         self._services[name] = (service_type(type_name), handler)
-        self._master.call("registerService", name, self._rosrpc, self._slave.uri)
+        self._master.tell("registerService", name, self._rosrpc, self._slave.uri)
+
+    def together(self) -> AbstractContextManager[None]:
+        """Register the services and topics of a block in one request; see `Master.together`."""
+        return self._master.together()
 
     def advertise(
         self,
@@ -99,7 +104,7 @@ class RosNode:
             topic = self._topics[name] = Topic(
                 name, message_type(type_name), latched=latched, reading=reading
             )
-            self._master.call("registerPublisher", name, type_name, self._slave.uri)
+            self._master.tell("registerPublisher", name, type_name, self._slave.uri)
         topic.publishers += 1
         return Publisher(topic, dict(template or {}))
 
@@ -109,7 +114,7 @@ class RosNode:
         topic.publishers -= 1
         if topic.publishers == 0:
             del self._topics[topic.name]
-            self._master.call("unregisterPublisher", topic.name, self._slave.uri)
+            self._master.tell("unregisterPublisher", topic.name, self._slave.uri)
             for link in list(topic.links):
                 link.close()
 
@@ -144,11 +149,11 @@ class RosNode:
     def unregister(self) -> None:
         """Unregister every service and topic at the master; connections stay open."""
         # A master that is gone has forgotten us already.
-        with contextlib.suppress(MasterUnreachable):
+        with contextlib.suppress(MasterUnreachable), self._master.together():
             for name in self._services:
-                self._master.call("unregisterService", name, self._rosrpc)
+                self._master.tell("unregisterService", name, self._rosrpc)
             for name in self._topics:
-                self._master.call("unregisterPublisher", name, self._slave.uri)
+                self._master.tell("unregisterPublisher", name, self._slave.uri)
 
     def abandon(self) -> None:
         """Close every socket without unregistering, like a controller that was killed."""
