@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "manifests/examples"
 PALAESTRA = Path(sys.executable).with_name("palaestra")
 PATIENCE_S = 240.0  # of runs that take seconds on an idle machine; below pytest's deadline
+REAPER = "reaper.py"  # its command line has that of the simulator in it
 GONE_S = 10.0  # for the kernel to end what was killed
 LOOK_EVERY_S = 0.02
 FAULT = re.compile(r"simulator fault .*kind=(\w+)")
@@ -165,7 +166,7 @@ class LocalRun:
             for pid, command in self.processes()
             if any(word.endswith(program) for word in command.split()[:4])
             and simulator in command
-            and (program == "keeper.py" or "keeper.py" not in command)
+            and (program == REAPER or REAPER not in command)
         ]
 
     def pid_of(self, program, simulator=""):

@@ -1,7 +1,8 @@
 """`make bench`: measure what the project promises, and print it as JSON.
 
 Every figure is a ratio within one run, or stands beside what it is compared with: machines are noisy.
-Names as arguments choose parts, e.g. `python -m tests.bench stepping parallel`.
+Names as arguments choose parts, e.g. `python -m tests.bench stepping parallel`; `--scale 0.1` does a tenth of
+what a part does, to see that the part itself works.
 """
 
 import argparse
@@ -44,13 +45,15 @@ def main():
     """Print one JSON object a line: part, seconds it took, what it found."""
     parser = argparse.ArgumentParser(prog="tests.bench", description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; default: all")
-    chosen = parser.parse_args().parts or list(PARTS)
+    parser.add_argument("--scale", type=float, default=1.0, help="share of the whole size (default: 1)")
+    asked = parser.parse_args()
+    chosen = asked.parts or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:
         parser.error(f"{unknown[0]} is no part; choose from {', '.join(PARTS)}")
     for name in chosen:
         started = time.monotonic()
-        found = PARTS[name]()
-        line = {"part": name, "seconds": round(time.monotonic() - started, 1), **found}
+        found = PARTS[name](asked.scale)
+        line = {"part": name, "scale": asked.scale, "seconds": round(time.monotonic() - started, 1), **found}
         sys.stdout.write(json.dumps(line) + "\n")
         sys.stdout.flush()
 

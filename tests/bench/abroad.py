@@ -4,34 +4,41 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from tests.bench.learning import success_rate, train
+from tests.bench.learning import EPISODES, shortened, success_rate, train
+from tests.bench.sizes import scaled
 from tests.soak.jobs import example
 
-HOMES = {"stub": "move-to-target", "mujoco": "move-to-target-mujoco"}
+HOMES = {"mujoco": "move-to-target-mujoco", "stub": "move-to-target"}
 CYLINDER_STEPS = 300_000
 
 
-def measure_transfer():
-    """Return the success of move-to-target's policies at home and in the other simulator, same episodes."""
+def measure_transfer(scale=1.0):
+    """Return the success of move-to-target's policies at home and in the other simulator, same episodes.
+
+    Below full scale, of the policy of MuJoCo alone.
+    """
+    homes = list(HOMES.items())[: scaled(len(HOMES), scale)]
     with tempfile.TemporaryDirectory() as folder:
-        runs = {home: train(example(name), Path(folder)) for home, name in HOMES.items()}
+        runs = {home: train(shortened(example(name), scale), Path(folder)) for home, name in homes}
         return {
-            f"{home}_in_{place}": success_rate(_moved(run, home, place))
+            f"{home}_in_{place}": success_rate(moved(run, home, place), scaled(EPISODES, scale))
             for home, run in runs.items()
             for place in HOMES
         }
 
 
-def measure_seeing():
+def measure_seeing(scale=1.0):
     """Return the success of policies that see: on an empty floor, and among cylinders by 1 and 3 frames."""
-    return {
-        "empty": _see(),
-        "cylinders_1_frame": _see(cylinders=True, frames=1),
-        "cylinders_3_frames": _see(cylinders=True, frames=3),
+    variants = {
+        "empty": {},
+        "cylinders_1_frame": {"cylinders": True, "frames": 1},
+        "cylinders_3_frames": {"cylinders": True, "frames": 3},
     }
+    chosen = list(variants.items())[: scaled(len(variants), scale)]
+    return {name: _see(scale, **options) for name, options in chosen}
 
 
-def _moved(run, home, place):
+def moved(run, home, place):
     """Return a copy of a run directory whose simulators have another driver."""
     copy = run.parent / f"in-{place}"
     shutil.copytree(run, copy)
@@ -41,7 +48,7 @@ def _moved(run, home, place):
     return copy
 
 
-def _see(**options):
+def _see(scale, **options):
     """Return the success of see-target's policy; with options, after more steps than without."""
     job = example("see-target")
     trainer = job["spec"]["trainer"]
@@ -49,4 +56,4 @@ def _see(**options):
     if options:
         trainer["steps"] = CYLINDER_STEPS
     with tempfile.TemporaryDirectory() as folder:
-        return success_rate(train(job, Path(folder)))
+        return success_rate(train(shortened(job, scale), Path(folder)), scaled(EPISODES, scale))

@@ -12,6 +12,7 @@ from palaestra_trainer.environments import baselines
 from palaestra_trainer.episodes.seeds import episode_seeds
 from palaestra_trainer.simulators.entry_point import make
 from tests.bench.arena import running
+from tests.bench.sizes import scaled
 from tests.local_run import PALAESTRA
 from tests.soak.jobs import example
 
@@ -19,36 +20,52 @@ SEEDS = (1, 2, 3, 4, 5)
 SPARSE_SEEDS = (1, 2, 3)
 NAVIGATE_SEEDS = (1, 2, 3)
 EPISODES = 100
+LEAST_STEPS = 300
 STREAM = "bench"
 MOVEMENTS = example("move-to-target")["spec"]["trainer"]["environment"]["options"]["movements"]
 EVAL = Path(sys.executable).with_name("palaestra-eval")
 
 
-def measure():
+def measure(scale=1.0):
     """Return what move-to-target and navigate learn, by seed, and two policies that learn nothing."""
-    trained = {str(seed): train_and_measure("move-to-target", seed) for seed in SEEDS}
-    navigating = {str(seed): train_and_measure("navigate", seed) for seed in NAVIGATE_SEEDS}
+    trained = by_seed("move-to-target", SEEDS, scale)
+    navigating = by_seed("navigate", NAVIGATE_SEEDS, scale)
     return {
         "success": trained,
         "seeds_at_95": sum(rate >= 0.95 for rate in trained.values()),
         "navigate": navigating,
         "navigate_seeds_at_90": sum(rate >= 0.9 for rate in navigating.values()),
-        **measure_baselines(),
+        **measure_baselines(scale),
     }
 
 
-def measure_sparse():
+def measure_sparse(scale=1.0):
     """Return what sparse-reward learns with each training seed."""
-    trained = {str(seed): train_and_measure("sparse-reward", seed) for seed in SPARSE_SEEDS}
+    trained = by_seed("sparse-reward", SPARSE_SEEDS, scale)
     return {"success": trained, "seeds_at_50": sum(rate >= 0.5 for rate in trained.values())}
 
 
-def train_and_measure(name, seed):
+def by_seed(name, seeds, scale):
+    """Return the success rate of an example's policy by training seed; of the first ones below full scale."""
+    return {str(seed): train_and_measure(name, seed, scale) for seed in seeds[: scaled(len(seeds), scale)]}
+
+
+def train_and_measure(name, seed, scale=1.0):
     """Return the success rate, on fresh episodes, of the policy that an example trains with `seed`."""
-    job = example(name)
+    job = shortened(example(name), scale)
     job["spec"]["seed"] = seed
     with tempfile.TemporaryDirectory() as folder:
-        return success_rate(train(job, Path(folder)))
+        return success_rate(train(job, Path(folder)), scaled(EPISODES, scale))
+
+
+def shortened(job, scale):
+    """Return a job with a share of its steps; below full scale it evaluates at its end only."""
+    if scale < 1:
+        trainer = job["spec"]["trainer"]
+        trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)
+        few = {"everySteps": trainer["steps"], "episodes": 2, "confirmEpisodes": 1}
+        trainer["evaluation"] = {**trainer.get("evaluation", {}), **few}
+    return job
 
 
 def train(job, folder):
@@ -64,19 +81,18 @@ def train(job, folder):
     return folder / job["metadata"]["name"] / "0"
 
 
-def success_rate(run):
+def success_rate(run, episodes=EPISODES):
     """Return the success rate of the policy of a run directory, on fresh episodes."""
-    result = subprocess.run(
-        [EVAL, run, f"--episodes={EPISODES}", f"--seeds={STREAM}"], check=True, capture_output=True, text=True
-    )
+    command = [EVAL, run, f"--episodes={episodes}", f"--seeds={STREAM}"]
+    result = subprocess.run(command, check=True, capture_output=True, text=True)
     return json.loads(result.stdout)["success_rate"]
 
 
-def measure_baselines():
+def measure_baselines(scale=1.0):
     """Return the success rates of chance and of driving straight at the target, on such episodes."""
     with running() as (robot, scene, _):
         env = make(robot, scene, movements=MOVEMENTS)
+        seeds = list(episode_seeds(SEEDS[0], STREAM, scaled(EPISODES, scale)))
         return {
-            name: baselines.success_rate(env, policy, episode_seeds(SEEDS[0], STREAM, EPISODES))
-            for name, policy in baselines.BASELINES.items()
+            name: baselines.success_rate(env, policy, seeds) for name, policy in baselines.BASELINES.items()
         }

@@ -13,6 +13,7 @@ from pathlib import Path
 from palaestra.cluster import connect
 from palaestra.cluster.resources import NAMESPACES, PODS
 from tests.bench import crowd, operator_memory, single
+from tests.bench.sizes import scaled
 from tests.control_plane.plane import running
 from tests.integration.operator.installed import asked, operator
 
@@ -23,39 +24,44 @@ QUIET_S = 30
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
-def measure():
+def measure(scale=1.0):
     """Return the figures of a crowd at both speeds of the Job controller, of one job, and of memory."""
     return {
-        "jobs": JOBS,
-        "default_rate": measure_crowd(None),
-        "fast": measure_crowd(FAST),
+        "jobs": scaled(JOBS, scale),
+        "default_rate": measure_crowd(None, scale),
+        "fast": measure_crowd(FAST, scale),
         "one_job": measure_one_job(),
-        "memory": operator_memory.measure(),
+        "memory": operator_memory.measure(scale),
     }
 
 
-def measure_crowd(requests_per_s):
-    """Return seconds until `JOBS` pods exist: of bare Jobs, of a client, of the operator; and its cost."""
+def measure_crowd(requests_per_s, scale):
+    """Return the figures of a crowd on a control plane of its own."""
     with cluster(requests_per_s) as (plane, api, folder):
-        bare_s = seconds_to_pods(api, "bare", crowd.create_bare_jobs)
-        client_s = seconds_to_pods(api, "client", crowd.create_all_objects)
-        with operator(plane, folder / "operator.log") as running_operator:
-            spent = cpu_seconds(running_operator)
-            operator_s = seconds_to_pods(api, "operator", crowd.create_training_jobs)
-            crowd.wait_for_silence(plane)
-            spent = cpu_seconds(running_operator) - spent
-            before = requests(plane)
-            time.sleep(QUIET_S)  # no request may arrive in this time
-            return {
-                "bare_jobs_s": round(bare_s, 1),
-                "client_s": round(client_s, 1),
-                "operator_s": round(operator_s, 1),
-                "times_client": round(operator_s / client_s, 2),
-                "times_bare_jobs": round(operator_s / bare_s, 2),
-                "cpu_ms_a_job": round(1000 * spent / JOBS, 1),
-                "rss_mib": mib(running_operator.rss_bytes()),
-                "requests_in_silence": requests(plane) - before,
-            }
+        return figures_of_a_crowd(plane, api, folder, scaled(JOBS, scale), QUIET_S)
+
+
+def figures_of_a_crowd(plane, api, folder, count, quiet_s):
+    """Return seconds until so many pods exist: of bare Jobs, of a client, of the operator; and its cost."""
+    bare_s = seconds_to_pods(api, "bare", crowd.create_bare_jobs, count)
+    client_s = seconds_to_pods(api, "client", crowd.create_all_objects, count)
+    with operator(plane, folder / "operator.log") as running_operator:
+        spent = cpu_seconds(running_operator)
+        operator_s = seconds_to_pods(api, "operator", crowd.create_training_jobs, count)
+        crowd.wait_for_silence(plane)
+        spent = cpu_seconds(running_operator) - spent
+        before = requests(plane)
+        time.sleep(quiet_s)  # no request may arrive in this time
+        return {
+            "bare_jobs_s": round(bare_s, 1),
+            "client_s": round(client_s, 1),
+            "operator_s": round(operator_s, 1),
+            "times_client": round(operator_s / client_s, 2),
+            "times_bare_jobs": round(operator_s / bare_s, 2),
+            "cpu_ms_a_job": round(1000 * spent / count, 1),
+            "rss_mib": mib(running_operator.rss_bytes()),
+            "requests_in_silence": requests(plane) - before,
+        }
 
 
 def measure_one_job():
@@ -81,13 +87,13 @@ def cluster(requests_per_s):
             api.close()
 
 
-def seconds_to_pods(api, namespace, create):
+def seconds_to_pods(api, namespace, create, count):
     """Return the seconds from the first object that `create` makes in a new namespace to the last pod."""
     api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": namespace}})
     crowd.wait_for_account(api, namespace)
     began = time.monotonic()
-    create(api, namespace, JOBS)
-    crowd.wait_for_count(api, PODS, namespace, JOBS)
+    create(api, namespace, count)
+    crowd.wait_for_count(api, PODS, namespace, count)
     return time.monotonic() - began
 
 

@@ -16,6 +16,7 @@ import yaml
 
 from palaestra.cluster import connect
 from palaestra.cluster.resources import JOBS, NAMESPACES, TRAINING_JOBS
+from tests.bench.sizes import scaled
 from tests.control_plane.plane import running
 from tests.integration.operator.installed import asked, operator, wait_for
 
@@ -28,22 +29,23 @@ MIB = 1 << 20
 THEN = "2026-01-01T00:00:00Z"
 
 
-def measure():
+def measure(scale=1.0):
     """Return resident memory in MiB: now where it says `rss`, the most of the process' life where `peak`."""
+    refused, planned_jobs, ended = (scaled(count, scale) for count in (LARGE, PLANNED, FINISHED))
     with crowd("large") as (plane, api):
         idle = started(plane)
-        create(api, (large_job(number) for number in range(LARGE)))
+        create(api, (large_job(number) for number in range(refused)))
         large = {"first": started(plane), "again": started(plane)}
     with crowd("planned") as (plane, api):
-        planned = beside_planned(plane, api, PLANNED)
+        planned = beside_planned(plane, api, planned_jobs)
     with crowd("finished") as (plane, api):
-        create_finished(api, FINISHED)
+        create_finished(api, ended)
         finished = started(plane)
     return {
         "idle": idle,
-        f"beside_{LARGE}_refused_jobs_of_{GROUPS * CHARACTERS}_characters": large,
-        f"beside_{PLANNED}_jobs": planned,
-        f"beside_{FINISHED}_finished_jobs": finished,
+        f"beside_{refused}_refused_jobs_of_{GROUPS * CHARACTERS}_characters": large,
+        f"beside_{planned_jobs}_jobs": planned,
+        f"beside_{ended}_finished_jobs": finished,
     }
 
 

@@ -6,6 +6,7 @@ import time
 from palaestra.api import validate
 from palaestra.plan import ClusterLayout, Images, identified, plan
 from palaestra_sim.world import builtin, check
+from tests.bench.sizes import scaled
 
 REPLICAS = 30
 SIMULATORS = 17  # of a replica: 16 that collect, one that evaluates
@@ -32,14 +33,15 @@ POST = """DEF POST_{0} Solid {{
 """
 
 
-def measure():
+def measure(scale=1.0):
     """Return processor seconds: to plan all replicas, to plan one, and to check the world once."""
     text = world()
-    job = identified(validate(request(text)), UID)
+    replicas = scaled(REPLICAS, scale)
+    job = identified(validate(request(text, replicas)), UID)
     layout = ClusterLayout(images=Images.of_release("0"))
     planned = plan(job, layout)
     return {
-        "replicas": REPLICAS,
+        "replicas": replicas,
         "simulators_a_replica": SIMULATORS,
         "world_kb": round(len(text) / 1000),
         "config_map_kb": round(len(json.dumps(planned.replicas[0].config_map)) / 1000),
@@ -56,7 +58,7 @@ def world():
     return text + "".join(POST.format(number) for number in range(posts))
 
 
-def request(text):
+def request(text, replicas):
     """Return the TrainingJob."""
     groups = (("collect", "Collect", SIMULATORS - 1), ("evaluate", "Evaluate", 1))
     simulators = [
@@ -67,7 +69,7 @@ def request(text):
         "apiVersion": "palaestra.dev/v1alpha1",
         "kind": "TrainingJob",
         "metadata": {"name": "large"},
-        "spec": {"replicas": REPLICAS, "simulators": simulators},
+        "spec": {"replicas": replicas, "simulators": simulators},
     }
 
 

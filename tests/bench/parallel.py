@@ -12,6 +12,7 @@ from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.simulators.keeper import Keeper
 from tests.bench.arena import running
+from tests.bench.sizes import scaled
 from tests.bench.stepping import rate
 
 ROUNDS = 15
@@ -22,12 +23,16 @@ MOVEMENTS = ("TURN_LEFT", "TURN_RIGHT")
 ARENA = Path(__file__).parents[2] / "sim_image/src/palaestra_sim/worlds/arena.wbt"
 
 
-def measure():
+def measure(scale=1.0):
     """Return environment steps per second of one and of four, and how many times the one the four are."""
     with ExitStack() as stack:
         members = [started(stack, f"parallel_{number}") for number in range(4)]
         one, four = vector(stack, members[:1]), vector(stack, members)
-        rounds = [(steps_per_second(one), steps_per_second(four)) for _ in range(ROUNDS)]
+        steps = scaled(STEPS, scale)
+        rounds = [
+            (steps_per_second(one, steps), steps_per_second(four, steps))
+            for _ in range(scaled(ROUNDS, scale))
+        ]
     ratios = sorted(four / one for one, four in rounds)
     return {
         "one": round(statistics.median(one for one, _ in rounds)),
@@ -84,8 +89,8 @@ def vector(stack, members):
     return env
 
 
-def steps_per_second(env):
+def steps_per_second(env, steps):
     """Return environment steps per second of all members together, without a learner, in a new episode."""
     env.reset()
     actions = itertools.cycle(np.full(env.num_envs, number) for number in range(len(MOVEMENTS)))
-    return env.num_envs * rate(lambda: env.step(next(actions)), STEPS)
+    return env.num_envs * rate(lambda: env.step(next(actions)), steps)

@@ -4,10 +4,12 @@ Plain means one process without a simulator: `fake_arena` computes the task, SB3
 Steps, hyperparameters, evaluations and the confirmation's episodes are those of the example.
 """
 
+import json
 import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 import torch
 from stable_baselines3 import DQN
@@ -18,23 +20,38 @@ from stable_baselines3.common.monitor import Monitor
 from palaestra_trainer.algorithms.values import arguments
 from palaestra_trainer.simulators.entry_point import make
 from palaestra_trainer.testing import fake_arena
+from tests.bench.sizes import scaled
 from tests.local_run import PALAESTRA
 from tests.soak.jobs import example
 
 JOB = "move-to-target"
 CONFIRMING = 100  # episodes: evaluation.confirmEpisodes, which the example leaves out
+LEAST_STEPS = 300
 
 
-def measure():
+def measure(scale=1.0):
     """Return the seconds of both, one after the other, and how many times plain training the run takes."""
-    plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain"])
+    plain_s = seconds_of([sys.executable, "-m", "tests.bench.plain", str(scale)])
     with tempfile.TemporaryDirectory() as folder:
-        run_s = seconds_of([PALAESTRA, "run", f"manifests/examples/{JOB}.yaml", "--dir", folder])
+        file = Path(folder) / "job.yaml"
+        file.write_text(json.dumps(job(scale)))
+        run_s = seconds_of([PALAESTRA, "run", file, "--dir", folder])
     return {
         "seconds": round(run_s),
         "plain_seconds": round(plain_s),
         "times_plain": round(run_s / plain_s, 2),
     }
+
+
+def job(scale):
+    """Return the example, with a share of its steps and episodes."""
+    made = example(JOB)
+    trainer = made["spec"]["trainer"]
+    evaluation = trainer["evaluation"]
+    trainer["steps"] = scaled(trainer["steps"], scale, LEAST_STEPS)
+    evaluation["episodes"] = scaled(evaluation["episodes"], scale)
+    evaluation["confirmEpisodes"] = scaled(CONFIRMING, scale)
+    return made
 
 
 def seconds_of(command):
@@ -55,8 +72,8 @@ def train(spec):
         other, eval_freq=evaluation["everySteps"], n_eval_episodes=evaluation["episodes"], verbose=0
     )
     model.learn(trainer["steps"], callback=evaluating)
-    evaluate_policy(model, other, n_eval_episodes=CONFIRMING)
+    evaluate_policy(model, other, n_eval_episodes=evaluation["confirmEpisodes"])
 
 
 if __name__ == "__main__":
-    train(example(JOB)["spec"])
+    train(job(float(sys.argv[1]))["spec"])

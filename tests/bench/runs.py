@@ -6,41 +6,59 @@ import signal
 import time
 from pathlib import Path
 
-from tests.local_run import is_running, running
+from tests.bench.sizes import scaled
+from tests.local_run import REAPER, is_running, running
 from tests.soak.jobs import example
 
 WARM_STEPS = 1500
 PATIENCE_S = 180
-PROGRAMS = ("palaestra-train", "palaestra-stub", "palaestra-sidecar", "keeper.py", "rosmaster")
+PROGRAMS = ("palaestra-train", "palaestra-stub", "palaestra-sidecar", REAPER, "rosmaster")
 
 
-def measure_recovery():
+def measure_recovery(scale=1.0):
+    """Return `recovery` of a run that learns."""
+    return measured(recovery, scale)
+
+
+def measure_shutdown(scale=1.0):
+    """Return `shutdown` of a run that learns."""
+    return measured(shutdown, scale)
+
+
+def measure_memory(scale=1.0):
+    """Return `memory` of a run that learns."""
+    return measured(memory, scale)
+
+
+def measured(figures, scale):
+    """Return the figures of a run of move-to-target that has taken some steps."""
+    with running(example("move-to-target")) as run:
+        run.wait_for_step(scaled(WARM_STEPS, scale), PATIENCE_S)
+        return figures(run)
+
+
+def recovery(run):
     """Return the seconds from a SIGKILL of the collecting stub to the next environment step."""
-    with running(example("move-to-target")) as run:
-        before = run.wait_for_step(WARM_STEPS, PATIENCE_S)["step"]
-        stub = run.pid_of("palaestra-stub", "collect-0.wbt")
-        killed = time.monotonic()
-        os.kill(stub, signal.SIGKILL)
-        run.until(lambda: recovered(run.status(), before), PATIENCE_S, look_every_s=0.05)
-        return {"seconds_to_training_again": round(time.monotonic() - killed, 1)}
+    before = run.ask()["step"]
+    stub = run.pid_of("palaestra-stub", "collect-0.wbt")
+    killed = time.monotonic()
+    os.kill(stub, signal.SIGKILL)
+    run.until(lambda: recovered(run.status(), before), PATIENCE_S, look_every_s=0.05)
+    return {"seconds_to_training_again": round(time.monotonic() - killed, 1)}
 
 
-def measure_shutdown():
+def shutdown(run):
     """Return the seconds from a SIGTERM of the collecting sidecar to its end and that of its stub."""
-    with running(example("move-to-target")) as run:
-        run.wait_for_step(WARM_STEPS, PATIENCE_S)
-        sidecar, stub = (run.pid_of(it, "sim-collect-0/") for it in ("palaestra-sidecar", "palaestra-stub"))
-        asked = time.monotonic()
-        os.kill(sidecar, signal.SIGTERM)
-        run.until(lambda: not any(map(is_running, (sidecar, stub))), PATIENCE_S, look_every_s=0.01)
-        return {"seconds_to_the_end": round(time.monotonic() - asked, 2)}
+    sidecar, stub = (run.pid_of(it, "sim-collect-0/") for it in ("palaestra-sidecar", "palaestra-stub"))
+    asked = time.monotonic()
+    os.kill(sidecar, signal.SIGTERM)
+    run.until(lambda: not any(map(is_running, (sidecar, stub))), PATIENCE_S, look_every_s=0.01)
+    return {"seconds_to_the_end": round(time.monotonic() - asked, 2)}
 
 
-def measure_memory():
+def memory(run):
     """Return the resident megabytes of the processes of a run, by kind, the largest of each."""
-    with running(example("move-to-target")) as run:
-        run.wait_for_step(WARM_STEPS, PATIENCE_S)
-        return {f"{program}_mb": max(map(resident_mb, run.pids(program))) for program in PROGRAMS}
+    return {f"{program}_mb": max(map(resident_mb, run.pids(program))) for program in PROGRAMS}
 
 
 def recovered(status, step):

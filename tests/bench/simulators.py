@@ -18,6 +18,7 @@ from palaestra_sim.world import builtin
 from palaestra_trainer.errors import SimulatorFault
 from palaestra_trainer.launching.master import ensure_master
 from palaestra_trainer.ros import RosService, RosSubscriber
+from tests.bench.sizes import scaled
 
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
 SIMULATORS = ("stub", "mujoco")
@@ -30,25 +31,26 @@ DEADLINE_S = 30.0
 CAMERA = 'Camera {{ translation 0.1 0 0.25 name "eye" width {} height {} fieldOfView 1.2 }}'
 
 
-def measure():
+def measure(scale=1.0):
     """Return the figures of each simulator, times in ms and memory in MiB."""
     ensure_master()
-    found = {simulator: plain(simulator) for simulator in SIMULATORS}
-    for width, height in SIZES:
-        found["mujoco"][f"{width}x{height}"] = pictures(width, height)
-    found["mujoco"][f"{BOXES}_boxes"] = boxes()
+    steps, boxes = scaled(STEPS, scale), scaled(BOXES, scale)
+    found = {simulator: plain(simulator, steps) for simulator in SIMULATORS}
+    for width, height in SIZES[: scaled(len(SIZES), scale)]:
+        found["mujoco"][f"{width}x{height}"] = pictures(width, height, steps)
+    found["mujoco"][f"{boxes}_boxes"] = beside_boxes(boxes, steps)
     return found
 
 
-def plain(simulator):
+def plain(simulator, steps):
     """Return start, step and memory in the shipped arena."""
     with running(simulator, builtin("arena").decode()) as (process, start_s):
         with stepping() as step:
-            spent = [step() for _ in range(STEPS)]
+            spent = [step() for _ in range(steps)]
         return {"start_ms": ms(start_s), "step_ms": ms(statistics.median(spent)), "rss_mib": memory(process)}
 
 
-def pictures(width, height):
+def pictures(width, height, steps):
     """Return how long steps with and without a picture take, until the picture is there."""
     world = re.sub(
         r"(DEF ROBOTINO Robot \{.*?children \[)",
@@ -62,7 +64,7 @@ def pictures(width, height):
         eye = RosSubscriber(f"/{ROBOT}/eye/image", "sensor_msgs/Image", decode=len)
         eye.connect()
         spent, worked = {0: [], 1: []}, {0: [], 1: []}
-        for number in range(1, 2 * STEPS + 1):
+        for number in range(1, 2 * steps + 1):
             began, worked_before = time.perf_counter(), processor_s(process)
             step()
             if number % 2 == 0:
@@ -80,9 +82,9 @@ def pictures(width, height):
         }
 
 
-def boxes():
+def beside_boxes(count, steps):
     """Return how long a step takes beside many crates that lie around."""
-    places = itertools.islice(itertools.product(range(20), range(20)), BOXES)
+    places = itertools.islice(itertools.product(range(20), range(20)), count)
     crates = "\n".join(
         f'Solid {{ translation {3 + x} {y} 0.1 name "{x} {y}" physics Physics {{ density -1 mass 1 }}'
         " boundingObject Box { size 0.2 0.2 0.2 } }"
@@ -90,7 +92,7 @@ def boxes():
     )
     world = builtin("arena").decode()
     with running("mujoco", f"{world}\n{crates}\n") as (process, _), stepping() as step:
-        spent = [step() for _ in range(STEPS)]
+        spent = [step() for _ in range(steps)]
         return {"step_ms": ms(statistics.median(spent)), "rss_mib": memory(process)}
 
 

@@ -13,6 +13,7 @@ import rospy
 
 from palaestra_protocol.ros.rostypes import service_type
 from tests.bench.arena import running
+from tests.bench.sizes import scaled
 
 ROUNDS = 5
 OURS = 1000
@@ -21,10 +22,10 @@ PERIOD_MS = 192
 TOPICS = [*(f"ir{number}" for number in range(1, 10)), "touch_sensor"]
 
 
-def measure():
+def measure(scale=1.0):
     """Return steps per second of both, and their ratio round by round."""
     with running() as (robot, _, _):
-        pairs = [(rate_of_ours(robot), rate_of_rospy()) for _ in range(ROUNDS)]
+        pairs = [(rate_of_ours(robot, scale), rate_of_rospy(scale)) for _ in range(scaled(ROUNDS, scale))]
     return {
         "steps_per_second": round(statistics.median(ours for ours, _ in pairs)),
         "rospy_steps_per_second": round(statistics.median(rospys for _, rospys in pairs)),
@@ -32,19 +33,19 @@ def measure():
     }
 
 
-def rate_of_ours(robot):
+def rate_of_ours(robot, scale):
     """Return steps per second with our sockets, alone on the simulator."""
     robot.connect()
     ways = itertools.cycle((1.0, -1.0))
-    found = rate(lambda: step(robot, next(ways)), OURS)
+    found = rate(lambda: step(robot, next(ways)), scaled(OURS, scale))
     robot.close()
     return found
 
 
-def rate_of_rospy():
+def rate_of_rospy(scale):
     """Return steps per second with rospy, alone on the simulator."""
     stepper = RospyStepper("robotino")
-    found = rate(stepper.step, ROSPYS)
+    found = rate(stepper.step, scaled(ROSPYS, scale))
     stepper.close()
     return found
 

@@ -1,10 +1,11 @@
 """Nothing grows while simulators are restarted 500 times: no thread, socket, descriptor or process."""
 
 import os
+import time
 from collections import Counter
 from pathlib import Path
 
-from tests.local_run import below, running
+from tests.local_run import LOOK_EVERY_S, below, running
 from tests.soak.jobs import LITTLE_DQN, make_job
 
 RESTARTS = 500
@@ -53,6 +54,7 @@ def least(run, first, last):
     run.until(lambda: restarts_of(run) >= first, LONGEST_S)
     least_held = {}
     while restarts_of(run) < last:
+        time.sleep(LOOK_EVERY_S)
         for name, held in holdings(run).items():
             before = least_held.get(name, held)
             least_held[name] = {what: min(before[what], held[what]) for what in held}

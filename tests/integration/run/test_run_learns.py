@@ -2,25 +2,18 @@
 
 import pytest
 
-from tests.bench.learning import success_rate
+from tests.bench import learning
 
-STEPS = 20_000
-RARELY = {"everySteps": 5000, "episodes": 20, "confirmEpisodes": 20}
-PATIENCE_S = 1200  # two minutes on two idle processors; the other tests leave it a fifth of them
+SHARE = 0.2  # of the steps, and of the episodes on which the policy is measured
 
 
 @pytest.mark.minutes(3)
-@pytest.mark.timeout(1500)
-def test_two_fifths_of_move_to_target_learn_to_reach_most_targets(run):
-    """The promise of the README, on episodes that nothing was chosen on.
+@pytest.mark.timeout(900)
+def test_a_fifth_of_move_to_target_learns_to_reach_most_targets():
+    """The promise of the README, on episodes that nothing was chosen on, by the function of `make bench`.
 
     `make e2e` trains all 50,000 steps, twice, and asks for 90 of 100 episodes; `make bench` measures the
-    promise itself, 95 of 100, with five seeds. Here 80 are asked, so that chance fails one run in
-    thousands: three seeds measured 93 to 95.
+    promise itself, 95 of 100, with five seeds. Here 10 of 20 are asked, so that chance fails one run in
+    thousands: three seeds measured 18, 17 and 17. A robot that moves by chance reaches 1.
     """
-    whole = run(steps=STEPS, evaluation=RARELY).start()
-    code, output = whole.end(PATIENCE_S)
-
-    assert code == 0, output
-    assert whole.summary()["steps"] == STEPS
-    assert success_rate(whole.directory) >= 0.80
+    assert learning.train_and_measure("move-to-target", seed=1, scale=SHARE) >= 0.5

@@ -14,9 +14,10 @@ from typing import Any
 
 import pytest
 
+from tests.bench import runs
 from tests.local_run import ROOT, is_running, running
 from tests.soak import damage, kills, kinds, leaks, recovery
-from tests.soak.jobs import LITTLE_DQN, LITTLE_PPO
+from tests.soak.jobs import LITTLE_PPO
 
 FAULT = re.compile(r"^\| [^|]+ \| `([^`]+)` \| [^|]+ \| [^|]+ \|$", re.MULTILINE)
 # Of each kind some, and so seldom that a restarted simulator gets a few episodes far.
@@ -83,22 +84,24 @@ def lose_the_master(run):
     return int(code), again
 
 
-@pytest.mark.parametrize("algorithm", [LITTLE_DQN, LITTLE_PPO], ids=["DQN", "PPO"])
-def test_a_run_whose_simulators_break_in_many_ways_succeeds(algorithm):
-    """The faults are counted by kind, and cost no more than what they cut."""
-    found = kinds.play(MANY, algorithm, "Succeeded")
+def test_a_run_whose_simulators_break_in_many_ways_succeeds():
+    """The faults are counted by kind and cost no more than they cut; test_bench.py has DQN amid chaos."""
+    found = kinds.play(MANY, LITTLE_PPO, "Succeeded")
 
     assert found["exit"] == 0
     assert set(found["faults"]) == {"dead", "wrong_data"}
 
 
 def test_training_steps_again_after_a_simulator_was_killed_and_notices_one_that_hangs():
-    """How soon is measured where nothing else runs: `make soak`."""
+    """How soon is measured where nothing else runs, by `make soak` and `make bench`; both count here, too."""
     with recovery.training() as run:
         recovery.recovery(run, standby=False)
         recovery.noticing(run)
 
         assert {kind: count for kind, count in run.faults().items() if count} == {"dead": 1, "hung": 1}
+        figures = runs.memory(run) | runs.recovery(run) | runs.shutdown(run)
+    assert len(figures) == len(runs.PROGRAMS) + 2
+    assert all(figures.values())
 
 
 def test_a_trainer_that_is_killed_while_it_saves_resumes(troubled):
@@ -125,7 +128,7 @@ def test_a_damaged_checkpoint_is_noticed_and_the_one_before_is_used(troubled):
 def test_restarts_of_simulators_leave_nothing_behind():
     """Neither in the trainer nor in the sidecars."""
     with running(leaks.job()) as run:
-        early, late = leaks.least(run, 4, 8), leaks.least(run, 16, 20)
+        early, late = leaks.least(run, 3, 6), leaks.least(run, 12, 15)
         if leaks.grown(early, late):  # a leak stays; the memory of a restart does not
             late = leaks.least(run, 20, 40)
 

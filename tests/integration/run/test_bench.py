@@ -1,0 +1,61 @@
+"""Each part of `make bench`, and what tests do not run otherwise of `make soak`, at its smallest scale.
+
+The figures mean nothing here. Without these tests, a rename would break a measurement for months: until a
+change has to be measured. The parts `recovery`, `shutdown` and `memory` are in test_run_unattended.py,
+`operator` is in test_operator_scale.py.
+"""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from tests.bench.__main__ import PARTS
+from tests.local_run import ROOT
+from tests.soak import chaos
+
+SMALL = ("newcomer", "parallel", "planning", "simulators", "stepping")
+OF_WHOLE_RUNS = ("learning", "plain", "seeing", "sparse", "transfer")  # of each example in MEASURED
+ELSEWHERE = ("memory", "operator", "recovery", "shutdown")
+DEADLINE_S = 280
+
+
+def numbers(found):
+    """Yield all numbers in what a part found."""
+    for value in found.values():
+        yield from numbers(value) if isinstance(value, dict) else [value]
+
+
+def test_every_part_is_run_by_a_test():
+    """A new one must come with its test."""
+    assert PARTS.keys() == {*SMALL, *OF_WHOLE_RUNS, *ELSEWHERE}
+
+
+@pytest.mark.minutes(1)
+@pytest.mark.parametrize("parts", [SMALL, OF_WHOLE_RUNS], ids=["small", "of whole runs"])
+def test_the_benchmark_measures(parts, tmp_path):
+    """A line of JSON for each part, in which all is a number, as somebody who types it sees it."""
+    command = [sys.executable, "-m", "tests.bench", "--scale", "0", *parts]
+    with (tmp_path / "errors").open("w+") as errors:
+        done = subprocess.run(
+            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=errors, timeout=DEADLINE_S, check=False
+        )
+        errors.seek(0)
+        assert done.returncode == 0, errors.read()[-3000:]
+
+    lines = {line.pop("part"): line for line in map(json.loads, done.stdout.splitlines())}
+    assert lines.keys() == {*parts}
+    for line in lines.values():
+        found = list(numbers(line))
+        assert len(found) > len(("scale", "seconds"))
+        assert all(isinstance(number, int | float) for number in found)
+
+
+@pytest.mark.minutes(1)
+def test_the_soak_of_a_training_amid_chaos_comes_to_its_figures():
+    """With the example chaos, and 1,000 of its steps."""
+    found = chaos.measure(0.0)
+
+    assert found["summary"]["steps"] >= chaos.LEAST_STEPS
+    assert found["faults"].keys() <= {"dead", "hung", "wrong_data"}
