@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 
-def whole_lines(path: Path) -> list[dict[str, Any]]:
-    """Return what the lines of a file hold, but for a last one that is being written."""
+def whole_lines(path: Path, about: str = "") -> list[dict[str, Any]]:
+    """Return the content of the lines that have a text in them, without one that is being written."""
     lines = path.read_bytes().splitlines(keepends=True)
-    return [json.loads(line) for line in lines if line.endswith(b"\n")]
+    return [json.loads(line) for line in lines if line.endswith(b"\n") and about.encode() in line]

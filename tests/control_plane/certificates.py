@@ -19,7 +19,7 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Authority:
-    """The certificate authority of the server and its clients; its files are in `folder`."""
+    """The certificate authority of the server and its clients; its own files are in `folder`."""
 
     folder: Path
 
@@ -38,12 +38,12 @@ class Authority:
     def server(self, addresses: Iterable[str]) -> Pair:
         """Make the certificate of a server with these IP addresses."""
         names = ",".join(["DNS:localhost", *(f"IP:{address}" for address in addresses)])
-        return self._issue("server", "/CN=kube-apiserver", f"subjectAltName={names}")
+        return self._issue(self.folder / "server", "/CN=kube-apiserver", f"subjectAltName={names}")
 
-    def client(self, user: str, group: str = "") -> Pair:
-        """Make the certificate of a user, in a group."""
+    def client(self, user: str, group: str, folder: Path) -> Pair:
+        """Make the certificate of a user, in a group, with its files in a folder; "" is no group."""
         subject = f"/O={group}/CN={user}" if group else f"/CN={user}"
-        return self._issue(user.replace(":", "-"), subject, "extendedKeyUsage=clientAuth")
+        return self._issue(folder / user.replace(":", "-"), subject, "extendedKeyUsage=clientAuth")
 
     def signing_key(self) -> Path:
         """Make the key that signs the tokens of service accounts."""
@@ -51,8 +51,8 @@ class Authority:
         _openssl("genrsa", "-out", str(path), "2048")
         return path
 
-    def _issue(self, name: str, subject: str, extension: str) -> Pair:
-        pair = Pair(certificate=self.folder / f"{name}.crt", key=self.folder / f"{name}.key")
+    def _issue(self, path: Path, subject: str, extension: str) -> Pair:
+        pair = Pair(certificate=path.with_name(f"{path.name}.crt"), key=path.with_name(f"{path.name}.key"))
         signer = ("-CA", str(self.pair.certificate), "-CAkey", str(self.pair.key))
         usage = ("-addext", "keyUsage=critical,digitalSignature", "-addext", extension)
         _openssl("req", "-x509", "-new", *CURVE, *DAY, *signer, "-subj", subject, *usage, *_files(pair))

@@ -69,6 +69,8 @@ class ControlPlane:
         authority: signs more clients.
         kubeconfig: of an administrator.
         binaries: the folder of the programs.
+        clients: the folder for certificates and kubeconfigs of users; each process that uses the plane has
+            one of its own.
     """
 
     folder: Path
@@ -76,6 +78,7 @@ class ControlPlane:
     authority: Authority
     kubeconfig: Path
     binaries: Path
+    clients: Path
 
     @property
     def server(self) -> str:
@@ -87,9 +90,13 @@ class ControlPlane:
         """A line of JSON for each request, with user, verb and object."""
         return self.folder / "audit.log"
 
-    def audit(self) -> list[dict[str, Any]]:
-        """Return what was asked so far, in order; the last line of the log may not be whole yet."""
-        return whole_lines(self.audit_log)
+    def audit(self, about: str = "") -> list[dict[str, Any]]:
+        """Return what was asked so far, in order; the last line of the log may not be whole yet.
+
+        Args:
+            about: only entries that have this text in them, such as a namespace: all tests share the log.
+        """
+        return whole_lines(self.audit_log, about)
 
     def kubectl(self, *arguments: str, sent: str = "") -> "subprocess.CompletedProcess[str]":
         """Run kubectl as the administrator, with `sent` as its standard input; 60 s at most."""
@@ -120,7 +127,7 @@ class ControlPlane:
 
     def kubeconfig_of(self, user: str, group: str = "") -> Path:
         """Write a kubeconfig for a user with a certificate and return its path."""
-        return _kubeconfig(self.folder / f"{user.replace(':', '-')}.kubeconfig", self, user, group)
+        return _kubeconfig(self.clients / f"{user.replace(':', '-')}.kubeconfig", self, user, group)
 
 
 @contextmanager
@@ -149,6 +156,7 @@ def running(
             authority=authority,
             kubeconfig=folder / "kubeconfig",
             binaries=programs(),
+            clients=folder,
         )
         _kubeconfig(plane.kubeconfig, plane, "admin", "system:masters")
         etcd_port = ports.any()
@@ -268,7 +276,7 @@ def _wait_ready(plane: ControlPlane, api_server: "subprocess.Popen[bytes]") -> N
 
 
 def _kubeconfig(path: Path, plane: ControlPlane, user: str, group: str) -> Path:
-    pair = plane.authority.client(user, group)
+    pair = plane.authority.client(user, group, plane.clients)
     cluster = {"server": plane.server, "certificate-authority": str(plane.authority.pair.certificate)}
     credentials = {"client-certificate": str(pair.certificate), "client-key": str(pair.key)}
     content = {

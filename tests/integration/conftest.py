@@ -2,17 +2,16 @@
 
 import os
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-from palaestra.cluster import Api
+from palaestra.cluster import Api, connect
 from palaestra_trainer.launching.master import ensure_master
-from tests.control_plane.installing import install
-from tests.control_plane.plane import ControlPlane, running
+from tests.control_plane import shared
+from tests.control_plane.plane import ControlPlane
 from tests.integration.operator.cluster import Place
 
-KINDS = Path(__file__).parents[2] / "manifests" / "crd.yaml"
+RUN = shared.Run.of_this_process()  # this module is imported before workers start
 
 
 @pytest.fixture(scope="session")
@@ -25,19 +24,23 @@ def master() -> str:
 
 
 @pytest.fixture(scope="session")
-def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
-    """A control plane without nodes for all tests of a worker: each uses a namespace of its own.
+def control_plane(tmp_path_factory: pytest.TempPathFactory) -> ControlPlane:
+    """The control plane of the whole run: each test uses a namespace of its own.
 
-    It knows TrainingJobs from the start.
+    Everything of install.yaml but the Deployment is installed.
     """
-    with running(tmp_path_factory.mktemp("control-plane"), kinds=KINDS) as plane:
-        yield plane
+    return shared.joined(RUN, tmp_path_factory.mktemp("clients"))
+
+
+def pytest_unconfigure() -> None:
+    """End the control plane with the run."""
+    shared.end(RUN)
 
 
 @pytest.fixture(scope="session")
 def installed(control_plane: ControlPlane) -> Iterator[Api]:
-    """An administrator's client, once everything of install.yaml but the Deployment is there."""
-    api = install(control_plane)
+    """An administrator's client."""
+    api = connect(str(control_plane.kubeconfig))
     yield api
     api.close()
 

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import os
 from types import SimpleNamespace
 
 import pytest
@@ -53,6 +54,6 @@ def real(control_plane):
 @pytest.fixture
 def namespace(real):
     """A namespace of the test's own."""
-    name = f"test-{next(numbers)}"
+    name = f"test-{next(numbers)}-{os.getpid()}"
     real.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": name}})
     return name

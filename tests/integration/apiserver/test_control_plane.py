@@ -1,5 +1,6 @@
 """The control plane of the tests itself: it comes in seconds, and nothing of it is left behind."""
 
+import re
 import shutil
 import signal
 import subprocess
@@ -13,7 +14,8 @@ from palaestra.cluster import connect
 from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
-PROGRAMS = {"etcd", "kube-apiserver", "kube-controller-manager"}
+FIRST = {"etcd", "kube-apiserver"}
+PROGRAMS = {*FIRST, "kube-controller-manager"}
 
 
 def children(pid):
@@ -38,28 +40,60 @@ def gone(pid):
         return True
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL], ids=lambda end: end.name)
-def test_nothing_of_it_outlives_the_one_who_started_it(control_plane, end):
-    """`python -m tests.control_plane`, ended in each way that there is."""
-    assert control_plane.kubeconfig.exists()
-    owner = subprocess.Popen(
-        [sys.executable, "-m", "tests.control_plane"], cwd=ROOT, stdout=subprocess.PIPE, text=True
-    )
-    kubeconfig = owner.stdout.readline().strip().partition("=")[2]
-    connected = connect(kubeconfig)
-    assert connected.version()
-    connected.close()
-    # Each begins as another program, which sees to it that it ends with its owner.
-    started = eventually(lambda: set((found := children(owner.pid)).values()) == PROGRAMS and found)
+def owner(*arguments):
+    """Start `python -m tests.control_plane`, or another module of it."""
+    module = ".".join(("tests.control_plane", *arguments[:1]))
+    command = [sys.executable, "-m", module, *arguments[1:]]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
 
-    owner.send_signal(end)
-    owner.wait(30)
-    owner.stdout.close()
+
+def all_gone(pids):
+    """Whether all of these processes end within ten seconds; nothing tells a foreign process of their end."""
     ends = time.monotonic() + 10
-    while not all(map(gone, started)) and time.monotonic() < ends:
-        time.sleep(0.05)  # nobody tells a stranger that a process has ended
+    while not all(map(gone, pids)) and time.monotonic() < ends:
+        time.sleep(0.05)
+    return all(map(gone, pids))
 
-    assert all(map(gone, started))
-    assert Path(kubeconfig).exists() == (end == signal.SIGKILL)
-    if end == signal.SIGKILL:
-        shutil.rmtree(Path(kubeconfig).parent)
+
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT], ids=lambda end: end.name)
+def test_nothing_of_it_is_left_when_it_is_asked_to_end(end):
+    """`python -m tests.control_plane`, which a person ends with Ctrl-C."""
+    with owner() as process:
+        kubeconfig = process.stdout.readline().strip().partition("=")[2]
+        connected = connect(kubeconfig)
+        assert connected.version()
+        connected.close()
+        # Each begins as another program, which sees to it that it ends with its owner.
+        started = eventually(lambda: set((found := children(process.pid)).values()) == PROGRAMS and found)
+        process.send_signal(end)
+        process.wait(30)
+
+    assert all_gone(started)
+    assert not Path(kubeconfig).exists()
+
+
+def test_no_process_of_it_outlives_a_killed_owner():
+    """At any moment: here the API server is about to start."""
+    with owner() as process:
+        started = eventually(lambda: set((found := children(process.pid)).values()) >= FIRST and found)
+        etcd = next(pid for pid, program in started.items() if program == "etcd")
+        folder = re.search(r"--data-dir=(.+)/etcd", Path(f"/proc/{etcd}/cmdline").read_text())[1]
+        process.kill()
+
+    assert all_gone(started)
+    shutil.rmtree(folder)
+
+
+def test_the_control_plane_of_a_run_ends_with_the_run_however_that_ends(tmp_path):
+    """Pytest's own process may be killed; another process, which no worker waits for, runs the plane."""
+    with subprocess.Popen(["sleep", "600"]) as run:
+        folder = tmp_path / "plane"
+        folder.mkdir()
+        with owner("shared", str(folder), str(run.pid)) as keeper:
+            started = eventually(lambda: set((found := children(keeper.pid)).values()) >= FIRST and found)
+            run.kill()
+            run.wait()
+            keeper.wait(60)
+
+    assert all_gone(started)
+    assert not folder.exists()

@@ -21,14 +21,14 @@ KINDS = (
 Kubectl = Callable[..., str]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def control_plane(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ControlPlane]:
-    """One that nobody else uses: definitions are deleted here, and every TrainingJob with them."""
+    """One that only this folder uses: definitions are deleted here, and every TrainingJob with them."""
     with running(tmp_path_factory.mktemp("chart")) as plane:
         yield plane
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def kubectl(control_plane: ControlPlane) -> Kubectl:
     """Run kubectl as the administrator, and return all that it says; it must succeed."""
 
@@ -40,7 +40,7 @@ def kubectl(control_plane: ControlPlane) -> Kubectl:
     return run
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def cluster(control_plane: ControlPlane, kubectl: Kubectl) -> ControlPlane:
     """The control plane with those of Prometheus' and Kueue's kinds that the chart and the examples use."""
     files = [
@@ -63,7 +63,7 @@ def places(cluster: ControlPlane, kubectl: Kubectl) -> None:  # noqa: ARG001 - i
         kubectl("apply", "--server-side", "-f", "-", sent=json.dumps(place))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def api(cluster: ControlPlane) -> Iterator[Api]:
     """An administrator's client."""
     reached = connect(str(cluster.kubeconfig))

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import os
 from datetime import UTC, datetime
 from typing import Any
 
@@ -107,7 +108,7 @@ class Place:
 
     def __init__(self, api: Api, prefix: str = "place") -> None:
         self.api = api
-        self.name = f"{prefix}-{next(numbers)}-{datetime.now(UTC):%M%S}"
+        self.name = f"{prefix}-{next(numbers)}-{os.getpid()}"
         api.create(NAMESPACES, {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": self.name}})
 
     def create(self, resource: Resource, obj: Object) -> Object:

@@ -1,5 +1,6 @@
 """Operators to start, in the namespace of a test."""
 
+import fcntl
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -22,15 +23,17 @@ Start = Callable[..., RunningOperator]
 def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: Path) -> Iterator[Start]:
     """A function that starts operators with the rights of an installation, for this namespace only.
 
-    Without election, unless a test asks for it: the tests share one Lease.
+    Without election, unless a test asks for it: the tests share one Lease, so they elect one after another.
     """
     kubeconfig = control_plane.kubeconfig_of(USER, "system:serviceaccounts")
     started: list[RunningOperator] = []
+    turn = (control_plane.folder / "election.lock").open("w")
 
     def begin(*options: str, elect: bool = False, dies_after: int | None = None) -> RunningOperator:
         election = "--leader-elect" if elect else "--no-leader-elect"
-        if not started:  # what an earlier test left of the Lease would have to run out
-            with suppress(NotFound):
+        if elect and not started:
+            fcntl.flock(turn, fcntl.LOCK_EX)
+            with suppress(NotFound):  # what an earlier test left of the Lease would have to run out
                 installed.delete(LEASES, NAMESPACE, NAME)
         log = tmp_path / f"operator-{len(started)}.log"
         common = (f"--namespace={place.name}", election, *options)
@@ -40,3 +43,4 @@ def start(control_plane: ControlPlane, installed: Api, place: Place, tmp_path: P
     yield begin
     for each in started:
         each.kill()
+    turn.close()

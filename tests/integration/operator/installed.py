@@ -81,7 +81,7 @@ class Installed:
 def asked(plane: ControlPlane) -> list[Asked]:
     """Return all that any operator ever asked, watches and the Lease included, in order."""
     found = []
-    for entry in plane.audit():
+    for entry in plane.audit(USER):
         if entry["user"].get("username") == USER and entry["stage"] == "ResponseComplete":
             what = entry.get("objectRef") or {}
             found.append(

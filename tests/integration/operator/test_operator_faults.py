@@ -20,7 +20,7 @@ LEASE_S = 15.0
 def creations(control_plane, namespace):
     """Return how many objects of each kind were created in a namespace, by any client."""
     counts = {}
-    for event in control_plane.audit():
+    for event in control_plane.audit(namespace):
         target = event.get("objectRef", {})
         made = event["verb"] == "create" and event.get("responseStatus", {}).get("code") == 201
         if made and target.get("namespace") == namespace and "subresource" not in target:

@@ -34,7 +34,7 @@ def patches(control_plane, place):
     return sum(
         each["verb"] == "patch" and each["user"].get("username") == USER
         and each["responseStatus"]["code"] == 200 and wanted.items() <= each.get("objectRef", {}).items()
-        for each in control_plane.audit()
+        for each in control_plane.audit(place.name)
     )  # fmt: skip
 
 
@@ -192,8 +192,14 @@ def test_a_suspended_job_that_is_stopped_is_deleted_and_not_made_again(write, pl
     assert [each["reason"] for each in status["replicas"]] == ["DeadlineExceeded"] * 2
     assert place.get(JOBS, "job-1")["spec"]["activeDeadlineSeconds"] == 1
     made = {"resource": "jobs", "namespace": place.name, "name": "job-0"}
-    audited = [each for each in control_plane.audit() if made.items() <= each.get("objectRef", {}).items()]
-    assert [each["verb"] for each in audited if each["user"].get("username") == USER].count("delete") == 1
+    verbs = [
+        each["verb"]
+        for each in control_plane.audit(place.name)
+        if made.items() <= each.get("objectRef", {}).items() and each["user"].get("username") == USER
+    ]
+    assert verbs.count("create") == 1
+    # The one that follows may still see a Job whose deletion was the last write of the one before.
+    assert 1 <= verbs.count("delete") <= (2 if write else 1)
 
 
 def test_edits_of_policy_and_job_are_said_once_and_stay(place, start, control_plane):

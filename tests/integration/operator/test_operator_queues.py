@@ -105,7 +105,7 @@ def lists(control_plane, place):
     wanted = {"resource": "workloads", "namespace": place.name}
     return [
         each["responseStatus"]["code"]
-        for each in control_plane.audit()
+        for each in control_plane.audit(place.name)
         if each["user"].get("username") == USER and wanted.items() <= each.get("objectRef", {}).items()
     ]
 

@@ -112,7 +112,7 @@ def test_the_content_of_a_secret_is_never_asked_for(place, start, installed, con
 
     asked = [
         each
-        for each in control_plane.audit()
+        for each in control_plane.audit(place.name)
         if each["user"].get("username") == USER
         and {"resource": "secrets", "namespace": place.name}.items() <= each.get("objectRef", {}).items()
     ]

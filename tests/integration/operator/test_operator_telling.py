@@ -116,7 +116,7 @@ def test_nothing_that_the_operator_asks_for_is_forbidden(place, start, control_p
 
     asked = [
         event
-        for event in control_plane.audit()
+        for event in control_plane.audit(place.name)
         if event["user"].get("username") == USER  # nobody's, without credentials
         and event.get("objectRef", {}).get("namespace") == place.name
     ]
