@@ -15,6 +15,7 @@ from palaestra_protocol.ros import definitions, digests
 from palaestra_protocol.ros.codec import codec_of
 from palaestra_protocol.ros.fixed import attribute
 from tests import ros_values
+from tests.tables import for_each
 
 NAMES, SERVICES = definitions.type_names()
 SIDES = {side.name: side for name in SERVICES for side in definitions.service(name)}
@@ -62,7 +63,7 @@ def plain(value):
     return [plain(it) for it in value] if isinstance(value, list | tuple) else value
 
 
-@pytest.mark.parametrize("name", sorted(TYPES))
+@for_each("name", sorted(TYPES))
 @settings(max_examples=10)
 @given(data=st.data())
 def test_bytes_and_values_are_those_of_genpy(name, data):
@@ -80,7 +81,7 @@ def test_bytes_and_values_are_those_of_genpy(name, data):
     assert plain(codec.decode(ours)) == plain(classes(name)[name]().deserialize(ours))
 
 
-@pytest.mark.parametrize("name", sorted(TYPES))
+@for_each("name", sorted(TYPES))
 def test_md5_and_text_are_those_of_genmsg(name):
     """A subscriber compares the md5; rosbag and rostopic read the text."""
     message, find = TYPES[name]

@@ -8,12 +8,13 @@ import pytest
 from palaestra_protocol.ros.definitions import type_names
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_protocol.ros.tcpros import frame
+from tests.tables import for_each
 
 MD5 = json.loads(Path(__file__).with_name("ros_md5.json").read_text())
 MESSAGES, SERVICES = type_names()
 
 
-@pytest.mark.parametrize("name", sorted(MD5))
+@for_each("name", sorted(MD5))
 def test_every_type_of_webots_ros_has_its_md5(name):
     """Peers compare the md5 of a definition before the first byte of data."""
     type_ = message_type(name) if name in MESSAGES else service_type(name)
@@ -21,7 +22,7 @@ def test_every_type_of_webots_ros_has_its_md5(name):
     assert type_.md5 == MD5[name]
 
 
-@pytest.mark.parametrize("name", MESSAGES)
+@for_each("name", MESSAGES)
 def test_an_empty_message_survives_the_wire(name):
     """Zero, empty and False are what ROS sends for fields nobody set."""
     codec = message_type(name).codec
@@ -30,7 +31,7 @@ def test_an_empty_message_survives_the_wire(name):
     codec.decode(codec.encode({}))
 
 
-@pytest.mark.parametrize("name", SERVICES)
+@for_each("name", SERVICES)
 def test_request_and_response_of_every_service_survive_the_wire(name):
     """A service whose types cannot be read would only fail when first called."""
     type_ = service_type(name)

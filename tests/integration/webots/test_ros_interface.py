@@ -15,19 +15,19 @@ from tests.integration.webots.interface_plan import ANSWERS, FIELDS, QUIT_STATUS
 from tests.integration.webots.interface_player import play
 from tests.integration.webots.roscpp_build import build
 from tests.integration.webots.roscpp_client import RoscppClient
+from tests.tables import for_each
 from tools.interface.everything import FAILING, offered, world
 
 DEADLINE_S = 120.0  # of what takes seconds, on a busy machine
 ROOT = Path(__file__).parents[3]
 RUN = "import sys; from palaestra_sim.{}.cli import main; sys.exit(main())"
 PAGE = (ROOT / "docs/ros-interface.md").read_text()
-SURVEY = offered("mujoco")  # its types include the stub's
 STEPPED = {"robot/time_step"}
 
 
 def cases(paths):
-    """Return each path that `paths(simulator)` has, of each simulator."""
-    return [(simulator, path) for simulator in FAILING for path in sorted(paths(simulator))]
+    """Return a function that returns each path that `paths(simulator)` has, of each simulator."""
+    return lambda: [(simulator, path) for simulator in FAILING for path in sorted(paths(simulator))]
 
 
 def of_rospy(plan_, environment, _folder):
@@ -55,7 +55,8 @@ def of_roscpp(plan_, environment, folder):
 def program(folder):
     """Return the client with roscpp, built once for all simulators."""
     folder.mkdir()
-    return build(folder, set(SURVEY.services.values()), set(SURVEY.topics.values()))
+    survey = offered("mujoco")  # its types include the stub's
+    return build(folder, set(survey.services.values()), set(survey.topics.values()))
 
 
 @pytest.fixture(scope="module", params=[of_rospy, of_roscpp], ids=["rospy", "roscpp"])
@@ -103,9 +104,7 @@ def test_the_headers_of_roscpp_have_the_md5_of_the_page(outcomes):
     assert outcomes("stub")["digests"] == rows
 
 
-@pytest.mark.parametrize(
-    ("simulator", "path"), cases(lambda it: offered(it).services.keys() - STEPPED - FAILING[it])
-)
+@for_each("simulator, path", cases(lambda it: offered(it).services.keys() - STEPPED - FAILING[it]))
 def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
     """And where its answer is known from what was asked before, it is that."""
     answer = outcomes(simulator)["answers"][path]
@@ -120,7 +119,7 @@ def test_a_service_of_the_page_succeeds(outcomes, simulator, path):
         assert {name: answer[name] for name in expected} == near(expected)
 
 
-@pytest.mark.parametrize(("simulator", "path"), cases(FAILING.__getitem__))
+@for_each("simulator, path", cases(FAILING.__getitem__))
 def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
     """A success that did nothing would leave a client with a wrong picture."""
     answer = outcomes(simulator)["answers"][path]
@@ -128,8 +127,7 @@ def test_a_service_that_the_page_calls_failing_fails(outcomes, simulator, path):
     assert "failed" in answer or not next(iter(answer.values()))
 
 
-@pytest.mark.parametrize("simulator", FAILING)
-@pytest.mark.parametrize("type_name", FIELDS)
+@for_each("simulator, type_name", [(simulator, name) for simulator in FAILING for name in FIELDS])
 def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, type_name):
     """Through the messages of rospy and back."""
     _, _, value = FIELDS[type_name]
@@ -138,7 +136,7 @@ def test_a_field_of_every_type_is_read_as_it_was_written(outcomes, simulator, ty
     assert answers[f"supervisor/field/get_{type_name}"]["value"] == pytest.approx(value)
 
 
-@pytest.mark.parametrize(("simulator", "path"), cases(lambda it: offered(it).topics))
+@for_each("simulator, path", cases(lambda it: offered(it).topics))
 def test_a_topic_of_the_page_is_heard(outcomes, simulator, path):
     """In the class of its type, with the time at which it was sent."""
     message = outcomes(simulator)["heard"][absolute(path)]

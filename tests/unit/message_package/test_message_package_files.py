@@ -10,6 +10,7 @@ import pytest
 from palaestra_protocol.ros.definitions import type_names
 from palaestra_protocol.ros.rostypes import message_type, service_type
 from palaestra_sim.message_package.files import package_files
+from tests.tables import for_each
 
 FILES = dict(package_files())
 MESSAGES, SERVICES = ([name for name in names if name.startswith("webots_ros/")] for names in type_names())
@@ -32,7 +33,7 @@ def md5_of(spec, context, definitions):
     return genmsg.gentools.compute_md5(context, spec)
 
 
-@pytest.mark.parametrize("name", MESSAGES)
+@for_each("name", MESSAGES)
 def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
     """A tool that reads the file would otherwise be refused by the simulator."""
     context = genmsg.MsgContext.create_default()
@@ -43,7 +44,7 @@ def test_the_file_of_every_message_has_the_md5_of_the_wire(name, definitions):
     assert md5_of(spec, context, definitions) == message_type(name).md5
 
 
-@pytest.mark.parametrize("name", SERVICES)
+@for_each("name", SERVICES)
 def test_the_file_of_every_service_has_the_md5_of_the_wire(name, definitions):
     """Request and response together: the md5 of a service is over both."""
     context = genmsg.MsgContext.create_default()

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from palaestra_protocol.metrics import PREFIX, Kind
+from tests.tables import for_each
 from tools.metrics import page
 
 PAGE = Path(__file__).parents[3] / page.PAGE
@@ -50,7 +51,7 @@ OF_TARGETS = {
     "job", "instance", "namespace", "pod", "container", "endpoint", "service", "training_job", "replica",
 }  # fmt: skip
 
-each_family = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+each_family = for_each("family", FAMILIES)
 
 
 def test_a_name_is_declared_once():

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tables import for_each
+
 TABLE = Path(__file__).with_name("interface_r2023b.txt")
 DEVICES = {
     "<distance>": ["ir1", "ir9"],
@@ -31,7 +33,7 @@ def is_linear(path):
     return path.endswith("_force") and not path.startswith("supervisor/")
 
 
-@pytest.mark.parametrize(("path", "type_name"), [row for row in rows() if not is_linear(row[0])])
+@for_each("path, type_name", [row for row in rows() if not is_linear(row[0])])
 def test_every_service_of_the_table_is_served_with_its_type(robot, path, type_name):
     """`rosservice type` distinguishes types of the same md5 by name only."""
     service, _ = robot.services[path]

@@ -1,0 +1,24 @@
+"""What a run of the tests has skipped, in few lines: how many, and the command that runs them."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+
+BUILD = (
+    "tests/cluster/programs.sh"  # its arguments are programs; `control_plane.programs` names it in reasons
+)
+BUILDING = "builds them once, in 15 to 30 minutes"
+
+
+def lines(reasons: Iterable[str]) -> Iterator[str]:
+    """Yield a line for all tests that lack programs of a cluster, and one for each other reason."""
+    counts = Counter(reasons)
+    programs = {
+        reason: words.split() for reason in counts for words in [reason.partition(f"{BUILD} ")[2]] if words
+    }
+    if programs:
+        number = sum(counts[reason] for reason in programs)
+        names = " ".join(dict.fromkeys(name for words in programs.values() for name in words))
+        yield f"{number} tests need programs of a cluster; `{BUILD} {names}` {BUILDING}"
+    for reason, number in counts.items():
+        if reason not in programs:
+            yield f"{number} {'test' if number == 1 else 'tests'}: {reason}"
