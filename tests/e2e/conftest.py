@@ -113,7 +113,7 @@ def long_run(cluster: Cluster) -> Iterator[LongRun]:
 
 @pytest.fixture(scope="session")
 def evictions(cluster: Cluster) -> Iterator[Evictions]:
-    """A training whose pod is evicted five times."""
+    """A training whose pod is evicted again and again."""
     with Evictions(Namespace(cluster, unique("evictions"))) as run:
         yield run
 

@@ -1,6 +1,6 @@
 """A training whose pod is evicted again and again, beside the other tests.
 
-It takes minutes in which nothing happens: Kubernetes waits 10 s before the second pod of a Job, and
+For more than a minute of it nothing happens: Kubernetes waits 10 s before the second pod of a Job, and
 twice as long before each further one.
 """
 
@@ -13,10 +13,10 @@ from tests.e2e.jobs import make_slow_job
 from tests.e2e.namespace import Namespace
 
 NAME = "drained"
-EVICTIONS = 5
+EVICTIONS = 3  # each further one would only wait longer
 EVERY_STEPS = 100
 APART = 100
-STEPS = 2000
+STEPS = 1500
 NEXT_POD_S = 600.0
 
 

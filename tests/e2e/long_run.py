@@ -16,6 +16,7 @@ SEED = 20
 # before it, and so short that it has only just begun. In all less than the training takes on fast machines.
 GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
+EVALUATED_EVERY = 12_500  # more often than this, evaluations are a third of the training's time
 # So little that there is room beside it, and that others come before it where the processors are short.
 SIMULATOR = {"requests": {"cpu": "5m", "memory": "160Mi"}}
 TRAINER = {"requests": {"cpu": "20m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
@@ -49,6 +50,7 @@ class LongRun:
         for group in job["spec"]["simulators"]:
             group["resources"] = SIMULATOR
         job["spec"]["trainer"]["resources"] = TRAINER
+        job["spec"]["trainer"]["evaluation"]["everySteps"] = EVALUATED_EVERY
         self.namespace.apply(job)
         self._killer.start()
         return self

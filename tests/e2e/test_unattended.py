@@ -8,7 +8,7 @@ from tests.e2e.namespace import LONG_S, named
 
 @pytest.mark.comes_late
 @pytest.mark.timeout(1500)
-def test_five_evictions_cost_at_most_a_checkpoint_interval_each(evictions):
+def test_each_of_several_evictions_costs_at_most_a_checkpoint_interval(evictions):
     """None of them counts against `backoffLimit`, and the status has counted each of them once."""
     evicted, namespace = evictions.result(), evictions.namespace
 

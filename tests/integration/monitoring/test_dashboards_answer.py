@@ -17,7 +17,7 @@ FAULTY = {
     "faults": "crash:step=60 lost:topic=ir1/value,every=25",
     "algorithm": LITTLE_DQN,
     "steps": 100_000,
-    "evaluation": {"everySteps": 100, "episodes": 1},
+    "evaluation": {"everySteps": 100, "episodes": 1, "confirmEpisodes": 1},
     "checkpoint": {"everySteps": 50, "keep": 2},
 }
 

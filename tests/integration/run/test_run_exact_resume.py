@@ -1,61 +1,99 @@
-"""A run that is interrupted and goes on, with simulators that repeat themselves."""
+"""An interrupted and resumed run equals an uninterrupted one, bit for bit, with deterministic simulators.
+
+Each variant is the same story with another world, simulator and environment; `make soak` plays it with every
+algorithm.
+"""
 
 import os
 import signal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
-from tests.local_run import LocalRun
+from tests.local_run import ROOT, LocalRun
+from tests.pages import fenced
 from tests.soak import resume
 from tests.soak.jobs import make_job
 
-STEPS = 900  # `make soak` takes more
-SEEING_STEPS = 768
-SEEING = {"builtin": "seeing"}
-PPO = {"n_steps": 64, "batch_size": 64, "n_epochs": 1}
+PAGE = dict(fenced((ROOT / "docs/randomization.md").read_text()))
+EXAMPLES = ROOT / "examples"
+SEEING = {"driver": "mujoco", "world": {"builtin": "seeing"}}
+PPO = {"n_steps": 32, "batch_size": 32, "n_epochs": 1}
+FEW = {"episodes": 1, "confirmEpisodes": 1}
 
 
-@pytest.mark.parametrize("driver", ["stub", "mujoco"])
-def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, monkeypatch, driver):
-    """Bit for bit: its trainer is asked to end at a third; `make soak` does this for every algorithm."""
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """A job, and the step past which its trainer is asked to end."""
+
+    job: dict[str, Any]
+    asked_at: int
+
+
+def learning(environment: dict[str, Any], steps: int, driver: str) -> Variant:
+    """Return DQN in a world that changes in every episode; it learns from step 100 on."""
     job = resume.job("DQN", 1)
-    job["spec"]["trainer"]["steps"] = STEPS
+    job["spec"]["trainer"] |= {
+        "environment": environment,
+        "steps": steps,
+        "evaluation": {"everySteps": steps // 2, **FEW},
+        "checkpoint": {"everySteps": 50, "keep": 3},
+    }
     for group in job["spec"]["simulators"]:
         group["driver"] = driver
-    assert_resumes_exactly(tmp_path, job, STEPS // 3)
+    return Variant(job=job, asked_at=steps // 2)
 
 
-def test_an_interrupted_run_that_sees_ends_as_one_that_was_not(tmp_path, monkeypatch):
-    """Its observations are pictures, which a new simulator has to draw as the first one would have."""
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-
-    assert_resumes_exactly(tmp_path, seeing(), SEEING_STEPS // 6)
-
-
-def seeing():
-    """Return a short job of SeeTarget-v0 with MuJoCo that evaluates and saves a few times."""
-    return make_job(
-        collect={"driver": "mujoco", "world": SEEING},
-        evaluate={"driver": "mujoco", "world": SEEING},
+def seeing() -> Variant:
+    """Return PPO on pictures, which a new simulator has to draw as the first one would have."""
+    job = make_job(
+        collect=SEEING,
+        evaluate=SEEING,
         environment={"id": "SeeTarget-v0", "options": {"max_steps": 40, "cylinders": True}},
         algorithm={"name": "PPO", "cnn": "small", "hyperparameters": PPO},
-        steps=SEEING_STEPS,
-        evaluation={"everySteps": SEEING_STEPS // 2, "episodes": 2, "confirmEpisodes": 0},
-        checkpoint={"everySteps": SEEING_STEPS // 12, "keep": 3},
+        steps=256,
+        evaluation={"everySteps": 128, **FEW},
+        checkpoint={"everySteps": 32, "keep": 3},
     )
+    return Variant(job=job, asked_at=100)
 
 
-def assert_resumes_exactly(folder, job, step):
-    """Compare a run that is asked to end past a step, and goes on, with one that is not."""
-    for name in ("whole", "parts"):
-        (folder / name).mkdir()
-    whole, parts = (LocalRun(folder / name, job) for name in ("whole", "parts"))
+VARIANTS = {
+    "the page's scattered cylinders": learning(
+        yaml.safe_load(PAGE["yaml"])["spec"]["trainer"]["environment"], 360, "stub"
+    ),
+    # Each episode is replayed at the progress at which it began.
+    "the example's curriculum in MuJoCo": learning(
+        {"id": "curriculum:Curriculum-v0", "options": {"max_steps": 40}}, 240, "mujoco"
+    ),
+    "pictures of MuJoCo": seeing(),
+}
+
+
+@pytest.fixture
+def modules(tmp_path, monkeypatch):
+    """Put the modules of page and example on the path of every process of the test."""
+    folder = tmp_path / "modules"
+    folder.mkdir()
+    (folder / "scattered.py").write_text(PAGE["python in-a-job"])
+    monkeypatch.setenv("PYTHONPATH", f"{folder}{os.pathsep}{EXAMPLES}")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+
+
+@pytest.mark.usefixtures("modules")
+@pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
+def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
+    """World, experience, parameters and evaluations; its trainer is asked to end amid an episode."""
+    whole, parts = (begun(tmp_path / name, variant.job) for name in ("whole", "parts"))
     with whole:
-        whole.end()
+        code, output = whole.end()
+        assert code == 0, output
 
     with parts:
-        parts.wait_for_step(step)
+        parts.wait_for_step(variant.asked_at)
         os.kill(parts.trainer(), signal.SIGTERM)
         code, output = parts.end()
 
@@ -64,3 +102,9 @@ def assert_resumes_exactly(folder, job, step):
     assert (first, second.rpartition(" ")[0]) == ("new run", "resumed at step")
     assert "do not repeat" not in parts.log()
     assert resume.results(parts.directory) == resume.results(whole.directory)
+
+
+def begun(folder: Path, job: dict[str, Any]) -> LocalRun:
+    """Return a run of a job in a folder of its own."""
+    folder.mkdir()
+    return LocalRun(folder, job)

@@ -24,7 +24,7 @@ def test_a_script_of_one_s_own_trains_in_the_simulators_of_its_job_through_their
         faults=f"crash:step={CRASH_AT}",
         command=["python", str(SCRIPT)],
         steps=300,
-        evaluation={"everySteps": 300, "episodes": 2},
+        evaluation={"everySteps": 300, "episodes": 2, "confirmEpisodes": 2},
     )
     with running(job) as training:
         status = training.until(lambda: mended(training))

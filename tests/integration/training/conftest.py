@@ -45,7 +45,7 @@ def write_job(tmp_path):
             "seed": 3,
             "environment": {"id": "MoveToTargetEnv-v0", "options": {"max_steps": 30}},
             "steps": 600,
-            "evaluation": {"everySteps": 200, "episodes": 4},
+            "evaluation": {"everySteps": 200, "episodes": 4, "confirmEpisodes": 4},
             "checkpoint": {"everySteps": 200, "keep": 3},
             "statusAddress": "127.0.0.1:0",
             "simulators": [

@@ -21,6 +21,7 @@ from palaestra_trainer.errors import MasterLost
 from palaestra_trainer.run import training
 from palaestra_trainer.run_directory import RunDirectory
 from palaestra_trainer.telemetry.display import Lines
+from palaestra_trainer.telemetry.logs import configure_logs
 from palaestra_trainer.telemetry.progress import Progress
 from palaestra_trainer.waiting import patience
 
@@ -75,6 +76,7 @@ def attempt(fakes):
 
     `episodes` becomes those up to the checkpoint that it began from, and its own.
     """
+    configure_logs()
 
     def play(job, directory, episodes, at=0, interrupt=None):
         configuration = load(job)
@@ -143,7 +145,7 @@ def job(write_job):
             algorithm=algorithm | ({} if normalize is None else {"normalize": normalize}),
             environment={"id": "MoveToTargetEnv-v0", "options": options},
             steps=400,
-            evaluation={"everySteps": 150, "episodes": 2},
+            evaluation={"everySteps": 150, "episodes": 2, "confirmEpisodes": 2},
             checkpoint={"everySteps": 100, "keep": 2},
         )
 

@@ -242,7 +242,7 @@ def job(make_configuration):
     def make(name="DQN", **changes):
         defaults = {
             "algorithm": {"name": name, "hyperparameters": ALGORITHMS[name]},
-            "evaluation": {"everySteps": 40, "episodes": 4},
+            "evaluation": {"everySteps": 40, "episodes": 4, "confirmEpisodes": 4},
             "checkpoint": {"everySteps": 50, "keep": 2},
         }
         return make_configuration(**(defaults | changes))

@@ -36,7 +36,7 @@ def test_evaluations_are_lines_of_equal_episodes(play, job, directory):
     _, members = play(job())
 
     lines = list(read_lines(directory.evaluations))
-    seeds, confirming = episode_seeds(1, EVALUATE, 4), episode_seeds(1, CONFIRM, 100)
+    seeds, confirming = episode_seeds(1, EVALUATE, 4), episode_seeds(1, CONFIRM, 4)
     assert [line["step"] for line in lines] == [40, 80, 100]
     assert set(lines[0]) >= {"episodes", "success_rate", "mean_return", "mean_length"}
     assert members["evaluate-0"].env.seeds == [*seeds] * 3 + [*confirming]
