@@ -41,7 +41,7 @@ class Authority:
         return self._issue(self.folder / "server", "/CN=kube-apiserver", f"subjectAltName={names}")
 
     def client(self, user: str, group: str, folder: Path) -> Pair:
-        """Make the certificate of a user, in a group, with its files in a folder; "" is no group."""
+        """Make the certificate of a user with its files in a folder; an empty group adds no group."""
         subject = f"/O={group}/CN={user}" if group else f"/CN={user}"
         return self._issue(folder / user.replace(":", "-"), subject, "extendedKeyUsage=clientAuth")
 

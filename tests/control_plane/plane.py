@@ -91,7 +91,7 @@ class ControlPlane:
         return self.folder / "audit.log"
 
     def audit(self, about: str = "") -> list[dict[str, Any]]:
-        """Return what was asked so far, in order; the last line of the log may not be whole yet.
+        """Return the recorded requests in their order, without a last line that is being written.
 
         Args:
             about: only entries that have this text in them, such as a namespace: all tests share the log.

@@ -35,7 +35,7 @@ def test_every_part_is_run_by_a_test():
 @pytest.mark.minutes(1)
 @pytest.mark.parametrize("parts", [SMALL, OF_WHOLE_RUNS], ids=["small", "of whole runs"])
 def test_the_benchmark_measures(parts, tmp_path):
-    """A line of JSON for each part, in which all is a number, as somebody who types it sees it."""
+    """It prints one line of JSON for each part, and every value in it is a number."""
     command = [sys.executable, "-m", "tests.bench", "--scale", "0", *parts]
     with (tmp_path / "errors").open("w+") as errors:
         done = subprocess.run(

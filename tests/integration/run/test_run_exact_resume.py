@@ -86,7 +86,7 @@ def modules(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("modules")
 @pytest.mark.parametrize("variant", VARIANTS.values(), ids=VARIANTS)
 def test_an_interrupted_run_ends_as_one_that_was_not(tmp_path, variant):
-    """World, experience, parameters and evaluations; its trainer is asked to end amid an episode."""
+    """Compared are world, experience, parameters and evaluations; the signal comes during an episode."""
     whole, parts = (begun(tmp_path / name, variant.job) for name in ("whole", "parts"))
     with whole:
         code, output = whole.end()

@@ -85,7 +85,7 @@ def lose_the_master(run):
 
 
 def test_a_run_whose_simulators_break_in_many_ways_succeeds():
-    """The faults are counted by kind and cost no more than they cut; test_bench.py has DQN amid chaos."""
+    """The log counts the faults by kind; test_bench.py trains DQN with such faults."""
     found = kinds.play(MANY, LITTLE_PPO, "Succeeded")
 
     assert found["exit"] == 0

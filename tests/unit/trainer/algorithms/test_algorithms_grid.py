@@ -25,9 +25,8 @@ pytestmark = pytest.mark.minutes(3)
 
 COLLECTORS = 2
 STEPS = 26  # three rollouts on policy
-SIGNAL_AT = (
-    7  # a step of the first of two simulators: amid the second rollout, off policy after learning began
-)
+# A step of the first of two simulators: during the second rollout on policy, after learning began off policy.
+SIGNAL_AT = 7
 OFF_POLICY = {
     "learning_starts": 6,
     "batch_size": 8,
