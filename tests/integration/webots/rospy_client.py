@@ -38,4 +38,5 @@ class RospyClient:
         return dict(self._heard)
 
 
-json.dump(play(json.load(sys.stdin), RospyClient()), sys.stdout)
+answers, sys.stdout = sys.stdout, sys.stderr  # rospy prints there that it reaches a service only later
+json.dump(play(json.load(sys.stdin), RospyClient()), answers)
