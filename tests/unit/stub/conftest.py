@@ -85,7 +85,7 @@ class FakeNode:
         self.services[path] = (service_type(type_name), handler)
 
     def together(self):
-        """Do nothing: there is no master."""
+        """Return a context that registers nothing."""
         return nullcontext()
 
     def advertise(self, path, type_name, *, latched=False, template=None, reading=""):

@@ -70,6 +70,16 @@ def test_an_optimizer_brings_no_compiler_before_a_program_compiles():
     assert _run(OPTIMIZE + COMPILE) == [False, 2.0, True, True]
 
 
+def test_what_a_user_keeps_from_being_compiled_is_kept_from_it():
+    """A stand-in's answer would be forgotten by the time that another function is compiled."""
+    program = OPTIMIZE + "kept = torch._dynamo.disable(lambda x: x)\n"
+
+    assert _run(program + "print(json.dumps([before, hasattr(kept, '_torchdynamo_disable')]))") == [
+        False,
+        True,
+    ]
+
+
 def test_a_part_of_the_compiler_can_be_imported_first():
     """A part that was executed twice would have its state twice."""
     program = OPTIMIZE + "import torch._dynamo.config as part\nfrom torch._dynamo import optimize\n"

@@ -19,6 +19,8 @@ from typing import Any
 NAME = "torch._dynamo"
 _ANSWER = "__dynamo_disable"  # where PyTorch keeps the answer of `disable` for a function
 
+_OF_PYTORCH = {"disable": "torch._compile", "graph_break": "torch.optim.optimizer"}  # and who calls them
+
 
 def defer_compiler() -> None:
     """Defer the compiler from now on, unless it is imported already; safe to repeat."""
@@ -31,17 +33,19 @@ class _StandIn(ModuleType):
         super().__init__(name)
         self._asked_about: list[Callable[..., Any]] = []
 
-    def graph_break(self) -> None:
-        """Do nothing: there is no graph."""
+    def _graph_break(self) -> None:
+        pass  # without a compiler there is no graph
 
-    def disable(self, fn: Callable[..., Any], *_: Any, **_options: Any) -> Callable[..., Any]:
-        """Return the function itself: nothing compiles it."""
+    def _disable(self, fn: Callable[..., Any], *_: Any, **_options: Any) -> Callable[..., Any]:
         self._asked_about.append(fn)
         return fn
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):  # asked of every module by programs that look through all of them
             raise AttributeError(name)
+        # A function of a user that is disabled here must stay so when another one is compiled.
+        if sys._getframe(1).f_globals.get("__name__") == _OF_PYTORCH.get(name):  # noqa: SLF001
+            return getattr(self, f"_{name}")
         return getattr(self.give_way(), name)
 
     def give_way(self) -> ModuleType:
