@@ -27,8 +27,9 @@ PALAESTRA = Path(sys.executable).with_name("palaestra")
 PATIENCE_S = 240.0  # of runs that take seconds on an idle machine; below pytest's deadline
 REAPER = "reaper.py"  # its command line has that of the simulator in it
 GONE_S = 10.0  # for the kernel to end what was killed
-LOOK_EVERY_S = 0.02
+LOOK_EVERY_S = 0.05  # what is looked at, the run and all processes of the machine, costs processor time
 FAULT = re.compile(r"simulator fault .*kind=(\w+)")
+STATUS_ADDRESS = re.compile(r"^statusAddress: (\S+)$", re.MULTILINE)
 
 
 class LocalRun:
@@ -98,8 +99,8 @@ class LocalRun:
     def status(self):
         """Return what the trainer's /status says, None while nobody answers."""
         try:
-            address = self.training()["statusAddress"]
-            with urllib.request.urlopen(f"http://{address}/status", timeout=5) as answer:
+            found = STATUS_ADDRESS.search((self.directory / "training.yaml").read_text())
+            with urllib.request.urlopen(f"http://{found[1]}/status", timeout=5) as answer:
                 return json.load(answer)
         except (OSError, ValueError):
             return None

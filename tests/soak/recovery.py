@@ -13,6 +13,7 @@ from tests.soak.jobs import LITTLE_DQN, make_job
 
 TIMES = 10
 WARM_STEPS = 100
+LOOK_EVERY_S = 0.02
 SIMULATOR = "collect-0"
 # No promise is made about a spare that is still starting; a start takes half a second.
 SPARE_READY_S = 30.0
@@ -50,9 +51,9 @@ def recovery(run, *, standby):
     process, restarts = in_use(run), simulator(run)["restarts"]
     os.kill(process, signal.SIGKILL)
     began = time.monotonic()
-    run.until(lambda: simulator(run)["restarts"] > restarts)
+    run.until(lambda: simulator(run)["restarts"] > restarts, look_every_s=LOOK_EVERY_S)
     step = run.ask()["step"]
-    run.until(lambda: run.ask()["step"] > step)
+    run.until(lambda: run.ask()["step"] > step, look_every_s=LOOK_EVERY_S)
     return time.monotonic() - began
 
 
@@ -68,7 +69,7 @@ def noticing(run):
     process, before = in_use(run), run.faults().get("hung", 0)
     os.kill(process, signal.SIGSTOP)
     began = time.monotonic()
-    run.until(lambda: run.faults().get("hung", 0) > before)
+    run.until(lambda: run.faults().get("hung", 0) > before, look_every_s=LOOK_EVERY_S)
     return time.monotonic() - began
 
 

@@ -1,5 +1,7 @@
 """A stub simulator, started the way a notebook does it."""
 
+from contextlib import ExitStack
+
 import pytest
 
 from palaestra_trainer.launching.process import ProcessLauncher
@@ -8,13 +10,26 @@ from palaestra_trainer.robots.simulated import SimulatedScene
 from palaestra_trainer.webots import Mode, Webots
 
 
-class Setup:
-    """A running simulator and its facades; a short timeout, so that a hang is detected soon."""
+class Simulator:
+    """A running simulator; a short timeout, so that a hang is detected soon."""
 
-    def __init__(self, *options, world="arena", supervisor="robotino", robot=None):
+    def __init__(self, *options, world="arena", supervisor="robotino"):
         self.launcher = ProcessLauncher(world, options=options)
         self.webots = Webots(supervisor, world, launcher=self.launcher, start_deadline_s=20.0)
         self.webots.start()
+
+    def close(self):
+        """End it and its sidecar."""
+        self.webots.stop()
+        self.webots.close()
+        self.launcher.close()
+
+
+class Setup:
+    """A robot and its scene in a simulator, which runs."""
+
+    def __init__(self, simulator, robot=None):
+        self.launcher, self.webots = simulator.launcher, simulator.webots
         self.webots.supervisor.set_mode(Mode.FAST)
         self.robot = Robotino(self.webots, robot)
         self.scene = SimulatedScene(self.webots, self.robot)
@@ -25,30 +40,62 @@ class Setup:
         """The simulator's process."""
         return self.launcher.state().pid
 
-    def close(self):
-        """End the simulator and its sidecar."""
-        self.robot.close()
-        self.webots.stop()
-        self.webots.close()
-        self.launcher.close()
+
+class Standing:
+    """A simulator for several tests, which is away while others with its names run."""
+
+    def __init__(self):
+        self._simulator = None
+
+    def simulator(self):
+        """Return it, running."""
+        if self._simulator is None:
+            self._simulator = Simulator()
+        return self._simulator
+
+    def go(self):
+        """End it until it is asked for again."""
+        if self._simulator is not None:
+            self._simulator.close()
+            self._simulator = None
 
 
-@pytest.fixture
-def start(master):
-    """Starts simulators with options; ended when the test is."""
+@pytest.fixture(scope="module")
+def standing(master):
+    """The shipped arena for all tests of a module."""
     del master
-    started = []
-
-    def make(*options, **where):
-        started.append(Setup(*options, **where))
-        return started[-1]
-
-    yield make
-    for each in started:
-        each.close()
+    one = Standing()
+    yield one
+    one.go()
 
 
 @pytest.fixture
-def arena(start):
-    """The shipped arena, running."""
+def start(standing):
+    """Starts simulators with options; ended when the test is."""
+    standing.go()
+    with ExitStack() as started:
+
+        def make(*options, robot=None, **where):
+            simulator = Simulator(*options, **where)
+            started.callback(simulator.close)
+            setup = Setup(simulator, robot)
+            started.callback(setup.robot.close)
+            return setup
+
+        yield make
+
+
+@pytest.fixture
+def arena(standing):
+    """The shipped arena as it is after a start, running; `own_arena` is for tests of its process."""
+    setup = Setup(standing.simulator())
+    yield setup
+    with setup.webots:
+        setup.robot.simulation.reset(seed=0)
+    setup.robot.close()
+
+
+@pytest.fixture
+def own_arena(start):
+    """The shipped arena, running for one test, which may stop it."""
     return start()

@@ -96,28 +96,28 @@ def test_a_killed_script_leaves_no_folder_of_a_world_with_other_names(master, tm
     assert not world.parent.exists()
 
 
-def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone(arena):
+def test_the_error_inside_a_context_is_raised_and_not_that_the_simulator_is_gone(own_arena):
     """The context manager cannot pause a dead simulator, and must not hide the cause."""
 
     def fail():
-        with arena.webots:
-            arena.webots.stop()
+        with own_arena.webots:
+            own_arena.webots.stop()
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
         fail()
 
 
-def test_after_an_interrupted_call_the_next_answer_is_its_own(arena, monkeypatch):
+def test_after_an_interrupted_call_the_next_answer_is_its_own(own_arena, monkeypatch):
     """Ctrl-C in a notebook cell must not shift every later answer by one."""
-    probe = arena.webots.observer
+    probe = own_arena.webots.observer
     before = probe.time()
     monkeypatch.setattr("palaestra_trainer.ros.wire.Wire.receive", _interrupted)
     with pytest.raises(KeyboardInterrupt):
         probe.time()
     monkeypatch.undo()
 
-    arena.robot.advance()
+    own_arena.robot.advance()
 
     assert probe.time() == pytest.approx(before + 0.192)
 

@@ -19,14 +19,14 @@ def environment(robot, scene):
     return gymnasium.make("MoveToTargetEnv-v0", robot=robot, scene=scene)
 
 
-def test_an_episode_can_be_begun_after_each_restart(arena):
+def test_an_episode_can_be_begun_after_each_restart(own_arena):
     """The paper's loop: its simulator broke at the 25th reset, so it restarts before that."""
-    env = environment(arena.robot, arena.scene)
+    env = environment(own_arena.robot, own_arena.scene)
 
-    began = [arena.webots.run(lambda: env.reset(seed=1), restart=True)[0].tolist() for _ in range(2)]
+    began = [own_arena.webots.run(lambda: env.reset(seed=1), restart=True)[0].tolist() for _ in range(2)]
 
     assert began[0] == began[1]
-    assert arena.launcher.state().starts == 3
+    assert own_arena.launcher.state().starts == 3
 
 
 def test_a_robot_that_was_made_before_the_simulator_needs_no_connect(master):
@@ -48,35 +48,35 @@ def test_a_robot_that_was_made_before_the_simulator_needs_no_connect(master):
     assert [step[4]["outcome"] for step in (*collected, evaluated)] == ["running"] * 4
 
 
-def test_the_newest_robot_of_a_name_is_connected_and_no_other(arena):
+def test_the_newest_robot_of_a_name_is_connected_and_no_other(own_arena):
     """A notebook's cell that is carried out again makes another one; the first may have been a mistake."""
-    Robotino(arena.webots, period_ms=50)  # which the simulator would refuse
-    robot = Robotino(arena.webots)
+    Robotino(own_arena.webots, period_ms=50)  # which the simulator would refuse
+    robot = Robotino(own_arena.webots)
 
-    arena.webots()
+    own_arena.webots()
 
-    with arena.webots:
+    with own_arena.webots:
         assert robot.advance() == 0
     robot.close()
 
 
 @pytest.mark.parametrize("begin", [Webots.start, Webots.__enter__])
-def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(arena, begin):
+def test_a_hung_simulator_is_restarted_when_it_is_to_be_started(own_arena, begin):
     """Its sidecar takes it for ready, and would let nobody start a second one."""
-    hung = arena.pid
+    hung = own_arena.pid
     os.kill(hung, signal.SIGSTOP)
 
-    begin(arena.webots)
+    begin(own_arena.webots)
 
-    assert arena.webots.available()
-    assert arena.pid != hung
+    assert own_arena.webots.available()
+    assert own_arena.pid != hung
 
 
-def test_a_simulator_that_is_on_its_way_is_not_restarted(arena):
+def test_a_simulator_that_is_on_its_way_is_not_restarted(own_arena):
     """It does not answer either, and only needs its time."""
-    arena.webots.stop()
-    arena.launcher.start()
+    own_arena.webots.stop()
+    own_arena.launcher.start()
 
-    arena.webots.start()
+    own_arena.webots.start()
 
-    assert arena.launcher.state().starts == 2
+    assert own_arena.launcher.state().starts == 2

@@ -10,92 +10,92 @@ from palaestra_trainer.robots import Pose
 from palaestra_trainer.webots import Mode
 
 
-def test_a_started_simulator_is_available_until_it_is_stopped(arena):
+def test_a_started_simulator_is_available_until_it_is_stopped(own_arena):
     """Availability is a real round trip, not a memory of calls."""
-    available = [arena.webots.available()]
+    available = [own_arena.webots.available()]
 
-    arena.webots.stop()
+    own_arena.webots.stop()
 
-    assert [*available, arena.webots.available()] == [True, False]
+    assert [*available, own_arena.webots.available()] == [True, False]
 
 
-def test_a_stop_is_no_fault(arena):
+def test_a_stop_is_no_fault(own_arena):
     """It was announced before the supervisor was asked to quit."""
-    arena.webots.stop()
+    own_arena.webots.stop()
 
-    state = arena.launcher.state()
+    state = own_arena.launcher.state()
     assert (state.faults, state.last_exit.expected, state.last_exit.code) == (0, True, 0)
 
 
-def test_calling_the_facade_restarts_the_simulator(arena):
+def test_calling_the_facade_restarts_the_simulator(own_arena):
     """Another process answers under the same name."""
-    before = arena.pid
+    before = own_arena.pid
 
-    arena.webots()
+    own_arena.webots()
 
-    assert arena.webots.available()
-    assert arena.pid != before
+    assert own_arena.webots.available()
+    assert own_arena.pid != before
 
 
-def test_inside_the_context_time_is_fast_and_outside_it_stands(arena):
+def test_inside_the_context_time_is_fast_and_outside_it_stands(own_arena):
     """A simulator takes a whole core between steps unless it is paused."""
-    with arena.webots:
-        inside = arena.webots.observer.mode()
+    with own_arena.webots:
+        inside = own_arena.webots.observer.mode()
 
-    assert (inside, arena.webots.observer.mode()) == (Mode.FAST, Mode.PAUSE)
+    assert (inside, own_arena.webots.observer.mode()) == (Mode.FAST, Mode.PAUSE)
 
 
-def test_run_returns_what_the_callback_returns(arena):
+def test_run_returns_what_the_callback_returns(own_arena):
     """`run(callback)` and the context are two ways to say the same."""
-    assert arena.webots.run(arena.webots.observer.mode) is Mode.FAST
-    assert arena.webots.observer.mode() is Mode.PAUSE
+    assert own_arena.webots.run(own_arena.webots.observer.mode) is Mode.FAST
+    assert own_arena.webots.observer.mode() is Mode.PAUSE
 
 
-def test_run_can_restart_before_the_callback(arena):
+def test_run_can_restart_before_the_callback(own_arena):
     """What the paper's training loop does after 24 resets."""
-    before = arena.pid
+    before = own_arena.pid
 
-    arena.webots.run(lambda: None, restart=True)
+    own_arena.webots.run(lambda: None, restart=True)
 
-    assert arena.pid != before
+    assert own_arena.pid != before
 
 
-def test_entering_starts_a_simulator_that_does_not_run(arena):
+def test_entering_starts_a_simulator_that_does_not_run(own_arena):
     """On demand: nobody has to call start()."""
-    arena.webots.stop()
+    own_arena.webots.stop()
 
-    with arena.webots:
-        assert arena.webots.available()
+    with own_arena.webots:
+        assert own_arena.webots.available()
 
 
-def test_a_killed_simulator_is_dead_and_comes_back_with_the_same_objects(arena):
+def test_a_killed_simulator_is_dead_and_comes_back_with_the_same_objects(own_arena):
     """Robot, scene and environment are kept over restarts."""
-    os.kill(arena.pid, signal.SIGKILL)
+    os.kill(own_arena.pid, signal.SIGKILL)
     with pytest.raises(SimulatorDead):
-        arena.robot.advance()
-    arena.launcher.wait_stopped(60.0)
+        own_arena.robot.advance()
+    own_arena.launcher.wait_stopped(60.0)
 
-    arena.webots()
+    own_arena.webots()
 
-    assert arena.webots.run(arena.robot.advance) == 0
-    assert arena.launcher.state().faults == 1
+    assert own_arena.webots.run(own_arena.robot.advance) == 0
+    assert own_arena.launcher.state().faults == 1
 
 
-def test_a_stopped_process_hangs_and_can_be_restarted(arena):
+def test_a_stopped_process_hangs_and_can_be_restarted(own_arena):
     """Its sockets are open, and the kernel even accepts new connections for it."""
-    os.kill(arena.pid, signal.SIGSTOP)
+    os.kill(own_arena.pid, signal.SIGSTOP)
 
     with pytest.raises(SimulatorHung):
-        arena.robot.advance()
+        own_arena.robot.advance()
 
-    assert not arena.webots.available()
-    arena.webots()
-    assert arena.webots.available()
+    assert not own_arena.webots.available()
+    own_arena.webots()
+    assert own_arena.webots.available()
 
 
-def test_the_observer_changes_nothing(arena):
+def test_the_observer_changes_nothing(own_arena):
     """Time stands while it asks."""
-    observer = arena.webots.observer
+    observer = own_arena.webots.observer
     before = observer.time()
 
     seen = (observer.basic_time_step_ms(), observer.exists("ROBOTINO"), observer.exists("NOBODY"))
@@ -106,17 +106,17 @@ def test_the_observer_changes_nothing(arena):
     assert observer.time() == before
 
 
-def test_a_reload_brings_the_world_back_with_new_handles(arena):
+def test_a_reload_brings_the_world_back_with_new_handles(own_arena):
     """Old handles dangle; asked for again, they are looked up again."""
-    arena.robot.drive(0.5, 0.0, 0.0)
+    own_arena.robot.drive(0.5, 0.0, 0.0)
     for _ in range(3):
-        arena.robot.advance()
-    moved = arena.robot.pose()
+        own_arena.robot.advance()
+    moved = own_arena.robot.pose()
 
-    arena.robot.close()
-    arena.webots.supervisor.reload()
-    arena.webots.wait_available()
-    arena.robot.connect()
+    own_arena.robot.close()
+    own_arena.webots.supervisor.reload()
+    own_arena.webots.wait_available()
+    own_arena.robot.connect()
 
     assert moved.x_m > 0.1
-    assert arena.robot.pose() == Pose(0.0, 0.0, 0.0)
+    assert own_arena.robot.pose() == Pose(0.0, 0.0, 0.0)
