@@ -21,8 +21,8 @@ from tests.control_plane.programs import REQUIRED, NoPrograms
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A property is not about time, and machines are noisy: --durations shows slow tests.
 settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-# The same examples each time: a random example must not fail an unrelated change.
-settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True)
+# The same examples each time, as a random one must not fail an unrelated change, and few: they were met before.
+settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True, max_examples=40)
 settings.load_profile("repeat")
 # Files that one worker runs one after another, by the beginnings of their paths.
 TOGETHER = (
@@ -79,6 +79,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             terminalreporter.line(line)
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadFileScheduling:
     """Give each worker whole files, and one of them all files of a group."""
     return _ByFile(config, log)

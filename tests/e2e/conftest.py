@@ -106,7 +106,7 @@ def in_order(begun: dict[str, object], stories: Stories, request: pytest.Fixture
 
 @pytest.fixture(scope="session")
 def long_run(cluster: Cluster) -> Iterator[LongRun]:
-    """move-to-target in full, with two replicas, while its operator is killed again and again."""
+    """move-to-target in full and a job of two replicas, while their operator is killed again and again."""
     with LongRun(Namespace(cluster, unique("move-to-target"))) as run:
         yield run
 

@@ -1,4 +1,4 @@
-"""One training in full, which goes on beside the other tests, and whose operator is killed meanwhile."""
+"""A training in full and one of two replicas, which go on beside other tests; their operator is killed."""
 
 import random
 import threading
@@ -6,20 +6,25 @@ from datetime import UTC, datetime
 from typing import Self
 
 from tests.e2e.cluster import CommandFailed, Object
+from tests.e2e.jobs import SMALL, make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace, example, named, trains
 
-NAME = "move-to-target"
+NAME, STEPS = "move-to-target", 50_000
+# Its steps take time and no processor: it goes on until the last kill on the fastest machine.
+PAIR, PAIR_STEPS = "pair", 3_000
+TENTH_OF_A_SECOND = [{"name": "PALAESTRA_STUB_FAULTS", "value": "slow:latency_ms=100"}]
 REPLICAS = 2
 KILLS = 10
 SEED = 20
 # Between two kills, in turn: so long that an operator leads again, 15 s after the last renewal of the one
-# before it, and so short that it has only just begun. In all less than the training takes on fast machines.
+# before it, and so short that it has only just begun. In all less than the pair takes.
 GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
 EVALUATED_EVERY = 12_500  # more often than this, evaluations are a third of the training's time
-# So little that there is room beside it, and that others come before it where the processors are short.
-SIMULATOR = {"requests": {"cpu": "5m", "memory": "160Mi"}}
-TRAINER = {"requests": {"cpu": "20m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
+# So little that there is room beside it, and that others come before it where the processors are short: it trains
+# while they wait.
+SIMULATOR = {"requests": {"cpu": "1m", "memory": "160Mi"}}
+TRAINER = {"requests": {"cpu": "1m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
 
 # The operator is process 1 of its container, which no signal from inside can kill, unless the pod
 # shares its process namespace.
@@ -34,7 +39,7 @@ for entry in pathlib.Path("/proc").glob("[0-9]*"):
 
 
 class LongRun:
-    """The long run: `namespace` it is in, and when its operator was killed: `kills`."""
+    """Both jobs: the `namespace` they are in, and when their operator was killed: `kills`."""
 
     def __init__(self, namespace: Namespace) -> None:
         self.namespace = namespace
@@ -43,15 +48,10 @@ class LongRun:
         self._killer = threading.Thread(target=self._kill_again_and_again, daemon=True)
 
     def __enter__(self) -> Self:
-        """Begin the training, and the killing in the same moment."""
+        """Begin the trainings, and the killing in the same moment."""
         make_killable(self.namespace)
-        job = example(NAME)
-        job["spec"]["replicas"] = REPLICAS
-        for group in job["spec"]["simulators"]:
-            group["resources"] = SIMULATOR
-        job["spec"]["trainer"]["resources"] = TRAINER
-        job["spec"]["trainer"]["evaluation"]["everySteps"] = EVALUATED_EVERY
-        self.namespace.apply(job)
+        self.namespace.apply(_full())
+        self.namespace.apply(_pair())
         self._killer.start()
         return self
 
@@ -62,11 +62,11 @@ class LongRun:
         self.namespace.delete()
 
     def pods(self) -> list[Object]:
-        """Return the pods once both train."""
+        """Return the pods of the pair once both train."""
         space = self.namespace
 
         def training() -> list[Object]:
-            found = [pod for pod in space.pods(NAME) if trains(pod)]
+            found = [pod for pod in space.pods(PAIR) if trains(pod)]
             steps = [space.trainer_status(named(pod)).get("step", 0) for pod in found]
             return found if len(found) == REPLICAS and all(steps) else []
 
@@ -76,11 +76,11 @@ class LongRun:
         """Wait until nobody kills the operator any more."""
         self._killer.join(END_S)
 
-    def end(self) -> Object:
-        """Return its last status."""
-        self.namespace.wait_for_end(NAME, END_S)
+    def end(self, name: str) -> Object:
+        """Return the last status of one of the jobs."""
+        self.namespace.wait_for_end(name, END_S)
         self.wait_for_kills()
-        return self.namespace.status(NAME)
+        return self.namespace.status(name)
 
     def _kill_again_and_again(self) -> None:
         moments = random.Random(SEED)
@@ -90,6 +90,29 @@ class LongRun:
 
     def _gap_s(self) -> tuple[float, float]:
         return GAPS_S[len(self.kills) % len(GAPS_S)]
+
+
+def _full() -> Object:
+    job = example(NAME)
+    for group in job["spec"]["simulators"]:
+        group["resources"] = SIMULATOR
+    job["spec"]["trainer"]["resources"] = TRAINER
+    job["spec"]["trainer"]["evaluation"]["everySteps"] = EVALUATED_EVERY
+    return job
+
+
+def _pair() -> Object:
+    simulators = [
+        {"name": "collect", "role": "Collect", "env": TENTH_OF_A_SECOND, "resources": SIMULATOR},
+        {"name": "evaluate", "role": "Evaluate", "resources": SIMULATOR},
+    ]
+    trainer = {
+        "steps": PAIR_STEPS,
+        "evaluation": {"everySteps": PAIR_STEPS, "episodes": 1, "confirmEpisodes": 1},
+        "checkpoint": {"everySteps": PAIR_STEPS},
+        "resources": SMALL,
+    }
+    return make_job(PAIR, replicas=REPLICAS, simulators=simulators, trainer=trainer)
 
 
 def make_killable(namespace: Namespace) -> None:

@@ -1,4 +1,4 @@
-"""move-to-target with two replicas, from `kubectl apply` to a policy, as the README promises it."""
+"""move-to-target from `kubectl apply` to a policy, as the README promises it, and a job of two replicas."""
 
 import json
 from datetime import datetime
@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from palaestra_sim.world import RunIdentity, robots, ros_name
-from tests.e2e.long_run import KILLS, NAME, REPLICAS
+from tests.e2e.long_run import KILLS, NAME, PAIR, PAIR_STEPS, REPLICAS, STEPS
 from tests.e2e.namespace import LONG_S, named
 
 pytestmark = pytest.mark.timeout(1200)
@@ -28,7 +28,7 @@ def test_every_robot_of_all_pods_has_a_ros_name_of_its_own(long_run):
     """The paper's one limitation: a world with fixed names allows one simulator only."""
     known = {named(pod): set() for pod in long_run.pods()}
     space = long_run.namespace
-    generated = [name for each in space.select("configmaps", NAME) for name in ros_names(each["data"])]
+    generated = [name for each in space.select("configmaps", PAIR) for name in ros_names(each["data"])]
     assert len(generated) == len(set(generated)) == REPLICAS * 2
 
     def all_known():
@@ -61,12 +61,12 @@ def test_the_status_tells_where_each_replica_stands(long_run):
     space = long_run.namespace
 
     def told():
-        replicas = space.status(NAME).get("replicas", [])
+        replicas = space.status(PAIR).get("replicas", [])
         return replicas if len(replicas) == REPLICAS and all(each.get("step") for each in replicas) else []
 
     for replica in space.wait(told, LONG_S):
         assert replica["phase"] == "Running"
-        assert replica["target"] == 50_000
+        assert replica["target"] == PAIR_STEPS
         assert {each["name"]: each["role"] for each in replica["simulators"]} == {
             "collect-0": "Collect",
             "evaluate-0": "Evaluate",
@@ -74,57 +74,59 @@ def test_the_status_tells_where_each_replica_stands(long_run):
 
 
 @pytest.mark.after_the_long_run
-def test_two_replicas_train_to_the_end_though_the_operator_is_killed_ten_times(long_run):
+def test_every_replica_trains_to_the_end_though_the_operator_is_killed_ten_times(long_run):
     """SIGKILL at random moments, of which the pods notice nothing: one pod a replica, the same end."""
-    status = long_run.end()
+    ends = {name: long_run.end(name) for name in (NAME, PAIR)}
     space = long_run.namespace
 
-    assert status["phase"] == "Succeeded", status
+    assert ends[NAME]["successRate"] >= 0.9
     assert len(long_run.kills) == KILLS
-    made = space.get("trainingjobs", NAME)["metadata"]["creationTimestamp"]
-    begun, ended = (datetime.fromisoformat(each) for each in (made, status["completionTime"]))
+    made = space.get("trainingjobs", PAIR)["metadata"]["creationTimestamp"]
+    begun, ended = (datetime.fromisoformat(each) for each in (made, ends[PAIR]["completionTime"]))
     assert begun < min(long_run.kills) < max(long_run.kills) < ended, "killed when there was nothing to do"
-    assert status["successRate"] >= 0.9
-    assert status["running"] == f"{REPLICAS}/{REPLICAS}"
-    for replica in status["replicas"]:
-        assert replica["phase"] == "Succeeded"
-        assert replica["attempt"] == 1
-        assert replica["step"] == replica["lastCheckpoint"]["step"] == 50_000
-        assert replica["restarts"]["trainer"] == replica["restarts"]["disruption"] == 0
-    assert len(space.pods(NAME, live=False)) == space.pods_made(NAME) == REPLICAS
-    assert space.holds(NAME, "Succeeded")
-    assert not space.holds(NAME, "Running")
+    for name, replicas, steps in ((NAME, 1, STEPS), (PAIR, REPLICAS, PAIR_STEPS)):
+        assert ends[name]["phase"] == "Succeeded", ends[name]
+        assert ends[name]["running"] == f"{replicas}/{replicas}"
+        for replica in ends[name]["replicas"]:
+            assert replica["phase"] == "Succeeded"
+            assert replica["attempt"] == 1
+            assert replica["step"] == replica["lastCheckpoint"]["step"] == steps
+            assert replica["restarts"]["trainer"] == replica["restarts"]["disruption"] == 0
+        assert len(space.pods(name, live=False)) == space.pods_made(name) == replicas
+        assert space.holds(name, "Succeeded")
+        assert not space.holds(name, "Running")
 
 
 @pytest.mark.after_the_long_run
 def test_the_last_word_of_a_trainer_is_in_its_pod(long_run):
     """The final truth does not hang on having been asked in time."""
-    long_run.end()
+    long_run.end(PAIR)
 
-    for pod in long_run.namespace.pods(NAME, live=False):
+    for pod in long_run.namespace.pods(PAIR, live=False):
         ended = pod["status"]["containerStatuses"][0]["state"]["terminated"]
         assert ended["exitCode"] == 0
-        assert json.loads(ended["message"])["step"] == 50_000
+        assert json.loads(ended["message"])["step"] == PAIR_STEPS
 
 
 @pytest.mark.after_the_long_run
-def test_kubectl_shows_a_job_in_one_line(long_run):
+@pytest.mark.parametrize(("name", "replicas", "steps"), [(NAME, "1/1", "50000"), (PAIR, "2/2", "3000")])
+def test_kubectl_shows_a_job_in_one_line(long_run, name, replicas, steps):
     """Status, reason, replicas, step and success are what a person looks for first."""
-    status = long_run.end()
+    status = long_run.end(name)
     cluster, space = long_run.namespace.cluster, long_run.namespace
 
-    header, line = cluster.kubectl("get", "tj", NAME, "-n", space.name).splitlines()
+    header, line = cluster.kubectl("get", "tj", name, "-n", space.name).splitlines()
 
     assert header.split() == ["NAME", "STATUS", "REASON", "REPLICAS", "STEP", "TARGET", "SUCCESS", "AGE"]
-    assert line.split()[:6] == [NAME, "Succeeded", "Succeeded", "2/2", "50000", "50000"]
+    assert line.split()[:6] == [name, "Succeeded", "Succeeded", replicas, steps, steps]
     assert float(line.split()[6]) == pytest.approx(status["successRate"])
 
 
 @pytest.mark.after_the_long_run
 def test_what_was_run_stands_in_the_config_maps(long_run):
     """Anyone can read the resolved job and the source worlds of a replica, after its end too."""
-    long_run.end()
-    contents = long_run.namespace.select("configmaps", NAME)
+    long_run.end(PAIR)
+    contents = long_run.namespace.select("configmaps", PAIR)
 
     seeds = {yaml.safe_load(each["data"]["training.yaml"])["seed"] for each in contents}
     assert seeds == {1, 2}

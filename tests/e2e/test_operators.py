@@ -14,7 +14,7 @@ pytestmark = [pytest.mark.changes_the_operator, pytest.mark.timeout(1200)]
 
 NEXT_IMAGE = os.environ.get("PALAESTRA_E2E_NEXT_OPERATOR", "palaestra-operator:next")
 TRAINER_IMAGE = f"palaestra-trainer:{version('palaestra')}"
-MANY = 6
+MANY = 3
 KINDS = ("jobs", "pods", "configmaps", "persistentvolumeclaims", "networkpolicies")
 
 

@@ -14,8 +14,16 @@ import yaml
 
 from tests.chart.definitions import kinds_of_prometheus
 from tests.chart.helm import ROOT
-from tests.e2e.jobs import make_job
+from tests.e2e.jobs import WAIT, make_job
 from tests.e2e.namespace import LONG_S, OPERATOR, SYSTEM, Namespace
+from tests.e2e.served import (
+    NOTEBOOKS,
+    assert_notebooks_are_served_to_who_has_the_token,
+    assert_the_first_notebook_drives_a_robot,
+    page_of,
+    token_of,
+)
+from tests.e2e.test_operators import KINDS, fingerprint
 from tests.pages import blocks, chapters
 from tests.terminal import Terminal
 
@@ -28,7 +36,7 @@ TOOLS = (ROOT / "docs" / "tools.md").read_text()
 SWEEPS = (ROOT / "docs" / "sweeps.md").read_text()
 LAB = "lab"  # the namespace of the runs that TensorBoard shows
 NAMESPACES = (LAB, "robots", "drones")  # of the page, besides that of the operator
-TENSORBOARD, NOTEBOOKS = "palaestra-tensorboard", "palaestra-jupyter"
+TENSORBOARD = "palaestra-tensorboard"
 # The Deployments that run once the commands of a chapter of install.md were typed, with their replicas.
 PROMISED = {
     "Install": {OPERATOR: 1},
@@ -45,12 +53,17 @@ PROMISED = {
 }
 
 
+def checkout(folder, **environment):
+    """Return a terminal in a checkout of the release, with its programs on the PATH."""
+    for name in ("charts", "manifests"):
+        (folder / name).symlink_to(ROOT / name)
+    return Terminal(folder, path=Path(sys.executable).parent, **environment)
+
+
 @pytest.fixture
 def terminal(tmp_path):
-    """A checkout of the release, with its programs on the PATH."""
-    for name in ("charts", "manifests"):
-        (tmp_path / name).symlink_to(ROOT / name)
-    return Terminal(tmp_path, path=Path(sys.executable).parent)
+    """A checkout of the release."""
+    return checkout(tmp_path)
 
 
 @pytest.fixture
@@ -92,22 +105,55 @@ def deployments(cluster):
     return [(each, place) for place in (SYSTEM, LAB) for each in cluster.select("deployments", place)]
 
 
+class Stays:
+    """A job that runs while its operator is upgraded and taken away."""
+
+    def __init__(self, namespace):
+        self._namespace = namespace
+        namespace.apply(make_job("stays", script=WAIT))
+        namespace.wait_for_pod("stays", LONG_S)
+        namespace.wait(lambda: namespace.status("stays").get("phase") == "Running")
+        self._before = self._seen()
+
+    def assert_nothing_has_touched_it(self):
+        """Neither its pod nor what else was made for it."""
+        assert self._seen() == self._before
+        assert self._namespace.status("stays")["phase"] == "Running"
+
+    def _seen(self):
+        return {kind: fingerprint(self._namespace, kind) for kind in KINDS}
+
+
 @pytest.mark.changes_the_operator
 @pytest.mark.timeout(1800)
 @pytest.mark.usefixtures("untouched")
-def test_every_command_of_the_installation_works_and_its_pods_run(terminal, cluster):
+def test_every_command_of_the_installation_works_and_touches_no_job_that_runs(terminal, cluster, namespace):
     """A command that works alone can fail behind others: values stay, and pods find no image or volume."""
-    seen = {}
+    seen, stays = {}, None
     for heading, text in chapters(INSTALL):
         commands = blocks(text, "sh")
         for block in commands:
             terminal.type_in(block, TYPED_S)
+            if stays:
+                stays.assert_nothing_has_touched_it()
+            if heading == "Uninstall":
+                stays = None  # what comes next deletes all jobs
         if commands:
             seen[heading] = running(cluster)
+        if heading == "Install":
+            stays = Stays(namespace)
         if heading == "TensorBoard and notebooks":
-            assert_a_run_is_shown_by_the_name_of_its_job(Namespace(cluster, LAB, there=True))
+            assert_all_is_served(cluster)
 
     assert seen == PROMISED
+
+
+def assert_all_is_served(cluster):
+    """By pods as the page has installed them."""
+    assert "TensorBoard" in page_of(cluster, LAB, TENSORBOARD, 6006)
+    assert_a_run_is_shown_by_the_name_of_its_job(Namespace(cluster, LAB, there=True))
+    assert_notebooks_are_served_to_who_has_the_token(cluster, token_of(cluster, "notebooks"))
+    assert_the_first_notebook_drives_a_robot(cluster)
 
 
 def assert_a_run_is_shown_by_the_name_of_its_job(lab):
@@ -120,50 +166,53 @@ def assert_a_run_is_shown_by_the_name_of_its_job(lab):
     lab.wait(lambda: name in lab.cluster.kubectl("exec", *where, "--", "python3", "-c", RUNS))
 
 
-@pytest.fixture
-def at_home(terminal, cluster, namespace, tmp_path):
-    """A terminal whose kubeconfig names the namespace of the test; the operator is up."""
-    cluster.rolled_out(SYSTEM, OPERATOR)
-    terminal.type_in("kubectl config view --raw --flatten >config", READY_S)
-    mine = Terminal(tmp_path, path=Path(sys.executable).parent, KUBECONFIG=str(tmp_path / "config"))
-    mine.type_in(f"kubectl config set-context --current --namespace={namespace.name}", READY_S)
-    return mine
+def at_home(namespace, folder):
+    """Return a terminal whose kubeconfig names the namespace; the operator is up."""
+    namespace.cluster.rolled_out(SYSTEM, OPERATOR)
+    Terminal(folder).type_in("kubectl config view --raw --flatten >config", READY_S)
+    home = checkout(folder, KUBECONFIG=str(folder / "config"))
+    home.type_in(f"kubectl config set-context --current --namespace={namespace.name}", READY_S)
+    return home
 
 
+@pytest.mark.beside
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
-def test_every_command_of_the_tools_works(at_home, namespace, tmp_path):
+def test_every_command_of_the_tools_works(namespace, tmp_path):
     """From a namespace without a job to a policy on this machine, and a job that is gone."""
     [session] = blocks(TOOLS, "sh")
 
-    printed = at_home.type_in(session, SESSION_S)
+    printed = at_home(namespace, tmp_path).type_in(session, SESSION_S)
 
     assert (tmp_path / "fetched/minimal/0/model.zip").is_file()
     assert "suspension 1" in printed
     assert namespace.select("trainingjobs") == []
 
 
+@pytest.mark.beside
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
-def test_the_script_of_the_tools_trains(at_home, namespace, tmp_path):
+def test_the_script_of_the_tools_trains(namespace, tmp_path):
     """The same from Python, with the job of the examples."""
     [script] = blocks(TOOLS, "python with-a-cluster")
     (tmp_path / "train.py").write_text(script)
 
-    printed = at_home.type_in("python train.py", SESSION_S)
+    printed = at_home(namespace, tmp_path).type_in("python train.py", SESSION_S)
 
     assert "Succeeded 2000 " in printed
     assert namespace.select("trainingjobs") == []
 
 
+@pytest.mark.beside
 @pytest.mark.comes_late  # after the long run, whose operator is killed again and again
 @pytest.mark.timeout(900)
-def test_the_sweep_of_the_page_trains_in_the_cluster(at_home, namespace, tmp_path):
+def test_the_sweep_of_the_page_trains_in_the_cluster(namespace, tmp_path):
     """Two trials with two seeds each, compared, listed by their label and deleted."""
     [sweep] = blocks(SWEEPS, "yaml sweep")
     (tmp_path / "sweep.yaml").write_text(sweep)
+    home = at_home(namespace, tmp_path)
 
-    printed = "".join(at_home.type_in(block, SESSION_S) for block in blocks(SWEEPS, "sh"))
+    printed = "".join(home.type_in(block, SESSION_S) for block in blocks(SWEEPS, "sh"))
 
     assert "best: rates-" in printed
     assert (tmp_path / "runs/rates/table.txt").is_file()

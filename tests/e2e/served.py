@@ -1,0 +1,67 @@
+"""What a release of the chart serves to a browser: TensorBoard's page, and notebooks to who has the token."""
+
+import base64
+import json
+
+from tests.e2e.cluster import Cluster
+from tests.e2e.namespace import SYSTEM
+
+NOTEBOOKS = "palaestra-jupyter"
+STATUS_CODES = """
+import http.client, json, sys
+_, token, *paths = sys.argv
+codes = {}
+for path in paths:
+    server = http.client.HTTPConnection("127.0.0.1", 8888, timeout=30)
+    server.request("GET", path, headers={"Authorization": f"token {token}"} if token else {})
+    codes[path] = server.getresponse().status
+print(json.dumps(codes))
+"""
+
+
+def page_of(cluster: Cluster, namespace: str, deployment: str, port: int) -> str:
+    """Return the first page of a server that no other pod reaches, as `kubectl port-forward` would."""
+    fetch = (
+        f"from urllib.request import urlopen; print(urlopen('http://127.0.0.1:{port}', timeout=30).read())"
+    )
+    return inside(cluster, namespace, deployment, "python3", "-c", fetch)
+
+
+def inside(cluster: Cluster, namespace: str, deployment: str, *command: str) -> str:
+    """Return all that a command says in a pod of a Deployment of the release."""
+    return cluster.kubectl("exec", "-n", namespace, f"deploy/{deployment}", "--", *command)
+
+
+def token_of(cluster: Cluster, secret: str) -> str:
+    """Return the token of the notebook server."""
+    found = cluster.get("secrets", SYSTEM, secret)
+    assert found
+    return base64.b64decode(found["data"]["token"]).decode()
+
+
+def assert_notebooks_are_served_to_who_has_the_token(cluster: Cluster, right: str) -> None:
+    """Without the token, only the API version, which the kubelet probes, and the login page are served."""
+
+    def codes(token: str) -> dict[str, int]:
+        asked = ("/api", "/api/contents", "/lab")
+        said = inside(cluster, SYSTEM, NOTEBOOKS, "python3", "-c", STATUS_CODES, token, *asked)
+        found: dict[str, int] = json.loads(said)
+        return found
+
+    for token in ("", "another"):
+        assert codes(token) == {"/api": 200, "/api/contents": 403, "/lab": 302}
+    assert codes(right) == {"/api": 200, "/api/contents": 200, "/lab": 200}
+
+
+def assert_the_first_notebook_drives_a_robot(cluster: Cluster) -> None:
+    """With a kernel as the browser's, a simulator and a ROS master, in a pod that may do nothing else."""
+    look = (
+        "touch /usr/written; ls /var/run/secrets/kubernetes.io; jupyter execute --inplace first-steps.ipynb"
+    )
+    said = inside(cluster, SYSTEM, NOTEBOOKS, "sh", "-c", f"{look}; cat first-steps.ipynb")
+
+    assert "touch: cannot touch '/usr/written': Read-only file system" in said
+    assert "ls: cannot access '/var/run/secrets/kubernetes.io'" in said
+    assert "reached after" in said
+    assert "image/png" in said
+    assert '"name": "stderr"' not in said
