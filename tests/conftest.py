@@ -21,7 +21,7 @@ from tests.control_plane.programs import REQUIRED, NoPrograms
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 # A property is not about time, and machines are noisy: --durations shows slow tests.
 settings.register_profile("explore", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-# The same examples each time, as a random one must not fail an unrelated change, and few: they were met before.
+# The same examples each time, as a random one must not fail an unrelated change; so a few are enough.
 settings.register_profile("repeat", settings.get_profile("explore"), derandomize=True, max_examples=40)
 settings.load_profile("repeat")
 # Files that one worker runs one after another, by the beginnings of their paths.

@@ -21,8 +21,7 @@ SEED = 20
 GAPS_S = ((26.0, 36.0), (4.0, 10.0))
 END_S = 900.0
 EVALUATED_EVERY = 12_500  # more often than this, evaluations are a third of the training's time
-# So little that there is room beside it, and that others come before it where the processors are short: it trains
-# while they wait.
+# So little that there is room beside it, and that others come before it where processors are short.
 SIMULATOR = {"requests": {"cpu": "1m", "memory": "160Mi"}}
 TRAINER = {"requests": {"cpu": "1m", "memory": "768Mi"}, "limits": {"cpu": "1", "memory": "2Gi"}}
 
