@@ -6,6 +6,7 @@ it connects to anything else. The processes end with the one that started them, 
 """
 
 import json
+import os
 import shutil
 import ssl
 import subprocess
@@ -39,6 +40,7 @@ CONTROLLERS = (
 )
 START_DEADLINE_S = 60
 STOP_DEADLINE_S = 10
+RARELY = {"GOGC": "400"}  # collect garbage: a plane lives for minutes, and a tenth of its work would be that
 AUDIT = {
     "apiVersion": "audit.k8s.io/v1",
     "kind": "Policy",
@@ -245,6 +247,7 @@ def started(folder: Path, command: list[str]) -> Iterator["subprocess.Popen[byte
     with (folder / f"{Path(command[0]).name}.log").open("wb") as log:
         process = subprocess.Popen(
             ["setpriv", "--pdeathsig", "KILL", "--", *command],
+            env=os.environ | RARELY,
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,

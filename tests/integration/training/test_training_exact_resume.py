@@ -145,7 +145,7 @@ def job(write_job):
             algorithm=algorithm | ({} if normalize is None else {"normalize": normalize}),
             environment={"id": "MoveToTargetEnv-v0", "options": options},
             steps=400,
-            evaluation={"everySteps": 150, "episodes": 2, "confirmEpisodes": 2},
+            evaluation={"everySteps": 200, "episodes": 1, "confirmEpisodes": 1},
             checkpoint={"everySteps": 100, "keep": 2},
         )
 

@@ -49,7 +49,7 @@ HYPERPARAMETERS = {
     "CrossQ": OFF_POLICY,
     "PPO": ON_POLICY | {"n_epochs": 2},
     "A2C": {},
-    "TRPO": ON_POLICY,
+    "TRPO": ON_POLICY | {"cg_max_steps": 3},
     "RecurrentPPO": ON_POLICY | {"n_epochs": 2, "policy_kwargs": SMALL | {"lstm_hidden_size": 4}},
     "REINFORCE": {"episodes_per_update": 1},
 }
