@@ -1,4 +1,4 @@
-"""Messages, metrics, numbers, imports and HTTP server that operator, trainer, sidecar and simulator share.
+"""Messages, metrics, HTTP server and small rules that operator, trainer, sidecar and simulator share.
 
 - `control`: between trainer and sidecar: the requests, and the state of a simulator
 - `pod`: between trainer and operator: `/status`, the termination message, exit codes
@@ -7,8 +7,9 @@
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options
 - `imports`: imports of programs, without what they do not use
+- `signals`: which signals a program obeys
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time, size and connections
 
-This package imports none of the others. All modules except `http`, `imports` and `ros.sockets` are
-pure: values and bytes.
+This package imports none of the others. All modules except `http`, `imports`, `signals` and `ros.sockets`
+are pure: values and bytes.
 """

@@ -18,7 +18,6 @@ from palaestra.errors import PalaestraError, SpecErrors
 from palaestra.local import rundir
 from palaestra.local.errors import KILLED
 from palaestra.local.files import write
-from palaestra.local.interrupt import obeyed
 from palaestra.sweeps import expanding, ledger
 from palaestra.sweeps.carrying_out import Place, carry_out
 from palaestra.sweeps.here import Here
@@ -29,6 +28,7 @@ from palaestra.sweeps.there import There
 from palaestra.sweeps.trial import State
 from palaestra_protocol.numbers import whole
 from palaestra_protocol.pod.status import ExitCode
+from palaestra_protocol.signals import obeyed
 
 FAILED = 1
 SEARCHED_AT_ONCE = 4  # trials of a search in a cluster: it learns nothing from those that run

@@ -1,25 +1,17 @@
 """End a run early: the first Ctrl-C saves a checkpoint, the second kills; a deadline ends it too.
 
-A signal that was ignored when the program started stays ignored: SIGINT of a command in the background of a
-script, SIGHUP under nohup. SIGTERM always ends a run.
+A signal that was ignored when the program started stays ignored; SIGTERM always ends a run.
 """
 
 import asyncio
 import signal
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
+from palaestra_protocol.signals import obeyed
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
-def obeyed(numbers: Iterable[signal.Signals]) -> list[signal.Signals]:
-    """Return those of the signals that may get a handler: SIGTERM, and those that are not ignored."""
-    return [
-        number
-        for number in numbers
-        if number is signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN
-    ]
 
 
 class Stoppable(Protocol):

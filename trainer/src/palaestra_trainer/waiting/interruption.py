@@ -21,6 +21,7 @@ from types import FrameType, TracebackType
 from typing import Any, Self
 
 from palaestra_protocol.pod.status import ExitCode
+from palaestra_protocol.signals import obeyed
 from palaestra_trainer.errors import TrainerError
 from palaestra_trainer.waiting import patience
 
@@ -28,11 +29,6 @@ SIGNALS = (signal.SIGTERM, signal.SIGINT)
 HURRY = "a second signal ends at once"
 
 Check = Callable[[], None]
-
-
-def _obeyed() -> list[signal.Signals]:
-    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    return [signal.SIGTERM] if ignored else [*SIGNALS]
 
 
 def go_on() -> None:
@@ -52,7 +48,7 @@ def leaving_when_asked() -> Iterator[None]:
     has no effect, because it would replace the exit code of the run.
     """
     atexit.register(_ignore)
-    before = {number: signal.signal(number, _leave) for number in _obeyed()}
+    before = {number: signal.signal(number, _leave) for number in obeyed(SIGNALS)}
     try:
         yield
     finally:
@@ -84,7 +80,7 @@ class Interruption:
 
     def __enter__(self) -> Self:
         """Install the signal handlers."""
-        self._before = {number: signal.signal(number, self._note) for number in _obeyed()}
+        self._before = {number: signal.signal(number, self._note) for number in obeyed(SIGNALS)}
         return self
 
     def __exit__(
