@@ -36,7 +36,7 @@ exec "\$root/lib/$loader" --argv0 "\$root/bin/python3" --library-path "\$root/li
 SCRIPT
 cat >"$target/palaestra-sidecar" <<'SCRIPT'
 #!/bin/sh
-exec "${0%/*}/bin/python3" -I -B -u -m palaestra_sim.sidecar.cli "$@"
+exec "${0%/*}/bin/python3" -I -B -u -m palaestra_sim.sidecar.entry "$@"
 SCRIPT
 chmod 755 "$target/bin/python3" "$target/palaestra-sidecar"
 "$target/palaestra-sidecar" --help >/dev/null

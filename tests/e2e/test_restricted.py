@@ -9,8 +9,10 @@ from tests.e2e.cluster import CommandFailed, Refused
 from tests.e2e.jobs import WAIT
 from tests.e2e.namespace import LONG_S, statuses
 
-# A program that has not begun to listen to signals yet is ended by SIGKILL, after the pod's grace.
-ENDS_WHEN_ALL_IS_UP = "until (: </dev/tcp/127.0.0.1/7200) 2>/dev/null; do sleep 0.2; done"
+ENDS = {
+    "when all is up": "until (: </dev/tcp/127.0.0.1/7200) 2>/dev/null; do sleep 0.2; done",
+    "at once": "exit 0",
+}
 TOKEN = "/var/run/secrets/kubernetes.io/serviceaccount/token"
 
 
@@ -51,17 +53,21 @@ def test_a_training_succeeds_and_its_status_tells_how(namespace, job):
 
 @pytest.mark.beside
 @pytest.mark.timeout(1200)
-def test_a_pod_ends_with_its_trainer(namespace, job):
-    """Simulators and ROS master are not what anybody waits for, nor a preempted node's grace."""
-    namespace.apply(job("ends", script=ENDS_WHEN_ALL_IS_UP))
+@pytest.mark.parametrize("moment", ENDS)
+def test_a_pod_ends_with_its_trainer(namespace, job, moment):
+    """Simulators and ROS master are not what anybody waits for, nor a preempted node's grace.
+
+    At once means while the sidecars still start, and process 1 of a container loses early signals.
+    """
+    namespace.apply(job("ends", script=ENDS[moment]))
     assert namespace.wait_for_end("ends") == "Succeeded"
 
     (pod,) = namespace.pods("ends", live=False)
-    ended = {each["name"]: moment(each["state"]["terminated"]) for each in statuses(pod)}
+    ended = {each["name"]: finished(each["state"]["terminated"]) for each in statuses(pod)}
     assert max(ended.values()) - ended["trainer"] < timedelta(seconds=10)
 
 
-def moment(terminated):
+def finished(terminated):
     """Return when a container ended."""
     return datetime.fromisoformat(terminated["finishedAt"])
 

@@ -2,6 +2,7 @@
 
 It may have a second simulator as a standby. The two share the process and its ports, and nothing else.
 
+- `entry`: the start: signals are held back before anything else is imported; `blocked`: which ones
 - `cli`: the command line: check everything, then run; `options`: its options
 - `preparation`: the world that the simulator will run, with its own ROS names
 - `project`: the Webots project around that world: a folder, and links to what is around the source

@@ -27,8 +27,7 @@ log = logging.getLogger(__name__)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the sidecar until SIGTERM or SIGINT; return its exit code."""
-    signals.hold_back()
+    """Run the sidecar until SIGTERM or SIGINT, which `entry` has blocked; return its exit code."""
     log_to_stdout()
     given = parse(sys.argv[1:] if arguments is None else arguments)
     with work_folder(given):
@@ -166,7 +165,3 @@ def _missing_controllers(given: argparse.Namespace) -> str | None:
     if Driver(given.driver) is not Driver.WEBOTS:
         return None
     return project.missing_controllers(given.world, preparation.read(given.world), os.environ)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,7 +1,7 @@
 """The signals of the sidecar, received by one thread that waits for nothing else.
 
-They are blocked everywhere and received with sigtimedwait. A handler would not be enough: Python runs
-handlers in the main thread, so a signal that arrives just before that thread blocks on something else
+They are blocked everywhere (`blocked`) and received with sigtimedwait. A handler would not be enough: Python
+runs handlers in the main thread, so a signal that arrives just before that thread blocks on something else
 wakes no thread. Process 1 receives blocked signals too, although it has no handler for them.
 """
 
@@ -11,19 +11,12 @@ import threading
 import time
 from collections.abc import Callable
 
+from palaestra_sim.sidecar.blocked import ENDS, TAKEN
 from palaestra_sim.sidecar.process import reap
 from palaestra_sim.sidecar.reaper import adopt_orphans
 
 SHUTDOWN_S = 1.8  # the sidecar ends this long after the first signal, even if something hangs
 EXIT_HUNG = 1
-
-_ENDS = frozenset({signal.SIGTERM, signal.SIGINT})
-_TAKEN = _ENDS | {signal.SIGCHLD}
-
-
-def hold_back() -> None:
-    """Block the signals until `take` receives them; call it before a second thread starts."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, _TAKEN)
 
 
 def take(shut_down: Callable[[], None]) -> None:
@@ -37,11 +30,11 @@ def take(shut_down: Callable[[], None]) -> None:
 
 
 def _take(shut_down: Callable[[], None]) -> None:
-    while signal.sigwait(_TAKEN) not in _ENDS:
+    while signal.sigwait(TAKEN) not in ENDS:
         reap()
     give_up = time.monotonic() + SHUTDOWN_S
     shut_down()
     while (left_s := give_up - time.monotonic()) > 0:
-        signal.sigtimedwait(_TAKEN, left_s)
+        signal.sigtimedwait(TAKEN, left_s)
         reap()
     os._exit(EXIT_HUNG)  # the reaper reads the end of its pipe and ends the rest

@@ -1,0 +1,19 @@
+"""The first steps of a sidecar's process."""
+
+import json
+import subprocess
+import sys
+
+FIRST = """
+import json, sys
+from palaestra_sim.sidecar import entry
+print(json.dumps(sorted(name for name in sys.modules if name.startswith("palaestra"))))
+"""
+
+
+def test_signals_are_held_back_before_anything_else_is_imported():
+    """Each import before it is time in which process 1 of a container loses a SIGTERM."""
+    said = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, check=True, timeout=60)
+
+    package = "palaestra_sim.sidecar"
+    assert json.loads(said.stdout) == ["palaestra_sim", package, f"{package}.blocked", f"{package}.entry"]
