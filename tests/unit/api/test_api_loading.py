@@ -176,3 +176,31 @@ def test_snake_case_is_refused_as_in_a_cluster() -> None:
     text = FIVE_MISTAKES.replace("stepps: 1000", "evaluation: {every_steps: 100}")
 
     assert "spec.trainer.evaluation.every_steps: is not a field; did you mean everySteps?" in told(text)
+
+
+MILLIONS = """\
+apiVersion: palaestra.dev/v1alpha1
+kind: TrainingJob
+metadata: {name: millions}
+spec:
+  trainer:
+    algorithm: {name: DQN, hyperparameters: {buffer_size: 1e6, learning_rate: 1e-4, gamma: 1.0}}
+    steps: 1e6
+    evaluation: {everySteps: 5.0e+4}
+"""
+
+
+def test_a_whole_number_is_one_however_it_is_written() -> None:
+    """An API server stores it so, and a file has one meaning on a laptop and on a cluster."""
+    trainer = load(MILLIONS).spec.trainer
+    given = trainer.algorithm.hyperparameters
+
+    assert (trainer.steps, trainer.evaluation.every_steps) == (1_000_000, 50_000)
+    assert given == {"buffer_size": 1_000_000, "learning_rate": 1e-4, "gamma": 1}
+    assert [type(value) for value in given.values()] == [int, float, int]
+
+
+@pytest.mark.parametrize("steps", ["1.5", "1e-3", "1e300"])
+def test_a_number_that_is_not_whole_is_still_refused(steps) -> None:
+    """Nor is one of which a float does not know every digit."""
+    assert any("spec.trainer.steps" in each for each in told(MILLIONS.replace("1e6\n", f"{steps}\n")))

@@ -19,6 +19,7 @@ from palaestra.api.tree import objects
 from palaestra.api.yaml_text import NotYaml, read, write
 from palaestra.errors import SpecErrors
 
+_NOT_EXACT = 2.0**53  # larger floats stand for several whole numbers
 _KEY = "[key]"  # last item of pydantic's path if the key of a mapping is wrong, not its value
 
 _HEADING = (("apiVersion", API_VERSION), ("kind", KIND))
@@ -43,9 +44,13 @@ def load(text: str, name: str = "job") -> TrainingJob:
 def validate(data: Any, name: str = "job") -> TrainingJob:
     """Return the TrainingJob in plain `data`, such as an API server returns.
 
+    A number that is whole is a whole number, however it is written: an API server stores 1e6 and 1.0 as
+    1000000 and 1.
+
     Raises:
         SpecErrors: the job is invalid; lists every mistake.
     """
+    data = _stored(data)
     if not isinstance(data, Mapping):
         fact = "empty" if data is None else f"{quoted(data)}, not a mapping"
         problem = f"{name}: the document is {fact}; begin it with apiVersion: {API_VERSION}"
@@ -72,6 +77,15 @@ def dump(job: TrainingJob) -> str:
 def as_data(job: TrainingJob) -> dict[str, Any]:
     """Return the job as plain data in camelCase with its defaults; absent fields are omitted."""
     return job.model_dump(mode="json", by_alias=True, exclude_none=True)
+
+
+def _stored(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {key: _stored(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_stored(value) for value in data]
+    exact = isinstance(data, float) and data.is_integer() and abs(data) < _NOT_EXACT
+    return int(data) if exact else data
 
 
 def _unsupported(value: Any, ours: str) -> str:

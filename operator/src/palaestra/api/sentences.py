@@ -84,8 +84,6 @@ def _no_text(_: Path, value: Any, __: dict[str, Any]) -> str:
 def _no_integer(_: Path, value: Any, __: dict[str, Any]) -> str:
     if isinstance(value, str):
         return f"{quoted(value)} is text; write a whole number without quotes"
-    if isinstance(value, float) and value.is_integer():
-        return f"{value:g} has a fraction or an exponent; write {int(value)}"
     return f"{quoted(value)} is not a whole number; write one"
 
 
