@@ -53,7 +53,9 @@ class Checked(gymnasium.vector.VectorWrapper):
         """Step, and look."""
         result = super().step(actions)
         observations, rewards, _, truncations, infos = result
-        faults = infos.get("final_info", {}).get("_sim_fault", np.zeros(self.num_envs, bool))
+        faults = (
+            infos.get("final_info", {}).get("palaestra", {}).get("_sim_fault", np.zeros(self.num_envs, bool))
+        )
         assert observations in self.observation_space
         assert np.isfinite(rewards).all()
         assert truncations[faults].all()

@@ -69,7 +69,7 @@ class Trained:
     def step(self):
         """Take a step; return whether its row is valid, and its info."""
         _, _, _, (info,) = self.env.step(STAND)
-        return info["valid"], info
+        return info["palaestra"]["valid"], info
 
     def break_by(self, number):
         """Send a signal to the simulator; return the fault that this was."""
@@ -78,9 +78,9 @@ class Trained:
 
     def fault(self):
         """Step until the simulator is found broken; return the fault."""
-        while (info := self.step()[1])["valid"]:
+        while (info := self.step()[1])["palaestra"]["valid"]:
             pass
-        return info["sim_fault"]
+        return info["palaestra"]["sim_fault"]
 
     def go_on(self):
         """Step until a row is valid again."""

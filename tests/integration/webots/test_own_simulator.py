@@ -132,7 +132,7 @@ def test_a_facade_s_simulator_that_breaks_is_mended_where_it_broke(webots):
     *_, truncated, info = webots.run(lambda: env.step(0))
 
     assert truncated
-    assert "was restarted amid an episode" in info["sim_fault"]["fact"]
+    assert "was restarted amid an episode" in info["palaestra"]["sim_fault"]["fact"]
     webots.run(lambda: env.reset(seed=1))
     assert not webots.run(lambda: env.step(0))[3]
     env.close()
@@ -147,7 +147,7 @@ def test_an_episode_does_not_go_on_in_a_simulator_that_the_program_restarted(web
     *_, truncated, info = webots.run(lambda: env.step(0))
 
     assert truncated
-    assert info["sim_fault"]["kind"] == SimulatorDead.kind
+    assert info["palaestra"]["sim_fault"]["kind"] == SimulatorDead.kind
     env.close()
 
 

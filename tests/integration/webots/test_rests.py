@@ -63,7 +63,7 @@ def test_what_has_rested_goes_on(rested):
     rested.env.unpause()
 
     assert mode is Mode.PAUSE
-    assert rested.step()["valid"]
+    assert rested.step()["palaestra"]["valid"]
 
 
 @pytest.mark.parametrize(("number", "kind"), [(signal.SIGKILL, "dead"), (signal.SIGSTOP, "hung")])
@@ -72,7 +72,7 @@ def test_what_broke_while_it_rested_is_mended(rested, number, kind):
     os.kill(rested.launcher.state().pid, number)
 
     rested.env.unpause()
-    fault = rested.step()["sim_fault"]
+    fault = rested.step()["palaestra"]["sim_fault"]
 
     assert fault["kind"] == kind
-    eventually(lambda: rested.step()["valid"], PATIENCE_S)
+    eventually(lambda: rested.step()["palaestra"]["valid"], PATIENCE_S)

@@ -31,7 +31,8 @@ def make_env(environment: str | None = None, *, role: str = "Collect", **options
     """Return a gymnasium.Env in a simulator of its own, for a training loop of any library.
 
     A fault of the simulator ends an episode as truncated, with the last observation before it, reward 0 and
-    `info["sim_fault"]`. The next `reset` waits until the simulator is mended, within its restart budget.
+    `info["palaestra"]["sim_fault"]`. The next `reset` waits until the simulator is mended, within its restart
+    budget.
 
     The simulator is that of the newest `Webots` facade of this process that no environment uses. If there is
     none, it is a free one of PALAESTRA_CONFIG. Without that variable, as in a notebook, one is started: a

@@ -25,7 +25,8 @@ from palaestra_trainer.errors import ConfigurationError, TrainerError
 from palaestra_trainer.run.termination import UNEXPECTED, end_of, write_last_word
 from palaestra_trainer.run_directory import RUN_VARIABLE, RunDirectory
 from palaestra_trainer.telemetry.logs import configure_logs, last_lines
-from palaestra_trainer.waiting.interruption import leaving_when_asked
+from palaestra_trainer.waiting.interruption import end_undisturbed, leaving_when_asked
+from palaestra_trainer.waiting.leaving import leave_after
 
 log = structlog.get_logger(__name__)
 
@@ -89,6 +90,7 @@ exit codes:
   130 ended by Ctrl-C; nothing is written
   1   any other error; a retry may help
 """
+LEFT_S = 10.0  # for what libraries do at the exit of Python, such as an upload
 KEYBOARD_INTERRUPT = 130  # the exit status that shells give a process ended by SIGINT
 
 
@@ -123,6 +125,14 @@ def train(arguments: Sequence[str] | None = None) -> int:
         )
 
 
+def train_and_leave() -> int:
+    """Run `palaestra-train` as a program: it ends soon, also if a thread of the job's code goes on."""
+    code = train()
+    end_undisturbed()
+    leave_after(LEFT_S, code)
+    return code
+
+
 def evaluate(arguments: Sequence[str] | None = None) -> int:
     """Run `palaestra-eval`; return its exit code."""
     parser = _parser("palaestra-eval", EVAL, EVAL_EXIT_CODES)
@@ -140,7 +150,7 @@ def evaluate(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         log.error("ended by Ctrl-C")
         return KEYBOARD_INTERRUPT
-    except (TrainerError, OSError) as error:
+    except (TrainerError, OSError, SystemExit) as error:  # the environment may end the program
         return _code_of_refusal(error)
     sys.stdout.write(json.dumps(result) + "\n")
     return ExitCode.DONE
@@ -165,7 +175,7 @@ def export(arguments: Sequence[str] | None = None) -> int:
     return ExitCode.DONE
 
 
-def _code_of_refusal(error: Exception) -> int:
+def _code_of_refusal(error: Exception | SystemExit) -> int:
     code = _refuse(error)
     return code if code in {ExitCode.CONFIGURATION, ExitCode.FAULT_BUDGET} else UNEXPECTED
 
@@ -200,7 +210,7 @@ def _run_directory(chosen: Path | None) -> Path:
     return Path(name)
 
 
-def _refuse(error: Exception) -> int:
+def _refuse(error: Exception | SystemExit) -> int:
     end = end_of(error)
     for line in end.message.splitlines():
         log.error(line, reason=end.reason)

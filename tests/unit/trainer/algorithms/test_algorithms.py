@@ -12,6 +12,8 @@ from stable_baselines3.common.utils import explained_variance
 from torch import nn, optim
 
 from palaestra_trainer.algorithms import ALGORITHMS, REINFORCE, check, make_model
+from palaestra_trainer.algorithms.elsewhere import ELSEWHERE
+from palaestra_trainer.algorithms.entries import OURS
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
@@ -98,7 +100,7 @@ def test_all_mistyped_hyperparameters_are_reported_at_once_with_the_nearest_name
 @pytest.mark.parametrize("name", ["env", "seed", "optimize_memory_usage", "device"])
 def test_what_the_training_loop_gives_itself_is_no_hyperparameter(name):
     """Else a file could undo what keeps invalid rows out."""
-    with pytest.raises(ConfigurationError, match="has no such hyperparameter"):
+    with pytest.raises(ConfigurationError, match=f"{name}: is no hyperparameter here"):
         check(Algorithm(name="DQN", hyperparameters={name: 1}))
 
 
@@ -224,7 +226,7 @@ def test_invalid_rows_are_not_counted_as_steps(make_env, name):
     counted = []
 
     def count(locals_, _):
-        counted.extend(info["valid"] for info in locals_["infos"])
+        counted.extend(info["palaestra"]["valid"] for info in locals_["infos"])
         return True
 
     model = model_of(name, make_env(members=2, faults=(3, 4, 20))).learn(60, count)
@@ -364,3 +366,24 @@ def test_reinforce_learns_the_corridor(make_env):
 def test_reinforce_is_a_stable_baselines_algorithm():
     """Callbacks, wrappers and tools of others expect that."""
     assert issubclass(REINFORCE, sb3.common.base_class.BaseAlgorithm)
+
+
+def test_words_of_other_projects_are_refused_with_their_place_here():
+    """The nearest hyperparameter is the wrong one: n_timesteps is no n_steps."""
+    given = Algorithm(name="PPO", hyperparameters={"n_timesteps": 1e5, "policy": "MlpPolicy", "seed": 1})
+
+    with pytest.raises(ConfigurationError) as refused:
+        check(given)
+
+    assert str(refused.value).splitlines() == [
+        "algorithm.hyperparameters.n_timesteps: is no hyperparameter here; write trainer.steps",
+        "algorithm.hyperparameters.policy: is no hyperparameter here; write trainer.algorithm.policy",
+        "algorithm.hyperparameters.seed: is no hyperparameter here; write spec.seed",
+    ]
+
+
+def test_each_argument_that_a_run_gives_itself_has_its_place():
+    """Whatever a person copies from a call of Stable-Baselines3, the answer says where it goes."""
+    hindsight = {"replay_buffer_class", "replay_buffer_kwargs"}  # hyperparameters where there is a buffer
+
+    assert OURS - {"self", "_init_setup_model"} - hindsight <= ELSEWHERE.keys()

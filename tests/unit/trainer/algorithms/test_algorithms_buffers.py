@@ -31,7 +31,7 @@ def add(buffer, marks, valid):
         np.zeros(len(marks), int),
         column,
         np.zeros(len(marks), bool),
-        [{"valid": it} for it in valid],
+        [{"palaestra": {"valid": it}} for it in valid],
     )
 
 
@@ -61,7 +61,11 @@ def rollout(rewards, valid, starts, *, kind=ValidRolloutBuffer, gamma=0.9):
 
 def test_a_row_is_valid_unless_it_says_otherwise():
     """Environments of others say nothing."""
-    assert valid_rows([{}, {"valid": True}, {"valid": False}]).tolist() == [True, True, False]
+    assert valid_rows([{}, {"palaestra": {"valid": True}}, {"palaestra": {"valid": False}}]).tolist() == [
+        True,
+        True,
+        False,
+    ]
 
 
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=20))

@@ -47,7 +47,7 @@ def add(buffer, *steps):
         np.zeros((len(steps), 1)),
         places[:, 0],
         np.array(["done" in word for word in words]),
-        [{"valid": "bad" not in word} for word in words],
+        [{"palaestra": {"valid": "bad" not in word}} for word in words],
     )
 
 

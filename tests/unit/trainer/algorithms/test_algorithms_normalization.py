@@ -92,7 +92,7 @@ def test_what_a_fault_spoiled_reaches_no_statistic(make_env):
 
     for chosen in actions(2):
         *_, infos = env.step(chosen)
-        seen.append(env.get_original_obs()[[info["valid"] for info in infos]])
+        seen.append(env.get_original_obs()[[info["palaestra"]["valid"] for info in infos]])
 
     rows = np.concatenate(seen)
     assert len(rows) < 2 * 61
@@ -127,9 +127,9 @@ def test_the_end_of_an_episode_is_not_seen_where_the_next_cannot_begin(make_env)
 
     steps = [env.step(np.zeros(1, int)) for _ in range(8)]
 
-    assert [(dones.item(), infos[0]["valid"]) for *_, dones, infos in steps] == [(False, True)] * 7 + [
-        (True, True)
-    ]
+    assert [(dones.item(), infos[0]["palaestra"]["valid"]) for *_, dones, infos in steps] == [
+        (False, True)
+    ] * 7 + [(True, True)]
     assert env.obs_rms.count == pytest.approx(8, abs=1e-3)
 
 

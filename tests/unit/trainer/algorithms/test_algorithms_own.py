@@ -136,7 +136,7 @@ def test_a_class_of_ones_own_learns_from_valid_rows_only(lab, make):
 
     model = make(algorithm, faults=(3, 9)).learn(60, lambda locals_, _: not counted.extend(locals_["infos"]))
 
-    valid = sum(info["valid"] for info in counted)
+    valid = sum(info["palaestra"]["valid"] for info in counted)
     assert model.care == 0.25
     assert model.num_timesteps == valid < len(counted)
 

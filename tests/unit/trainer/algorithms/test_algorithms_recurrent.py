@@ -124,7 +124,7 @@ def test_the_memory_restarts_with_the_first_valid_row(model):
     rows = []
 
     def note(locals_, _):
-        valid = [info["valid"] for info in locals_["infos"]]
+        valid = [info["palaestra"]["valid"] for info in locals_["infos"]]
         rows.append((valid, locals_["self"]._last_episode_starts.tolist()))
         return True
 

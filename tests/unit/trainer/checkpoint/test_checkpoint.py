@@ -200,7 +200,7 @@ def test_a_row_that_ends_as_truncated_afterwards_is_written_again(trained):
     buffer.positions = buffer.positions._replace(newest=(3,))
     buffer.dones[3] = 0.0
     empty = np.zeros((1, 2), np.float32)
-    buffer.add(empty, empty, np.zeros(1), np.zeros(1), np.ones(1), [{"valid": False}])
+    buffer.add(empty, empty, np.zeros(1), np.zeros(1), np.ones(1), [{"palaestra": {"valid": False}}])
 
     assert buffer.changed == {0}
 

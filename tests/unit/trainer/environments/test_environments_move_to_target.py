@@ -204,7 +204,7 @@ def test_extra_steps_are_reported_and_not_taken_for_speed():
 
     *_, info = play(env, IN_THE_OPEN, [FORWARD, FORWARD])[-1]
 
-    assert info["extra_steps"] == 1
+    assert info["palaestra"]["extra_steps"] == 1
     assert env.situation.speed_m_s == pytest.approx(0.5, abs=0.01)
 
 

@@ -63,7 +63,7 @@ def test_a_step_has_a_row_for_each_member(make_env, make_member, members):
     assert first.shape == observations.shape == (members, 2)
     assert rewards.dtype == np.float32
     assert rewards.shape == dones.shape == (members,)
-    assert [info["valid"] for info in infos] == [True] * members
+    assert [info["palaestra"]["valid"] for info in infos] == [True] * members
 
 
 def test_an_episode_is_reset_in_its_last_step(make_env, make_member):
@@ -146,13 +146,13 @@ def test_a_fault_ends_the_episode_as_truncated_and_invalid(make_env, make_member
     assert dones[0]
     assert rewards[0] == 0.0
     assert observations[0][0] == np.float32(0.1)
-    assert infos[0]["valid"] is False
+    assert infos[0]["palaestra"]["valid"] is False
     assert infos[0]["TimeLimit.truncated"] is True
     assert infos[0]["terminal_observation"][0] == np.float32(0.1)
-    assert infos[0]["sim_fault"]["kind"] == "dead"
-    assert infos[0]["sim_fault"]["simulator"] == "collect-0"
-    assert infos[0]["sim_fault"]["step"] == 1
-    assert "recovering" not in infos[0]
+    assert infos[0]["palaestra"]["sim_fault"]["kind"] == "dead"
+    assert infos[0]["palaestra"]["sim_fault"]["simulator"] == "collect-0"
+    assert infos[0]["palaestra"]["sim_fault"]["step"] == 1
+    assert "recovering" not in infos[0]["palaestra"]
     assert "episode" not in infos[0]
 
 
@@ -168,9 +168,9 @@ def test_alone_the_step_after_a_fault_waits_and_begins_the_next_episode(make_env
 
     assert member.log == ["restart"]
     assert (dones[0], rewards[0], observations[0][0]) == (True, 0.0, 0.0)
-    assert (infos[0]["valid"], infos[0]["recovering"]) == (False, True)
-    assert "sim_fault" not in infos[0]
-    assert walk(env, 1)[0][3][0]["valid"] is True
+    assert (infos[0]["palaestra"]["valid"], infos[0]["palaestra"]["recovering"]) == (False, True)
+    assert "sim_fault" not in infos[0]["palaestra"]
+    assert walk(env, 1)[0][3][0]["palaestra"]["valid"] is True
 
 
 def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
@@ -182,11 +182,11 @@ def test_nobody_waits_for_a_member_that_is_mended(make_env, make_member):
 
     rows = walk(env, 20, LEFT)
 
-    assert all(infos[0]["valid"] for _, _, _, infos in rows)
-    assert not any(infos[1]["valid"] for _, _, _, infos in rows)
-    assert all(infos[1]["recovering"] for _, _, _, infos in rows)
+    assert all(infos[0]["palaestra"]["valid"] for _, _, _, infos in rows)
+    assert not any(infos[1]["palaestra"]["valid"] for _, _, _, infos in rows)
+    assert all(infos[1]["palaestra"]["recovering"] for _, _, _, infos in rows)
     assert not any(dones[1] for _, _, dones, _ in rows)
-    assert not any("sim_fault" in infos[1] for _, _, _, infos in rows)
+    assert not any("sim_fault" in infos[1]["palaestra"] for _, _, _, infos in rows)
     assert [members[0].log, members[1].log] == [[], ["restart"]]
 
 
@@ -202,10 +202,10 @@ def test_a_mended_member_begins_its_next_episode(make_env, make_member):
     observations, _, dones, infos = walk(env, 1)[0]
 
     assert dones[1]
-    assert infos[1]["valid"] is False
+    assert infos[1]["palaestra"]["valid"] is False
     assert observations[1][0] == 0.0
     assert env.reset_infos[1]["seed"] == members[1].env.seeds[-1] == episode_seed(1, COLLECT, 1, 1)
-    assert walk(env, 1)[0][3][1]["valid"] is True
+    assert walk(env, 1)[0][3][1]["palaestra"]["valid"] is True
 
 
 def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
@@ -226,8 +226,8 @@ def test_while_all_are_mended_a_step_waits_for_the_first(make_env, make_member):
 
     assert len(looks) >= 3
     assert dones.tolist() == [False, True]
-    assert [info["valid"] for info in infos] == [False, False]
-    assert [info["valid"] for info in walk(env, 1)[0][3]] == [False, True]
+    assert [info["palaestra"]["valid"] for info in infos] == [False, False]
+    assert [info["palaestra"]["valid"] for info in walk(env, 1)[0][3]] == [False, True]
 
 
 def test_a_signal_does_not_wait_for_a_member_that_is_mended(make_env, make_member):
@@ -251,10 +251,10 @@ def test_a_fault_at_a_reset_does_not_spoil_the_step_before(make_env, make_member
 
     rows = walk(env, 5)
 
-    assert [infos[0]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
-    assert "sim_fault" not in rows[2][3][0]
+    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
+    assert "sim_fault" not in rows[2][3][0]["palaestra"]
     assert rows[2][0][0][0] == np.float32(0.3)
-    assert rows[3][3][0]["sim_fault"]["step"] == 0
+    assert rows[3][3][0]["palaestra"]["sim_fault"]["step"] == 0
     assert rows[3][2][0]
 
 
@@ -265,7 +265,7 @@ def test_before_anything_was_seen_there_is_an_observation_of_nothing(make_env, m
     first = env.reset()
 
     assert first.tolist() == [[0.0, 0.0]]
-    assert walk(env, 2)[-1][3][0]["valid"] is True
+    assert walk(env, 2)[-1][3][0]["palaestra"]["valid"] is True
 
 
 def test_a_reset_leaves_a_member_alone_that_is_mended(make_env, make_member):
@@ -304,7 +304,7 @@ def test_a_member_that_breaks_while_it_is_resumed_begins_the_next_episode(make_e
     assert [(state.episode, state.actions) for state in env.snapshot()] == [(5, None)]
     _, _, dones, infos = walk(env, 1)[0]
     assert dones[0]
-    assert infos[0]["sim_fault"]["episode"] == 4
+    assert infos[0]["palaestra"]["sim_fault"]["episode"] == 4
     assert env.snapshot()[0].episode == 5
 
 
@@ -316,7 +316,7 @@ def test_every_kind_of_fault_is_reported_by_its_name_and_once(make_env, make_mem
 
     rows = walk(env, 5)
 
-    told = [infos[0].get("sim_fault", {}).get("kind") for _, _, _, infos in rows]
+    told = [infos[0]["palaestra"].get("sim_fault", {}).get("kind") for _, _, _, infos in rows]
     assert told == ["hung", None, "wrong_data", None, None]
 
 
@@ -353,7 +353,7 @@ def test_a_sensor_that_is_no_number_is_the_simulator_s_fault(make_env, make_memb
 
     _, _, _, infos = walk(env, 1)[0]
 
-    assert infos[0]["sim_fault"]["kind"] == "wrong_data"
+    assert infos[0]["palaestra"]["sim_fault"]["kind"] == "wrong_data"
 
 
 def test_a_reward_that_is_no_number_is_nobody_s_fault_but_the_environment_s(make_env, make_member):
@@ -379,7 +379,7 @@ def test_a_simulator_that_does_not_come_back_is_tried_again(make_env, make_membe
     rows = walk(env, 4)
 
     assert member.log == ["restart"] * 4
-    assert [infos[0]["valid"] for _, _, _, infos in rows] == [False, False, False, True]
+    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [False, False, False, True]
 
 
 def test_a_spent_budget_ends_the_run(make_env, make_member):
@@ -424,8 +424,8 @@ def test_the_run_goes_on_without_a_simulator_if_enough_are_left(make_member):
 
     assert keepers[0].lost
     assert members[0].log == ["restart", "stop"]
-    assert all(infos[1]["valid"] and infos[2]["valid"] for _, _, _, infos in rows)
-    assert not any(dones[0] or infos[0]["valid"] for _, _, dones, infos in rows)
+    assert all(infos[1]["palaestra"]["valid"] and infos[2]["palaestra"]["valid"] for _, _, _, infos in rows)
+    assert not any(dones[0] or infos[0]["palaestra"]["valid"] for _, _, dones, infos in rows)
     with pytest.raises(FaultBudgetSpent, match="collect-2: 1 restarts"):
         walk(env, 500)
 
@@ -439,7 +439,7 @@ def test_a_member_is_recycled_between_episodes_without_a_fault(make_env, make_me
     rows = walk(env, 9)
 
     assert member.log == ["restart"]
-    assert all(infos[0]["valid"] for _, _, _, infos in rows)
+    assert all(infos[0]["palaestra"]["valid"] for _, _, _, infos in rows)
     assert member.resets == 2
 
 
@@ -467,7 +467,7 @@ def test_members_are_recycled_at_the_same_time(make_env, make_member):
 
     rows = walk(env, 3)
 
-    assert all(info["valid"] for _, _, _, infos in rows for info in infos)
+    assert all(info["palaestra"]["valid"] for _, _, _, infos in rows for info in infos)
 
 
 def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member):
@@ -479,7 +479,7 @@ def test_a_recycling_that_fails_is_a_fault_like_any_other(make_env, make_member)
     rows = walk(env, 5)
 
     assert member.log == ["restart", "restart"]
-    assert [infos[0]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
+    assert [infos[0]["palaestra"]["valid"] for _, _, _, infos in rows] == [True, True, True, False, True]
 
 
 def test_an_error_that_is_no_fault_comes_out_when_all_rows_are_done(make_env, make_member):

@@ -35,7 +35,7 @@ MODULE = """
             SEEN.append((self.word, "start", self.num_timesteps))
 
         def _on_step(self):
-            valid = [info["valid"] for info in self.locals["infos"]]
+            valid = [info["palaestra"]["valid"] for info in self.locals["infos"]]
             SEEN.append((self.word, "step", self.num_timesteps, valid))
             if self.n_calls == self.fail_at:
                 raise RuntimeError("no such plot")

@@ -135,7 +135,7 @@ def test_steps_of_tolerant_environments_count_until_the_program_reports():
     """Only the program knows what it has learned before this attempt."""
     progress = Reported(100, [])
 
-    progress.played(Role.COLLECT, [{}, {"episode": {"r": 1.0, "l": 5}}, {"sim_fault": {}}])
+    progress.played(Role.COLLECT, [{}, {"episode": {"r": 1.0, "l": 5}}, {"palaestra": {"sim_fault": {}}}])
     before = progress.status()
     progress.reports(50, None)
     progress.played(Role.COLLECT, [{}])

@@ -49,7 +49,9 @@ def test_at_the_start_nothing_is_known(progress):
 
 def test_steps_and_episodes_are_counted(progress):
     """An invalid row has no episode."""
-    progress.collected(7, [{"episode": {"r": 2.0, "l": 3}, "extra_steps": 1}, {"valid": False}])
+    progress.collected(
+        7, [{"episode": {"r": 2.0, "l": 3}, "palaestra": {"extra_steps": 1}}, {"palaestra": {"valid": False}}]
+    )
 
     status = progress.status()
 

@@ -57,7 +57,7 @@ def test_a_fault_returns_the_last_observation_as_truncated(make_env):
 
     assert observation.tolist() == before.tolist()
     assert (reward, terminated, truncated) == (0.0, False, True)
-    assert {name: info["sim_fault"][name] for name in ("kind", "simulator", "step")} == {
+    assert {name: info["palaestra"]["sim_fault"][name] for name in ("kind", "simulator", "step")} == {
         "kind": "dead",
         "simulator": "collect-0",
         "step": 1,
@@ -175,7 +175,7 @@ def test_a_step_can_wait_for_the_mending_itself(make_env):
     env, member = make_env(mend_at_once=True, steps={1: WrongData("collect-0", "nonsense")})
     env.reset()
 
-    assert env.step(RIGHT)[4]["sim_fault"]["kind"] == "wrong_data"
+    assert env.step(RIGHT)[4]["palaestra"]["sim_fault"]["kind"] == "wrong_data"
     assert member.log == ["restart"]
 
 
@@ -239,4 +239,4 @@ def test_common_wrappers_can_be_put_around_it(make_players):
 
     assert steps[-1][3]
     assert steps[-1][4]["episode"]["l"] == 4
-    assert steps[-1][4]["sim_fault"]["kind"] == "dead"
+    assert steps[-1][4]["palaestra"]["sim_fault"]["kind"] == "dead"

@@ -72,8 +72,8 @@ def test_the_step_of_a_fault_waits_and_begins_the_next_episode(make_env):
     assert rewards.tolist() == [0.0, -0.1]
     assert (terminations.tolist(), truncations.tolist()) == ([False, False], [True, False])
     assert infos["final_obs"][0][0] == np.float32(0.1)
-    assert infos["final_info"]["sim_fault"]["kind"].tolist() == ["dead", None]
-    assert infos["final_info"]["_sim_fault"].tolist() == [True, False]
+    assert infos["final_info"]["palaestra"]["sim_fault"]["kind"].tolist() == ["dead", None]
+    assert infos["final_info"]["palaestra"]["_sim_fault"].tolist() == [True, False]
 
 
 def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
@@ -85,7 +85,7 @@ def test_several_simulators_that_break_in_one_step_are_mended_at_once(make_env):
 
     assert truncations.tolist() == [True, True, False]
     assert [member.log for member in members] == [["restart"], ["restart", "restart"], []]
-    assert infos["final_info"]["_sim_fault"].tolist() == [True, True, False]
+    assert infos["final_info"]["palaestra"]["_sim_fault"].tolist() == [True, True, False]
 
 
 def test_no_row_of_many_steps_with_faults_is_invalid(make_env):
@@ -187,7 +187,7 @@ def test_stable_baselines3_counts_no_episode_that_a_fault_cut(make_env):
 
     assert dones.tolist() == [True, False]
     assert infos[0]["TimeLimit.truncated"] is True
-    assert infos[0]["sim_fault"]["kind"] == "dead"
+    assert infos[0]["palaestra"]["sim_fault"]["kind"] == "dead"
     assert "episode" not in infos[0]
 
 

@@ -1,10 +1,11 @@
 """The learning algorithms: Stable-Baselines3's, sb3-contrib's and users' own, made safe against faults."""
 
 from palaestra_trainer.algorithms.entries import ALGORITHMS, entry_of
+from palaestra_trainer.algorithms.futile import futile
 from palaestra_trainer.algorithms.kept import begin_with, begun_with, keep
 from palaestra_trainer.algorithms.normalization import normalizer_of, policy_of
 from palaestra_trainer.algorithms.reinforce import REINFORCE
-from palaestra_trainer.algorithms.table import check, make_model
+from palaestra_trainer.algorithms.table import check, make_model, refuse_spaces
 
 __all__ = [
     "ALGORITHMS",
@@ -13,8 +14,10 @@ __all__ = [
     "begun_with",
     "check",
     "entry_of",
+    "futile",
     "keep",
     "make_model",
     "normalizer_of",
     "policy_of",
+    "refuse_spaces",
 ]

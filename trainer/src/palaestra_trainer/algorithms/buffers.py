@@ -21,11 +21,12 @@ from stable_baselines3.common.buffers import (
 )
 
 from palaestra_trainer.algorithms.observations import by_name, part
+from palaestra_trainer.infos import is_valid
 
 
 def valid_rows(infos: Sequence[dict[str, Any]]) -> np.ndarray:
     """Return which rows of a vector step are valid; shape (n_envs,), bool."""
-    return np.array([info.get("valid", True) for info in infos], dtype=bool)
+    return np.array([is_valid(info) for info in infos], dtype=bool)
 
 
 COLUMNS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -106,7 +107,7 @@ class ValidReplayBuffer(ReplayBuffer):
     ) -> None:
         """Append the valid rows; the row before an invalid one ends as truncated."""
         for row, info in enumerate(infos):
-            if info.get("valid", True):
+            if is_valid(info):
                 one = slice(row, row + 1)
                 # In a full buffer this row may have been the newest one of another member.
                 self._newest = [None if newest == self.pos else newest for newest in self._newest]

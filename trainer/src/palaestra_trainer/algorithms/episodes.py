@@ -52,6 +52,11 @@ class EpisodeRecorder:
         ready = [len(episodes) == self._wanted for episodes in self._whole]
         return any(ready) and all(done or away for done, away in zip(ready, self._away, strict=True))
 
+    @property
+    def longest(self) -> int:
+        """Steps of the longest episode that has not ended."""
+        return max(len(episode.rewards) for episode in self._current)
+
     def add(
         self,
         observations: Any,

@@ -5,9 +5,10 @@ Everything that does not fit is refused here, by the spaces alone, before a simu
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
 from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.policies import BasePolicy
@@ -31,12 +32,20 @@ def policy_of_spaces(
     Raises:
         ConfigurationError: the algorithm does not fit the environment; one line for each reason.
     """
-    lines = [*_about_observations(seen), *_about_actions(algorithm.name, entry, acted)]
-    if not lines:
-        lines += [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]
-    if lines:
+    refuse_misfits(algorithm.name, entry, seen, acted)
+    if lines := [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]:
         raise ConfigurationError("\n".join(lines))
     return named_policy(algorithm, entry) or _usual_policy(algorithm.name, entry, seen)
+
+
+def refuse_misfits(name: str, entry: Entry, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
+    """Refuse observations and actions that an algorithm takes wrongly, or not at all.
+
+    Raises:
+        ConfigurationError: one line for each reason.
+    """
+    if lines := [*_about_observations(seen), *_about_actions(name, entry, acted)]:
+        raise ConfigurationError("\n".join(lines))
 
 
 def named_policy(algorithm: Algorithm, entry: Entry) -> str | type[BasePolicy] | None:
@@ -78,24 +87,65 @@ def scalable(space: spaces.Space[Any]) -> list[str] | bool:
     return isinstance(space, spaces.Box) and not is_image_space(space)
 
 
-def _about_observations(seen: spaces.Space[Any]) -> list[str]:
+def refuse_flaws(seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
+    """Refuse spaces that every algorithm of Stable-Baselines3 takes wrongly, or not at all.
+
+    Raises:
+        ConfigurationError: one line for each reason.
+    """
+    if lines := [*_about_observations(seen), *_flaws_of_action(acted)]:
+        raise ConfigurationError("\n".join(lines))
+
+
+def _about_observations(seen: spaces.Space[Any]) -> Iterator[str]:
     parts = seen.spaces if isinstance(seen, spaces.Dict) else {"": seen}
-    return [
-        f"environment.id: its {f'observation {key}'.rstrip()} is a {type(part).__name__}, which no policy "
-        "takes; use Box, Discrete, MultiDiscrete or MultiBinary, or a Dict of these"
-        for key, part in parts.items()
-        if not isinstance(part, KINDS)
-    ]
+    if not parts:
+        yield "environment.id: its observation is a Dict without parts; add one"
+    for key, part in parts.items():
+        what = f"environment.id: its {f'observation {key}'.rstrip()}"
+        if not isinstance(part, KINDS):
+            yield (
+                f"{what} is a {type(part).__name__}, which no policy takes; use Box, Discrete, MultiDiscrete "
+                "or MultiBinary, or a Dict of these"
+            )
+        elif flaw := _flaw(part):
+            yield f"{what} {flaw}"
 
 
-def _about_actions(name: str, entry: Entry, acted: spaces.Space[Any]) -> list[str]:
+def _about_actions(name: str, entry: Entry, acted: spaces.Space[Any]) -> Iterator[str]:
     known = KINDS if entry.actions is None else entry.actions
-    if isinstance(acted, known):
-        return []
-    kinds = " or ".join(kind.__name__ for kind in known)
-    return [
-        f"algorithm.name: {name} needs {kinds} actions, not {type(acted).__name__}; use another algorithm"
-    ]
+    if not isinstance(acted, known):
+        kinds = " or ".join(kind.__name__ for kind in known)
+        fact = f"{name} needs {kinds} actions, not {type(acted).__name__}"
+        yield f"algorithm.name: {fact}; use another algorithm"
+    else:
+        yield from _flaws_of_action(acted)
+
+
+def _flaws_of_action(acted: spaces.Space[Any]) -> Iterator[str]:
+    if flaw := _flaw(acted) or _flaw_of_bounds(acted):
+        yield f"environment.id: its action {flaw}"
+
+
+def _flaw(part: spaces.Space[Any]) -> str:
+    """Return what Stable-Baselines3 would take wrongly in a space, and the remedy; "" if there is nothing."""
+    if isinstance(part, spaces.Discrete | spaces.MultiDiscrete) and np.any(part.start):
+        start = np.asarray(part.start).tolist()
+        return f"counts from {start}, and networks count from 0; count from 0, and add {start} inside"
+    if isinstance(part, spaces.MultiBinary) and len(part.shape) > 1:
+        return f"is a MultiBinary of shape {part.shape}; flatten it"
+    if isinstance(part, spaces.Box) and not part.shape:
+        return "is a single number of shape (); give it the shape (1,)"
+    return ""
+
+
+def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
+    """Return why a Box is no action; an observation may be one."""
+    if not isinstance(acted, spaces.Box):
+        return ""
+    if not np.issubdtype(acted.dtype, np.floating):
+        return f"is a Box of {acted.dtype}, and algorithms send fractions; use float32, or MultiDiscrete"
+    return "" if acted.is_bounded() else "has no bounds; give its Box a finite low and high"
 
 
 def _about_images(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:

@@ -24,6 +24,7 @@ from palaestra_trainer.algorithms.buffers import (
 )
 from palaestra_trainer.configuration import Algorithm, nearest
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.infos import is_valid
 
 log = structlog.get_logger(__name__)
 
@@ -163,7 +164,7 @@ class ValidHerReplayBuffer(ValidDictReplayBuffer, HerReplayBuffer):
         """Append each valid row to its member's column; an invalid one closes the episode before it."""
         actions = action.reshape((self.n_envs, self.action_dim))
         for column, info in enumerate(infos):
-            if not info.get("valid", True):
+            if not is_valid(info):
                 self._cut(column)
                 continue
             row = self._next[column]

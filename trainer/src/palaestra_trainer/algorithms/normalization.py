@@ -67,7 +67,7 @@ class ValidNormalize(VecNormalize):
     """VecNormalize for rows of which some may be invalid.
 
     Args:
-        venv: marks the invalid rows of a step or a reset by `info["valid"]` False.
+        venv: marks the invalid rows of a step or a reset (`palaestra_trainer.infos`).
         wanted: which values to normalize, and where to clip them.
         gamma: discount of the return that rewards are scaled by.
     """

@@ -27,6 +27,7 @@ from stable_baselines3.common.utils import obs_as_tensor, safe_mean
 
 from palaestra_trainer.algorithms.buffers import valid_rows
 from palaestra_trainer.algorithms.episodes import Batch, EpisodeRecorder
+from palaestra_trainer.waiting.episode_end import EpisodeEnd
 
 
 class REINFORCE(BaseAlgorithm):
@@ -160,11 +161,14 @@ class REINFORCE(BaseAlgorithm):
         """Return the whole valid episodes of one update; None if the callback ended training.
 
         At the end of training there may be fewer than `episodes_per_update` of each environment.
+
+        Raises:
+            ConfigurationError: an episode does not end.
         """
         assert self.env is not None  # set in __init__ or by set_env()
         self.policy.set_training_mode(False)
         recorder = EpisodeRecorder(self.env.num_envs, self.episodes_per_update)
-        dones = np.zeros(self.env.num_envs, dtype=bool)
+        dones, end = np.zeros(self.env.num_envs, dtype=bool), EpisodeEnd("REINFORCE")
         callback.on_rollout_start()
         while not recorder.complete:
             observations, actions = self._last_obs, self._act()
@@ -177,6 +181,7 @@ class REINFORCE(BaseAlgorithm):
             self._update_info_buffer(infos, dones)
             self._last_obs = new_obs  # type: ignore[assignment]  # as in Stable-Baselines3
             recorder.add(observations, actions, rewards, dones, valid)
+            end.not_after(recorder.longest)
             self._episode_num += int(dones.sum())
             if dones.any() and self.num_timesteps >= self._total_timesteps:
                 break

@@ -23,7 +23,7 @@ from gymnasium.utils.passive_env_checker import (
     env_reset_passive_checker,
     env_step_passive_checker,
 )
-from gymnasium.wrappers import OrderEnforcing, TimeLimit
+from gymnasium.wrappers import NormalizeObservation, NormalizeReward, OrderEnforcing, TimeLimit
 
 from palaestra_trainer.errors import ConfigurationError
 
@@ -47,6 +47,21 @@ def held(env: gymnasium.Env[Any, Any], name: str) -> gymnasium.Env[Any, Any]:
     if lowest is not None:
         lowest.env = Checked(lowest.env, name)
     return Checked(env, name)
+
+
+def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
+    """Refuse wrappers with statistics of their own: no model keeps them, and each simulator has others.
+
+    Raises:
+        ConfigurationError: there is one.
+    """
+    while isinstance(env, gymnasium.Wrapper):
+        if isinstance(env, NormalizeObservation | NormalizeReward):
+            raise ConfigurationError(
+                f"environment.id: {name}: {type(env).__name__} has statistics that the policy's file lacks, "
+                "other ones in each simulator; remove it, and set algorithm.normalize"
+            )
+        env = env.env
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):

@@ -20,6 +20,7 @@ from palaestra_trainer.environments.move_to_target import REACHED_M, MoveToTarge
 from palaestra_trainer.environments.observation import UNIT_M
 from palaestra_trainer.environments.options import GoalOptions, time_up_terminates
 from palaestra_trainer.environments.rewards import Outcome
+from palaestra_trainer.infos import OURS
 from palaestra_trainer.robots.base import RobotinoAbc, Scene
 
 Numbers = NDArray[np.float32]
@@ -126,7 +127,7 @@ class MoveToTargetGoalEnv(gymnasium.Env[Observation, Any]):
         info = {
             "is_success": reached,
             "outcome": self._outcome(reached=reached).value,
-            "extra_steps": driven["extra_steps"],
+            OURS: driven[OURS],
         }
         reward = float(self.compute_reward(achieved, desired, info))
         info["reward_terms"] = {"reached": reward}

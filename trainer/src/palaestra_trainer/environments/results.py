@@ -6,6 +6,7 @@ from typing import Any
 
 from palaestra_trainer.environments.options import Episodes, time_up_terminates
 from palaestra_trainer.environments.rewards import Outcome, Transition, reward_terms
+from palaestra_trainer.infos import OURS
 
 Result = tuple[float, bool, bool, dict[str, Any]]
 
@@ -23,7 +24,7 @@ def result(step: Transition, options: Episodes, extra_steps: int) -> Result:
         "is_success": outcome is Outcome.REACHED,
         "outcome": outcome.value,
         "reward_terms": terms,
-        "extra_steps": extra_steps,
+        OURS: {"extra_steps": extra_steps},
     }
     time_up, terminates = outcome is Outcome.TIME_UP, time_up_terminates(options)
     terminated = outcome.terminal or (time_up and terminates)

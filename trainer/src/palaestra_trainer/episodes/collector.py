@@ -3,10 +3,11 @@
 Translates gymnasium's step into the row that Stable-Baselines3 expects: reset in the same step,
 `terminal_observation`, `TimeLimit.truncated`, Monitor's `episode`.
 
-Translates a fault into invalid rows (`info["valid"]` False), so that the others need not wait for the broken
-member. The row of the fault ends the episode (done, truncated, `info["sim_fault"]`). The rows after it have
-`info["recovering"]` True. The last of them has `done=True` and the first observation of the next episode.
-After a member was given up, `info["recovering"]` is False, and no last row follows.
+Translates a fault into invalid rows (`valid` is False), so that the others need not wait for the broken
+member. The row of the fault ends the episode (done, truncated, `sim_fault`). In the rows after it
+`recovering` is True. The last of them has `done=True` and the first observation of the next episode. After a
+member was given up, `recovering` is False, and no last row follows. `palaestra_trainer.infos` says where
+these words are.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple
 
+import structlog
 from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
@@ -21,9 +23,12 @@ from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.position import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
 from palaestra_trainer.errors import Diverged, SimulatorFault
+from palaestra_trainer.infos import HIDDEN, OURS, TRUNCATED, of_environment
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Environment, Step
 from palaestra_trainer.waiting.interruption import Check, go_on
+
+log = structlog.get_logger(__name__)
 
 
 class Row(NamedTuple):
@@ -34,7 +39,7 @@ class Row(NamedTuple):
         reward: of this step; 0 in an invalid row.
         done: an episode ended, by its own end, by a time limit, or by a fault; or, in an invalid row,
             another begins.
-        info: what the environment reported, and the keys named in this module's docstring.
+        info: what the environment reported, and the words named in this module's docstring.
     """
 
     observation: Any
@@ -69,6 +74,7 @@ class Collector:
         self._return, self._length = 0.0, 0
         self._actions: ActionLog | None = None
         self._news: dict[str, Any] = {}
+        self._hidden: set[str] = set()
 
     @property
     def env(self) -> Environment:
@@ -93,7 +99,7 @@ class Collector:
             FaultBudgetSpent: the member's restart budget is used up.
         """
         self._actions = None
-        self.reset_info = {"valid": False}
+        self.reset_info = {OURS: {"valid": False}}
         self._return, self._length = 0.0, 0
         if self.keeper.up():
             try:
@@ -142,8 +148,7 @@ class Collector:
         except SimulatorFault as fault:
             self._break(fault)
             return self._invalid(seen=self._observation, done=True)
-        info["valid"] = True
-        info["TimeLimit.truncated"] = truncated and not terminated
+        info = self._said(info) | {TRUNCATED: truncated and not terminated}
         if terminated or truncated:
             info["terminal_observation"] = observation
             info["episode"] = self._summary()
@@ -176,6 +181,17 @@ class Collector:
             self._actions.append(action)
         return step
 
+    def _said(self, info: dict[str, Any]) -> dict[str, Any]:
+        said = of_environment(info, valid=True)
+        for word in said[OURS].get(HIDDEN, {}).keys() - self._hidden:
+            self._hidden.add(word)
+            log.warning(
+                "word of the environment moved: it has a meaning of its own",
+                word=word,
+                now=f'info["{OURS}"]["{HIDDEN}"]["{word}"]',
+            )
+        return said
+
     def _break(self, fault: SimulatorFault) -> None:
         self._news = {
             "sim_fault": {
@@ -193,15 +209,13 @@ class Collector:
         """Return the row of a step that no episode is under way for."""
         seen = self._observation
         self.begin()
-        row = self._invalid(seen, done=self._actions is not None)
-        row.info["recovering"] = not self.keeper.lost
-        return row
+        return self._invalid(seen, done=self._actions is not None, recovering=not self.keeper.lost)
 
-    def _invalid(self, seen: Any, *, done: bool) -> Row:
+    def _invalid(self, seen: Any, *, done: bool, **words: Any) -> Row:
         """Return a row that nothing is learned from; the first one after a fault has its `sim_fault`."""
-        info = {"valid": False, "TimeLimit.truncated": done, "terminal_observation": seen} | self._news
+        words = {"valid": False} | words | self._news
         self._news = {}
-        return Row(self._observation, 0.0, done, info)
+        return Row(self._observation, 0.0, done, {OURS: words, TRUNCATED: done, "terminal_observation": seen})
 
     def _summary(self) -> dict[str, float]:
         seconds = time.monotonic() - self._started

@@ -24,6 +24,7 @@ from palaestra_trainer.episodes.position import EVALUATING, reset_options
 from palaestra_trainer.errors import FaultBudgetSpent, SimulatorFault
 from palaestra_trainer.simulators.keeper import LOOK_EVERY_S, Keeper
 from palaestra_trainer.simulators.member import Member
+from palaestra_trainer.waiting.episode_end import EpisodeEnd
 from palaestra_trainer.waiting.interruption import Check, go_on
 
 
@@ -263,9 +264,10 @@ def _play(
     observation, _ = keeper.reset(seed, reset_options(EVALUATING, number), check)
     info: dict[str, Any] = {}
     memory: Any = None  # the state of a recurrent policy
-    over = False
+    over, end = False, EpisodeEnd("an evaluation")
     while not over:
         check()
+        end.not_after(len(rewards))
         action, memory = policy.predict(observation, memory, np.array([not rewards]), deterministic=True)
         observation, reward, terminated, truncated, info = keeper.step(np.asarray(action)[()])
         keeper.watcher.stepped(1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any, cast
 
@@ -38,9 +39,13 @@ class MembersVecEnv(VecEnv):
         return [env.get_wrapper_attr(attr_name) for env in self._targets(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the chosen environments."""
-        for env in self._targets(indices):
-            setattr(env, attr_name, value)
+        """Set an attribute of the chosen environments, in the wrapper that defines it or behind all of them.
+
+        Stable-Baselines3's own vectors set it in the outermost wrapper, where no environment sees it. A
+        restarted simulator keeps it, and a standby gets it.
+        """
+        for index in self._get_indices(indices):
+            self._keepers[index].set_attribute(attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -57,7 +62,10 @@ class MembersVecEnv(VecEnv):
         return [is_wrapped(env, wrapper_class) for env in self._targets(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return an image of each environment, None if it draws none."""
+        """Return an image of each environment; None of all, and a warning, if they do not draw arrays."""
+        if self.render_mode != "rgb_array":
+            warnings.warn(f"render_mode: is {self.render_mode}; only rgb_array gives images", stacklevel=2)
+            return [None] * self.num_envs
         return [cast("np.ndarray | None", env.render()) for env in self._targets(None)]
 
     def _targets(self, indices: VecEnvIndices) -> list[Environment]:

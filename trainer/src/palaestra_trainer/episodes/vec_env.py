@@ -14,16 +14,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import structlog
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
+from palaestra_trainer.errors import fact_of
+from palaestra_trainer.infos import is_valid
 from palaestra_trainer.simulators.keeper import Keeper, await_one, settle
 from palaestra_trainer.simulators.member import Environment
 from palaestra_trainer.waiting.interruption import Check, go_on
 from palaestra_trainer.waiting.turns import take_turns
+
+log = structlog.get_logger(__name__)
 
 COMPUTE_REWARD = "compute_reward"  # the method of goal environments
 
@@ -114,7 +119,7 @@ class SimulatorsVecEnv(MembersVecEnv):
                 partial(collector.step, action)
                 for collector, action in zip(self._collectors, self._actions, strict=True)
             )
-        if valid := sum(row.info["valid"] for row in rows):
+        if valid := sum(is_valid(row.info) for row in rows):
             self._watcher.stepped(valid)
         dones = np.array([row.done for row in rows])
         if dones.any():
@@ -127,11 +132,14 @@ class SimulatorsVecEnv(MembersVecEnv):
         )
 
     def close(self) -> None:
-        """End background work and close the environments; the caller stops the simulators."""
+        """End background work and close the environments; the caller stops the simulators.
+
+        An environment that raises an error is logged, and the others are closed too.
+        """
         settle(self._keepers)
         for keeper in self._keepers:
             if not keeper.busy:
-                keeper.member.env.close()
+                _close(keeper)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
@@ -152,3 +160,10 @@ class SimulatorsVecEnv(MembersVecEnv):
 
     def _keep_reset_infos(self) -> None:
         self.reset_infos = [collector.reset_info for collector in self._collectors]
+
+
+def _close(keeper: Keeper) -> None:
+    try:
+        keeper.member.env.close()
+    except (Exception, SystemExit) as error:  # code of the job's author may raise anything
+        log.warning("environment not closed", simulator=keeper.name, fact=fact_of(error), exc_info=error)

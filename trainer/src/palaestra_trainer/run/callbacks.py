@@ -147,7 +147,7 @@ def _naming(name: str) -> Iterator[None]:
         yield
     except TrainerError:
         raise  # a fault, a signal: not the callback's
-    except Exception as error:  # whatever code of the job's author raises
+    except (Exception, SystemExit) as error:  # whatever code of the job's author raises
         raise CallbackFailed(f"callback {name}: raised {fact_of(error)}") from error
 
 

@@ -121,7 +121,7 @@ class Conductor(BaseCallback):
         self._selection = Selection(self._run, self.model)
 
     def _on_rollout_start(self) -> None:
-        if self._rollout_ended is not None and self._updates_so_far() != self._updates:
+        if self._rollout_ended is not None and self.updates_so_far() != self._updates:
             self._learning_s = time.monotonic() - self._rollout_ended
         if self._resumed:
             # State-dependent exploration has drawn its noise twice for this rollout.
@@ -152,7 +152,7 @@ class Conductor(BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        self._rollout_ended, self._updates = time.monotonic(), self._updates_so_far()
+        self._rollout_ended, self._updates = time.monotonic(), self.updates_so_far()
         if self._learning_s is not None and self._learning_s >= LONG_LEARNING_S:
             self._env.pause()
             self._resting = True
@@ -160,7 +160,8 @@ class Conductor(BaseCallback):
         if first or self._resting:  # the first update may be long, and so may one like the last
             self._before_update = Tensors.of(self.model)
 
-    def _updates_so_far(self) -> int:
+    def updates_so_far(self) -> int:
+        """Return how often the policy was updated, as far as its algorithm counts it."""
         return int(self.model._n_updates)  # noqa: SLF001 - no public name has it
 
     def _mark_boundary(self) -> None:

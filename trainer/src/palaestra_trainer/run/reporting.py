@@ -18,6 +18,7 @@ from typing import Any
 from palaestra_protocol.pod.status import Cause, Termination
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.configuration import CONFIG_VARIABLE, Configuration, load
+from palaestra_trainer.infos import ours
 from palaestra_trainer.run.termination import write_last_word
 from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
@@ -62,7 +63,7 @@ class Reported(Progress):
 
     def played(self, role: Role, infos: Sequence[Mapping[str, Any]]) -> None:
         """Count a step of environments by the infos of their rows; evaluating ones add no steps."""
-        valid = sum("sim_fault" not in info for info in infos)
+        valid = sum("sim_fault" not in ours(info) for info in infos)
         if valid:
             self.stepped(valid)
         self._evaluates = role is Role.EVALUATE

@@ -66,6 +66,9 @@ def end_of(error: BaseException) -> End:
     for kind, code, reason in ENDS:
         if isinstance(error, kind):
             return End(code, reason, str(error))
+    if isinstance(error, SystemExit | KeyboardInterrupt):
+        fact = "code of the job ended the program, which is for the run to decide"
+        return End(UNEXPECTED, "ProgramEnded", f"{fact} ({fact_of(error)}); raise an error instead")
     if isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}:
         where = error.filename or "the run directory"
         return End(UNEXPECTED, "StorageFull", f"{where}: disk full; free some space")

@@ -25,8 +25,9 @@ from palaestra_trainer.algorithms.divergence import Learner
 from palaestra_trainer.algorithms.replay_size import replay_size
 from palaestra_trainer.checkpoint import Checkpoint
 from palaestra_trainer.configuration import Configuration, dump
+from palaestra_trainer.environments.checking import refuse_statistics
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
-from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError
+from palaestra_trainer.errors import ConfigurationError, Diverged, TrainerError, fact_of
 from palaestra_trainer.run.attempt import Run
 from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
@@ -50,11 +51,17 @@ from palaestra_trainer.telemetry.metrics import constants
 from palaestra_trainer.telemetry.progress import Counters, Progress
 from palaestra_trainer.telemetry.status_server import status_server
 from palaestra_trainer.waiting.interruption import Interruption
+from palaestra_trainer.waiting.leaving import leave_after
 
 log = structlog.get_logger(__name__)
 
 MakeMembers = Callable[[Configuration], Sequence[Member]]
 DONE = End(ExitCode.DONE, "Completed", "the training is complete")
+NOTHING_LEARNED = End(
+    ExitCode.DONE,
+    "Completed",
+    "the training is complete, but nothing was learned: no update was made",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,6 +123,18 @@ def run(
     return int(end.code)
 
 
+def _logged(error: BaseException) -> End:
+    end = end_of(error)
+    if end.reason in {"Unexpected", "CallbackFailed", "ProgramEnded"}:
+        log.error("unexpected error", exc_info=error)
+    return end
+
+
+STOPPED_S = 60.0  # for closing environments and stopping simulators
+# Code of the job's author may end the program, as by sys.exit.
+ENDING = (Exception, SystemExit, KeyboardInterrupt)
+
+
 class Learning(NamedTuple):
     """A model and its environment."""
 
@@ -141,17 +160,29 @@ class Attempt:
         self._callbacks = JobCallbacks([])
 
     def play(self) -> End:
-        """Train, and return how the run ended. It always stops everything that it started."""
+        """Train, and return how the run ended. It always stops everything that it started.
+
+        The first cause decides: an error while everything is stopped is logged, and changes nothing. If that
+        takes too long, the process ends.
+        """
+        with ExitStack() as stack:
+            end = self._trained(stack)
+            hurry = leave_after(STOPPED_S, int(end.code), lambda: write_last_word(self.last_word(end)))
+            try:
+                stack.close()
+            except ENDING as error:
+                log.warning("not everything was stopped in order", fact=fact_of(error), exc_info=error)
+            finally:
+                hurry.cancel()
+        return end
+
+    def _trained(self, stack: ExitStack) -> End:
         try:
             self._directory.path.mkdir(parents=True, exist_ok=True)
-            with ExitStack() as stack:
-                self._train(*self._prepare(stack))
-        except Exception as error:  # the edge of the process: every end has an exit code
-            end = end_of(error)
-            if end.reason in {"Unexpected", "CallbackFailed"}:
-                log.exception("unexpected error")
-            return end
-        return DONE
+            learned = self._train(*self._prepare(stack))
+        except ENDING as error:  # the edge of the process: every end has an exit code
+            return _logged(error)
+        return DONE if learned else NOTHING_LEARNED
 
     def last_word(self, end: End) -> Termination:
         """Return the termination message of an attempt that ends now."""
@@ -212,12 +243,17 @@ class Attempt:
         """Return a new model with its environment; no simulator has to be up."""
         use_threads(self._around.environment)
         wanted = self._configuration
+        task = fleet.collecting[0].member.env
+        algorithms.refuse_spaces(self._algorithm, task.observation_space, task.action_space)
+        refuse_statistics(task, wanted.environment.id)
         judge = make_judge(wanted) if her.wanted(self._algorithm) else None
         env = SimulatorsVecEnv(fleet.collecting, wanted.seed, check=interruption.check, judge=judge)
         stack.callback(env.close)
         replay = replay_size(self._algorithm, env.observation_space, env.action_space, wanted.steps)
         refuse_what_does_not_fit(replay, wanted.checkpoint, capacity_now(self._directory))
         model = algorithms.make_model(self._algorithm, env, wanted.seed, wanted.device)
+        for line in algorithms.futile(model, wanted.steps):
+            log.warning(line)
         if found is None and wanted.initial_policy is not None:
             checkpoint.begin_from(Path(wanted.initial_policy), model)
         return Learning(env, model)
@@ -252,14 +288,17 @@ class Attempt:
             raise ConfigurationError(f"resumeFrom: {another} has no checkpoint; give the run of another job")
         return found
 
-    def _train(self, run: Run, learning: Learning, found: Checkpoint | None) -> None:
+    def _train(self, run: Run, learning: Learning, found: Checkpoint | None) -> bool:
+        """Train to the end; return whether the policy was updated, as far as its algorithm counts it."""
         env, model = learning
         self._forget_what_is_played_again()
         resumed = self._resume(model, env, found) if found else None
         model.set_logger(Curves(self._directory.tensorboard, self._progress))
         with self._progress.spending(Cause.LEARNING):
-            self._learn_with_callbacks(model, Conductor(run, env, resumed))
+            conductor = Conductor(run, env, resumed)
+            self._learn_with_callbacks(model, conductor)
         write_summary(self._directory, summarise(self._directory, self._progress))
+        return self._algorithm.name not in algorithms.ALGORITHMS or conductor.updates_so_far() > 0
 
     def _forget_what_is_played_again(self) -> None:
         """Remove evaluations and curves after the resumed step, which a previous attempt wrote."""

@@ -20,7 +20,9 @@ from typing import Any
 import structlog
 
 from palaestra_protocol.pod.status import Cause
+from palaestra_trainer.copies import copied
 from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
+from palaestra_trainer.simulators.attributes import Attributes
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
 from palaestra_trainer.simulators.member import Member, NullWatcher, Step, Watcher
@@ -68,6 +70,7 @@ class Keeper:
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
         self.meter = Meter(member, self._budget)
+        self._attributes = Attributes()
         self._work: Future[None] | None = None
         self._abandoned = False
         self._recycles_resting = False
@@ -134,6 +137,7 @@ class Keeper:
     ) -> tuple[Any, dict[str, Any]]:
         """Return first observation and info of a new episode, in a recycled member if that is due.
 
+        They are copies, as those of `step`: the environment may go on to write into its own.
         `check` is called every tenth of a second while the member is recycled; raises to wait no longer.
 
         Raises:
@@ -141,26 +145,37 @@ class Keeper:
             Diverged: the observation is not finite.
         """
         self._recycle_when_due(check)
-        observation, info = self.member.env.reset(seed=seed, options=options)
-        check_observation(self.name, self.member.env, observation)
+        env = self.member.env
+        self._attributes.give(env)
+        observation, info = env.reset(seed=seed, options=copied(options))
+        check_observation(self.name, env, observation)
         self.meter.resets += 1
-        return observation, info
+        return copied(observation), copied(info)
 
     def step(self, action: Any) -> Step:
         """Return what the environment's step returns, all of it numbers that can be learned from.
+
+        Observation and info are copies, and the environment gets a copy of the action.
 
         Raises:
             SimulatorFault: it broke; begin to mend it.
             Diverged: observation or reward is not finite.
         """
         began = time.perf_counter() - away_s()
-        step: Step = self.member.env.step(action)
+        observation, reward, terminated, truncated, info = self.member.env.step(copied(action))
         seconds = time.perf_counter() - away_s() - began
         if self.meter.count_step(seconds):
             self.watcher.slow(self.name, seconds)
-        check_observation(self.name, self.member.env, step[0])
-        check_reward(self.name, self.member.env, step[1], step[4])
-        return step
+        check_observation(self.name, self.member.env, observation)
+        check_reward(self.name, self.member.env, reward, info)
+        return copied(observation), reward, terminated, truncated, copied(info)
+
+    def set_attribute(self, name: str, value: Any) -> None:
+        """Set an attribute of the member's environment, where it is defined, and of each that follows it.
+
+        While the keeper is busy, it is set when the next episode begins.
+        """
+        self._attributes.set(name, value, None if self.busy else self.member.env)
 
     def pause(self) -> None:
         """Let the member rest; a broken one is found by the next step that needs it."""

@@ -27,6 +27,7 @@ from palaestra_protocol.pod.status import (
 from palaestra_protocol.pod.terms import Role
 from palaestra_trainer.episodes.evaluation import Evaluation
 from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.infos import extra_steps
 from palaestra_trainer.telemetry.figures import EPISODES_IN_MEAN, Figures
 from palaestra_trainer.telemetry.goodput import Goodput
 from palaestra_trainer.telemetry.standings import AskLeftOut, AskStandby, Standings
@@ -235,7 +236,7 @@ class Progress:
         with self._lock:
             self.step = step
             for info in infos:
-                self.counters.extra_steps += int(info.get("extra_steps", 0))
+                self.counters.extra_steps += extra_steps(info)
                 if (episode := info.get("episode")) is not None:
                     self.counters.episodes += 1
                     self._returns.append(episode["r"])

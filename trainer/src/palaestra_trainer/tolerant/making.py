@@ -149,6 +149,6 @@ def _started(
 
 def _count(progress: Reported, role: Role, rows: Sequence[Row]) -> None:
     infos: list[dict[str, Any]] = [
-        row.info if row.episode is None else {**row.info, "episode": row.episode} for row in rows
+        row.marked | ({} if row.episode is None else {"episode": row.episode}) for row in rows
     ]
     progress.played(role, infos)

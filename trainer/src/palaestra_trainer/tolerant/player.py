@@ -1,20 +1,21 @@
 """One member that plays episodes for a loop that knows nothing of faults.
 
 Each row has valid numbers. A fault ends the episode as truncated, with the last observation before it,
-reward 0 and `info["sim_fault"]`. The member is mended in the background, and the next episode begins once it
-is up.
+reward 0 and `sim_fault` (`palaestra_trainer.infos`). The member is mended in the background, and the next
+episode begins once it is up.
 """
 
 from __future__ import annotations
 
 import time
-from copy import deepcopy
 from typing import Any, NamedTuple
 
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.seeding import np_random
 
+from palaestra_trainer.copies import copied
 from palaestra_trainer.errors import SimulatorFault
+from palaestra_trainer.infos import OURS, of_environment
 from palaestra_trainer.simulators.keeper import Keeper
 from palaestra_trainer.simulators.member import Environment, Step
 
@@ -41,6 +42,12 @@ class Row(NamedTuple):
         """Whether it is the last one of its episode."""
         return self.step[2] or self.step[3]
 
+    @property
+    def marked(self) -> dict[str, Any]:
+        """The info for Stable-Baselines3; the row of a fault has only our words."""
+        cut = self.ended and self.episode is None
+        return self.info if cut else of_environment(self.info)
+
 
 class Player:
     """Plays the episodes of one member.
@@ -56,7 +63,7 @@ class Player:
         self.keeper = keeper
         self.playing = False
         self.observation: Any = None
-        self._last: Any = None  # a copy, since a step that breaks off may have written into the original
+        self._last: Any = None  # a copy, since the training loop may write into the original
         self.reset_info: dict[str, Any] = {}
         self._return, self._length, self._began = 0.0, 0, 0.0
         self._random, _ = np_random()
@@ -94,7 +101,7 @@ class Player:
         except SimulatorFault as fault:
             self.keeper.begin_mending(fault)
             return
-        self._last = deepcopy(self.observation)
+        self._last = copied(self.observation)
         self._return, self._length, self._began = 0.0, 0, time.monotonic()
         self.playing = True
 
@@ -113,7 +120,7 @@ class Player:
         except SimulatorFault as fault:
             return self._cut(fault)
         self.observation, reward, terminated, truncated, _ = step
-        self._last = deepcopy(self.observation)
+        self._last = copied(self.observation)
         self._return += float(reward)
         self._length += 1
         self.playing = not (terminated or truncated)
@@ -122,7 +129,7 @@ class Player:
     def _cut(self, fault: SimulatorFault) -> Row:
         self.keeper.begin_mending(fault, self._length)
         report = {"kind": fault.kind, "simulator": self.keeper.name, "fact": str(fault), "step": self._length}
-        return Row((self._last, 0.0, False, True, {"sim_fault": report}))
+        return Row((self._last, 0.0, False, True, {OURS: {"sim_fault": report}}))
 
     def _summary(self) -> dict[str, float]:
         seconds = time.monotonic() - self._began

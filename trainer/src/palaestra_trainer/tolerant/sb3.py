@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
+from palaestra_trainer.algorithms.fitting import refuse_flaws
 from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
+from palaestra_trainer.infos import TRUNCATED
 from palaestra_trainer.tolerant.player import Row
 from palaestra_trainer.tolerant.players import Players
 
@@ -16,15 +18,20 @@ class TolerantVecEnv(MembersVecEnv):
     """All members step at the same time, as in `TolerantVectorEnv`.
 
     The info of an episode's last step has `terminal_observation`, `TimeLimit.truncated` and the `episode`
-    that Stable-Baselines3's Monitor would add. If a fault cut the episode, it has `sim_fault` and no
-    `episode`, so that `rollout/ep_rew_mean` does not count it.
+    that Stable-Baselines3's Monitor would add. If a fault cut the episode, it has `sim_fault`
+    (`palaestra_trainer.infos`) and no `episode`, so that `rollout/ep_rew_mean` does not count it.
 
     Args:
         players: in the order of the rows.
+
+    Raises:
+        ConfigurationError: Stable-Baselines3 would take the environment's observations or actions wrongly.
     """
 
     def __init__(self, players: Players) -> None:
         self._players = players
+        task = players.all[0].env
+        refuse_flaws(task.observation_space, task.action_space)
         super().__init__([player.keeper for player in players.all])
 
     def reset(self) -> VecEnvObs:
@@ -62,8 +69,8 @@ class TolerantVecEnv(MembersVecEnv):
 
 
 def _info(row: Row) -> dict[str, Any]:
-    observation, _, terminated, truncated, info = row.step
-    limited = {**info, "TimeLimit.truncated": truncated and not terminated}
+    observation, _, terminated, truncated, _ = row.step
+    limited = row.marked | {TRUNCATED: truncated and not terminated}
     if not row.ended:
         return limited
     ended = {**limited, "terminal_observation": observation}

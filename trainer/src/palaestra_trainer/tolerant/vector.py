@@ -20,8 +20,8 @@ class TolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
     """All members step at the same time; an episode that ends is reset in the same step.
 
     The last observation and info of an episode are `infos["final_obs"]` and `infos["final_info"]`. If a fault
-    ended it, `infos["final_info"]["sim_fault"]` is set. The step then waits until that simulator is mended,
-    and the others wait with it: this interface has no row for a simulator that does not step.
+    ended it, `infos["final_info"]["palaestra"]["sim_fault"]` is set. The step then waits until that simulator
+    is mended, and the others wait with it: this interface has no row for a simulator that does not step.
 
     Args:
         players: in the order of the rows.
@@ -75,6 +75,31 @@ class TolerantVectorEnv(VectorEnv[Any, Any, np.ndarray]):
             np.array(truncations, np.bool_),
             infos,
         )
+
+    def call(self, name: str, *arguments: Any, **options: Any) -> tuple[Any, ...]:
+        """Return what a method of each environment returns, or an attribute, as `SyncVectorEnv` does."""
+        found = [player.env.get_wrapper_attr(name) for player in self._players.all]
+        return tuple(each(*arguments, **options) if callable(each) else each for each in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each environment, also one behind wrappers."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of each environment; `values` are one for all, or a list or tuple of one for each.
+
+        Raises:
+            ValueError: the number of values is not that of environments.
+        """
+        each = values if isinstance(values, list | tuple) else [values] * self.num_envs
+        if len(each) != self.num_envs:
+            raise ValueError(f"values: {len(each)} for {self.num_envs} environments; give one for each")
+        for player, value in zip(self._players.all, each, strict=True):
+            player.keeper.set_attribute(name, value)
+
+    def render(self) -> tuple[Any, ...]:
+        """Return what each environment's `render` returns."""
+        return self.call("render")
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the simulators and release them."""

@@ -47,7 +47,7 @@ def leaving_when_asked() -> Iterator[None]:
     first of a container, have no effect, although there is nothing to save yet. While Python exits, a signal
     has no effect, because it would replace the exit code of the run.
     """
-    atexit.register(_ignore)
+    atexit.register(end_undisturbed)
     before = {number: signal.signal(number, _leave) for number in obeyed(SIGNALS)}
     try:
         yield
@@ -56,7 +56,8 @@ def leaving_when_asked() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _ignore() -> None:
+def end_undisturbed() -> None:
+    """Ignore the signals from now on, because the end of the run is decided."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 

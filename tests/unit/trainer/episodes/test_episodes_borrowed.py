@@ -1,0 +1,228 @@
+"""What an environment lends and borrows: it may keep and write into all that it gets or returns.
+
+A hostile environment is played beside one that makes everything anew; nobody may see a difference.
+"""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+import gymnasium
+import numpy as np
+import pytest
+import structlog
+from gymnasium import spaces
+
+from palaestra_trainer.copies import copied
+from palaestra_trainer.episodes.evaluation import evaluate
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.tolerant.env import TolerantEnv
+from palaestra_trainer.tolerant.players import Players
+from palaestra_trainer.tolerant.sb3 import TolerantVecEnv
+from palaestra_trainer.tolerant.vector import TolerantVectorEnv
+
+LENGTH = 3
+STEPS = 8
+OBSERVED = spaces.Dict({"numbers": spaces.Box(-100, 100, (2,), np.float32), "place": spaces.Discrete(9)})
+ACTED = spaces.Box(-1, 1, (2,), np.float32)
+
+
+class Honest(gymnasium.Env):
+    """Episodes of three steps; everything that it returns is new."""
+
+    observation_space, action_space = OBSERVED, ACTED
+
+    def reset(self, *, seed=None, options=None):
+        """Begin; what happened before does not matter."""
+        super().reset(seed=seed)
+        self.step_number, self.sum = 0, np.zeros(2, np.float32)
+        return self.seen(np.full(2, -50, np.float32)), {"begun": [seed is not None, dict(options or {})]}
+
+    def step(self, action):
+        """Add the action."""
+        self.step_number += 1
+        self.sum = self.sum + action
+        seen = self.seen(self.sum + self.step_number)
+        return seen, float(self.sum[0]), False, self.step_number == LENGTH, {"sums": [self.sum.tolist()]}
+
+    def seen(self, numbers):
+        """Return an observation."""
+        return {"numbers": numbers, "place": self.step_number}
+
+
+class Hostile(Honest):
+    """Returns the same objects for its whole life, and writes into all that it gets."""
+
+    def __init__(self):
+        self.numbers = np.zeros(4, np.float32)[::2]  # a view that is not contiguous
+        self.observation = {"numbers": self.numbers, "place": 0}
+        self.sums = []
+        self.info = {}
+
+    def reset(self, *, seed=None, options=None):
+        """Begin, and empty the options."""
+        seen, info = super().reset(seed=seed, options=options)
+        (options or {}).clear()
+        self.info.clear()
+        self.info.update(info)
+        return seen, self.info
+
+    def step(self, action):
+        """Add the action, and overwrite it."""
+        seen, reward, terminated, truncated, info = super().step(action)
+        action *= 0
+        self.info.clear()
+        self.sums[:] = info["sums"]
+        self.info["sums"] = self.sums
+        return seen, reward, terminated, truncated, self.info
+
+    def seen(self, numbers):
+        """Return the only observation."""
+        self.numbers[:] = numbers
+        self.observation["place"] = self.step_number
+        return self.observation
+
+
+class Frozen(Hostile):
+    """Its infos cannot be written into."""
+
+    def reset(self, *, seed=None, options=None):
+        """Begin."""
+        seen, info = super().reset(seed=seed, options=options)
+        return seen, MappingProxyType(info)
+
+    def step(self, action):
+        """Step."""
+        *others, info = super().step(action)
+        return *others, MappingProxyType(info)
+
+
+@pytest.fixture
+def keeper(make_member):
+    """The keeper of a member with an environment."""
+
+    def make(environment):
+        member = make_member("collect-0")
+        member.env = environment()
+        return Keeper(member)
+
+    return make
+
+
+def actions():
+    """Return the actions of one simulator, the same for every environment."""
+    return np.random.default_rng(1).uniform(-1, 1, (STEPS, 1, 2)).astype(np.float32)
+
+
+def collected(keeper):
+    """Return what the training loop gets, and the actions that an exact resume would repeat."""
+    env = SimulatorsVecEnv([keeper], 1)
+    rows = [env.reset(), *(env.step(action) for action in actions())]
+    return rows, env.reset_infos, env.snapshot()[0].actions
+
+
+def tolerated(keeper):
+    """Return what a loop over Stable-Baselines3's interface gets."""
+    env = TolerantVecEnv(Players([keeper], lambda: None))
+    env.seed(1)
+    return [env.reset(), *(env.step(action) for action in actions())], env.reset_infos
+
+
+def vectorized(keeper):
+    """Return what a loop over gymnasium's vector interface gets."""
+    env = TolerantVectorEnv(Players([keeper], lambda: None))
+    return [env.reset(seed=1, options={"word": 1}), *(env.step(action) for action in actions())]
+
+
+def alone(keeper):
+    """Return what a loop over a single environment gets."""
+    env = TolerantEnv(Players([keeper], lambda: None))
+    rows = []
+    for number, [action] in enumerate(actions()):
+        if number % LENGTH == 0:
+            rows.append(env.reset(seed=1, options={"word": 1}))
+        rows.append(env.step(action))
+    return rows
+
+
+def evaluated(keeper):
+    """Return the episodes of an evaluation."""
+    return [episode.record() for episode in evaluate(Fixed(), keeper, [1, 2]).episodes]
+
+
+class Fixed:
+    """A policy that returns the same array each time."""
+
+    action = np.array([0.5, -0.5], np.float32)
+
+    def predict(self, _observation, state=None, _episode_start=None, **_options):
+        """Return it."""
+        return self.action, state
+
+
+def plain(value):
+    """Return a value with its arrays as lists, and without the seconds of episodes."""
+    if isinstance(value, dict):
+        return {key: plain(part) for key, part in value.items() if key != "t"}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    return plain(value.tolist()) if isinstance(value, np.ndarray | np.generic) else value
+
+
+@pytest.mark.parametrize("played", [collected, tolerated, vectorized, alone, evaluated])
+@pytest.mark.parametrize("hostile", [Hostile, Frozen])
+def test_what_an_environment_does_with_its_objects_changes_nothing(keeper, played, hostile):
+    """Else a last observation is the next episode's first, and an exact resume repeats other actions."""
+    assert plain(played(keeper(hostile))) == plain(played(keeper(Honest)))
+
+
+def test_actions_of_the_training_loop_stay_as_they_are(keeper):
+    """They go into the buffer after the step."""
+    given = actions()[0]
+    env = SimulatorsVecEnv([keeper(Hostile)], 1)
+    env.reset()
+
+    env.step(given)
+
+    assert (given == actions()[0]).all()
+
+
+class WithWords(Honest):
+    """Its infos have words of their own that mean something else here, and in Stable-Baselines3."""
+
+    def step(self, action):
+        """Step."""
+        *others, _ = super().step(action)
+        words = ("valid", "episode", "sim_fault", "recovering", "extra_steps", "terminal_observation")
+        return *others, {**dict.fromkeys(words, "mine"), "palaestra": "mine"}
+
+
+def test_words_of_an_environment_are_not_taken_for_ours(keeper):
+    """They stay, but for those that only Stable-Baselines3 may say: these are moved, and a line says so."""
+    env = SimulatorsVecEnv([keeper(WithWords)], 1)
+    env.reset()
+    with structlog.testing.capture_logs() as logged:
+        infos = [env.step(action)[3][0] for action in actions()]
+
+    assert [info["palaestra"]["valid"] for info in infos] == [True] * STEPS
+    assert {(info["valid"], info["sim_fault"], info["extra_steps"]) for info in infos} == {("mine",) * 3}
+    assert [info["episode"]["l"] for info in infos if "episode" in info] == [LENGTH] * (STEPS // LENGTH)
+    hidden = {"episode": "mine", "terminal_observation": "mine", "palaestra": "mine"}
+    assert [info["palaestra"]["hidden"] for info in infos] == [hidden] * STEPS
+    assert sorted(line["word"] for line in logged) == sorted(hidden)
+
+
+def test_a_copy_shares_nothing_that_can_be_written_into():
+    """Objects of other classes are shared: a robot in an info cannot be copied."""
+    robot = object()
+    value = {"array": np.zeros((2, 2), order="F"), "parts": [({1, 2}, bytearray(b"a"))], "robot": robot}
+
+    copy = copied(MappingProxyType(value))
+    value["array"][0, 0] = 7
+    value["parts"][0][0].add(3)
+    value["parts"][0][1][0] = 0
+
+    assert copy["array"].sum() == 0
+    assert copy["parts"] == [({1, 2}, bytearray(b"a"))]
+    assert copy["robot"] is robot

@@ -1,0 +1,189 @@
+"""What code of a job's author does at the end of a run, or to end it: the first cause decides."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+from stable_baselines3.common.callbacks import BaseCallback
+
+from palaestra_trainer.run import training
+from palaestra_trainer.run_directory import RunDirectory
+from palaestra_trainer.waiting.leaving import leave_after
+
+AT_STEP = 5
+
+
+class Task(gymnasium.Env):
+    """A task that does something of its own at a step, and something when it is closed."""
+
+    observation_space = spaces.Box(-1, 1, (1,), np.float32)
+    action_space = spaces.Discrete(2)
+
+    def __init__(self, amid, at_close):
+        self.amid, self.at_close, self.closed, self.taken = amid, at_close, False, 0
+
+    def reset(self, *, seed=None, options=None):
+        """Begin."""
+        super().reset(seed=seed, options=options)
+        return np.zeros(1, np.float32), {}
+
+    def step(self, action):
+        """Step."""
+        del action
+        self.taken += 1
+        numbers = np.zeros(1, np.float32)
+        if self.taken == AT_STEP and self.amid:
+            numbers = self.amid() or numbers
+        return numbers, 0.0, self.taken % 4 == 0, False, {}
+
+    def close(self):
+        """Close."""
+        self.closed = True
+        self.at_close()
+
+
+class Leaves(BaseCallback):
+    """Ends the program."""
+
+    def _on_step(self):
+        sys.exit(0)
+
+
+def fails():
+    """Raise an error."""
+    raise RuntimeError("my close failed")
+
+
+def leaves():
+    """End the program."""
+    sys.exit(0)
+
+
+def diverges():
+    """Return what is not finite."""
+    return np.full(1, np.nan, np.float32)
+
+
+def breaks():
+    """Raise an error."""
+    raise RuntimeError("my first cause")
+
+
+def is_asked_to_end():
+    """Get a signal."""
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.fixture
+def play(make_member, make_configuration, tmp_path, monkeypatch):
+    """Train in two simulators of such a task; return exit code, last word and the tasks."""
+    word = tmp_path / "word"
+    monkeypatch.setenv("PALAESTRA_TERMINATION_LOG", str(word))
+
+    def run(amid=None, at_close=lambda: None, callbacks=()):
+        tasks = []
+
+        def make_members(given):
+            members = [make_member(entry.name) for entry in given.simulators]
+            for member in members:
+                member.env = Task(amid if not tasks else None, at_close)
+                tasks.append(member.env)
+            return members
+
+        configuration = make_configuration(
+            algorithm={
+                "name": "PPO",
+                "hyperparameters": {"n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [4]}},
+                "callbacks": [{"name": f"{__name__}:{each.__name__}"} for each in callbacks],
+            },
+            collectors=2,
+            steps=32,
+            evaluation={"everySteps": 0},
+        )
+        code = training.run(configuration, RunDirectory(tmp_path / "run"), make_members)
+        return code, json.loads(word.read_text())["reason"], tasks
+
+    return run
+
+
+@pytest.mark.parametrize("at_close", [fails, leaves])
+@pytest.mark.parametrize(
+    ("amid", "code", "reason"),
+    [
+        (None, 0, "Completed: "),
+        (is_asked_to_end, 75, "Interrupted: SIGTERM"),
+        (diverges, 81, "Diverged: "),
+        (breaks, 1, "Unexpected: RuntimeError: my first cause"),
+    ],
+)
+def test_an_environment_that_fails_to_close_changes_no_end(play, amid, at_close, code, reason):
+    """The others are closed too."""
+    found, word, tasks = play(amid, at_close)
+
+    assert found == code
+    assert word.startswith(reason)
+    assert [task.closed for task in tasks[:2]] == [True, True]
+
+
+def test_an_environment_cannot_end_the_program_as_if_the_run_were_complete(play):
+    """The exit code 0 of a library would be that of a run without a model."""
+    code, word, _ = play(leaves)
+
+    assert code == 1
+    assert word.startswith("ProgramEnded: ")
+    assert f"SystemExit: 0, in {__file__} line" in word
+
+
+def test_a_callback_cannot_end_the_program_as_if_the_run_were_complete(play):
+    """It returns False to stop training, or raises an error."""
+    code, word, _ = play(callbacks=[Leaves])
+
+    assert code == 1
+    assert word.startswith("CallbackFailed: ")
+    assert "SystemExit: 0" in word
+
+
+def test_an_environment_that_hangs_when_it_is_closed_does_not_keep_the_run():
+    """What was decided before is the end."""
+    left = []
+
+    leave_after(0.05, 75, lambda: left.append("word"), left.append).join(20)
+
+    assert left == ["word", 75]
+
+
+LIVES_ON = """
+import sys, threading, time
+from palaestra_trainer import cli
+from palaestra_trainer.telemetry.logs import configure_logs
+configure_logs()
+cli.train, cli.LEFT_S = lambda: 75, 1.0
+threading.Thread(target=time.sleep, args=(300,), name="mine").start()
+code = cli.train_and_leave()
+print("ended", flush=True)
+sys.exit(code)
+"""
+
+
+def test_a_thread_that_lives_on_does_not_keep_the_program():
+    """It ends soon with its code, whatever signals come; the thread is named."""
+    with subprocess.Popen(
+        [sys.executable, "-c", LIVES_ON], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdout.readline() == "ended\n"
+        program.send_signal(signal.SIGTERM)
+        began = time.monotonic()
+        said = program.stderr.read()
+
+    assert program.returncode == 75
+    assert "mine" in said
+    assert time.monotonic() - began < 60

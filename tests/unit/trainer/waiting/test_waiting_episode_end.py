@@ -1,0 +1,72 @@
+"""An episode that does not end, and those who wait for its end."""
+
+from __future__ import annotations
+
+import pytest
+import structlog
+
+from palaestra_trainer.algorithms.reinforce import REINFORCE
+from palaestra_trainer.episodes.evaluation import evaluate
+from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
+from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.simulators.keeper import Keeper
+from palaestra_trainer.testing import FakeTask
+from palaestra_trainer.testing.fake_task import ACTIONS, OBSERVATIONS
+from palaestra_trainer.waiting import episode_end
+from palaestra_trainer.waiting.episode_end import SAY_EVERY_S, EpisodeEnd
+
+
+class Endless(FakeTask):
+    """A task without an end."""
+
+    def step(self, action):
+        """Step."""
+        observation, reward, _, _, info = super().step(action)
+        return observation, reward, False, False, info
+
+
+class First:
+    """A policy that takes the first action."""
+
+    def predict(self, _observation, state=None, _episode_start=None, **_options):
+        """Return it."""
+        return 0, state
+
+
+@pytest.fixture
+def keeper(make_member):
+    """The keeper of a member with the task."""
+    member = make_member("collect-0")
+    member.env = Endless(OBSERVATIONS["Box"], ACTIONS["Discrete"])
+    return Keeper(member)
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Wait for a few steps only."""
+    monkeypatch.setattr(episode_end, "MOST_STEPS", 50)
+
+
+def test_an_evaluation_gives_an_endless_episode_up(keeper):
+    """A policy that stands still would keep the run for ever, and its steps count as progress."""
+    with pytest.raises(ConfigurationError, match="not ended after 50 steps, and an evaluation waits"):
+        evaluate(First(), keeper, [1])
+
+
+def test_reinforce_gives_an_endless_episode_up(keeper):
+    """It learns from whole episodes."""
+    model = REINFORCE("MlpPolicy", SimulatorsVecEnv([keeper], 1), policy_kwargs={"net_arch": [4]})
+
+    with pytest.raises(ConfigurationError, match="REINFORCE waits for its end; return truncated after"):
+        model.learn(30)
+
+
+def test_a_long_episode_is_a_line_in_the_log_every_minute(clock):
+    """Else nothing is heard of a run that goes on."""
+    end = EpisodeEnd("an evaluation", clock)
+    with structlog.testing.capture_logs() as logged:
+        for steps in range(40):
+            clock.now += SAY_EVERY_S / 10
+            end.not_after(steps)
+
+    assert [line["steps"] for line in logged] == [9, 19, 29, 39]

@@ -1,0 +1,45 @@
+"""Episodes that do not end, where somebody waits for their end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import structlog
+
+from palaestra_trainer.errors import ConfigurationError
+
+log = structlog.get_logger(__name__)
+
+MOST_STEPS = 100_000
+SAY_EVERY_S = 60.0
+REMEDY = "return truncated after a number of steps, or register it with max_episode_steps"
+
+
+class EpisodeEnd:
+    """Waits for the end of an episode: says every minute that it goes on, and gives up after so many steps.
+
+    Args:
+        waits: the name of the waiting part, for messages.
+        clock: returns seconds.
+    """
+
+    def __init__(self, waits: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._waits = waits
+        self._clock = clock
+        self._say_at = clock() + SAY_EVERY_S
+
+    def not_after(self, steps: int) -> None:
+        """Take note of the steps of the episode so far.
+
+        Raises:
+            ConfigurationError: there are too many.
+        """
+        if steps >= MOST_STEPS:
+            raise ConfigurationError(
+                f"environment.id: an episode has not ended after {steps} steps, and {self._waits} waits for "
+                f"its end; {REMEDY}"
+            )
+        if self._clock() >= self._say_at:
+            self._say_at = self._clock() + SAY_EVERY_S
+            log.warning("an episode goes on", waits=self._waits, steps=steps, most=MOST_STEPS)

@@ -1,0 +1,50 @@
+"""End the process in time, whatever code of the job's author still does.
+
+A method `close` that hangs, a thread that lives on and a function that waits at the exit of Python would each
+keep a run that is complete, and its pod, for ever.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import sys
+import threading
+from collections.abc import Callable
+
+import structlog
+
+log = structlog.get_logger(__name__)
+
+
+def nothing() -> None:
+    """Do nothing."""
+
+
+def leave_after(
+    seconds: float,
+    code: int,
+    before: Callable[[], None] = nothing,
+    leave: Callable[[int], object] = os._exit,
+) -> threading.Timer:
+    """Return a running timer that ends the process; cancel it if it need not.
+
+    Args:
+        seconds: from now.
+        code: the exit code.
+        before: called before the process ends.
+        leave: ends the process.
+    """
+
+    def end() -> None:
+        others = [thread for thread in threading.enumerate() if not thread.daemon]
+        names = [thread.name for thread in others if thread is not threading.main_thread()]
+        log.warning("ended although code of the job goes on", after_s=seconds, threads=names)
+        faulthandler.dump_traceback(sys.__stderr__ or 2, all_threads=True)
+        before()
+        leave(code)
+
+    timer = threading.Timer(seconds, end)
+    timer.name, timer.daemon = "leaving", True
+    timer.start()
+    return timer
