@@ -19,13 +19,14 @@ class Outcome:
     """The result of a replica's run; a value that was not measured is None.
 
     `exit_code` is the last trainer's, unless the run was killed or took too long; `interrupted`: a person
-    ended it. `faults` counts those of all simulators and pods. `trained_share` is the part of the wall clock,
-    0 to 1, that was spent on steps and on learning from them.
+    ended it. `saved` is the step of the newest checkpoint. `faults` counts those of all simulators and pods.
+    `trained_share` is the part of the wall clock, 0 to 1, that was spent on steps and on learning from them.
     """
 
     exit_code: int
     reason: str = ""
     steps: int | None = None
+    saved: int | None = None
     success_rate: float | None = None
     steps_per_second: float | None = None
     trained_share: float | None = None

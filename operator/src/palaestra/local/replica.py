@@ -19,10 +19,12 @@ from palaestra.local.pod import Kubelet, RunningPod
 from palaestra.local.spec import Pod, read_pod
 from palaestra.local.volumes import mount
 from palaestra.plan import ReplicaPlan
+from palaestra.plan.containers import BUILT_IN
 from palaestra_protocol.pod.status import ExitCode
 
 FAILED = 1
 DEADLINE_EXCEEDED = "DeadlineExceeded"
+ENDED_BY_OTHERS = "ProgramEnded: the trainer ended with exit code 0, and did not report that it was complete"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +56,7 @@ async def run_replica(planned: ReplicaPlan, setting: Setting) -> Outcome:
         while True:
             pods += 1
             code = await _run_pod(planned, setting, interrupt)
-            outcome = _outcome(setting.directory, code, pods)
+            outcome = _outcome(planned, setting.directory, code, pods)
             if interrupt.asked.is_set():
                 return _ended_early(outcome, interrupt)
             if not tries.another(verdict(planned.job, outcome.exit_code), outcome.steps or 0):
@@ -118,20 +120,33 @@ def _ended_early(outcome: Outcome, interrupt: Interrupt) -> Outcome:
     return outcome
 
 
-def _outcome(directory: Path, code: int | None, pods: int) -> Outcome:
-    """Return the outcome from the trainer's report, in summary.json or in its termination message."""
+def _outcome(planned: ReplicaPlan, directory: Path, code: int | None, pods: int) -> Outcome:
+    """Return the outcome from the trainer's report, in summary.json or in its termination message.
+
+    An exit code 0 of the built-in loop without a report is not its own: a library has ended the process.
+    """
     word, summary = _json(_termination(directory)), _json(directory / "summary.json")
     said = {**word, **summary}
+    code = int(ExitCode.INTERRUPTED) if code is None else code
+    if code == ExitCode.DONE and not said and _trains_by_itself(planned):
+        code, said["reason"] = FAILED, ENDED_BY_OTHERS
+    checkpoint = word.get("last_checkpoint")
     return Outcome(
-        exit_code=int(ExitCode.INTERRUPTED) if code is None else code,
+        exit_code=code,
         reason=str(said.get("reason", "")),
         steps=said.get("step", said.get("steps")),
+        saved=checkpoint.get("step") if isinstance(checkpoint, dict) else None,
         success_rate=said.get("success_rate"),
         steps_per_second=summary.get("steps_per_second"),
         trained_share=summary.get("trained_share"),
         faults=summary.get("faults"),
         pods=pods,
     )
+
+
+def _trains_by_itself(planned: ReplicaPlan) -> bool:
+    (trainer,) = planned.job["spec"]["template"]["spec"]["containers"]
+    return bool(trainer.get("command") == [BUILT_IN])
 
 
 def _termination(directory: Path) -> Path:

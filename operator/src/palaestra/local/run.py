@@ -148,7 +148,8 @@ def _shown(planned: ReplicaPlan, options: Options, *, on_terminal: bool) -> tupl
 def _tell(outcome: Outcome, path: Path) -> None:
     if outcome.exit_code == ExitCode.INTERRUPTED:
         place = "before it trained" if outcome.steps is None else f"at step {outcome.steps}"
-        say(f"interrupted {place}; the same command goes on from there")
+        after = "there" if outcome.saved in {None, outcome.steps} else f"step {outcome.saved}"
+        say(f"interrupted {place}; the same command goes on from {after}")
     elif outcome.exit_code == KILLED:
         say("killed; the same command goes on from the newest checkpoint")
     elif outcome.reason == DEADLINE_EXCEEDED:

@@ -16,6 +16,7 @@ from palaestra.plan.worlds import world_path
 Container = dict[str, Any]
 
 SIDECAR = "palaestra-sidecar"
+BUILT_IN = "palaestra-train"  # the program of a job without a command
 SECURITY = {
     "allowPrivilegeEscalation": False,
     "capabilities": {"drop": ["ALL"]},
@@ -97,7 +98,7 @@ def trainer(replica: Replica) -> Container:
         "name": TRAINER,
         "image": _trainer_image(replica),
         "imagePullPolicy": spec.image_pull_policy.value,
-        "command": [literal(word) for word in spec.command] or ["palaestra-train"],
+        "command": [literal(word) for word in spec.command] or [BUILT_IN],
         "ports": [_port("metrics", port)],
         "terminationMessagePath": places.termination,
         "terminationMessagePolicy": "FallbackToLogsOnError",
