@@ -125,7 +125,7 @@ WRONG = [
     ("spec.simulators.0.env", [{"name": "A-B", "value": "x"}], "env[0].name"),
     ("spec.simulators.0.resources", {"requests": {"cpu": "lots"}}, "resources.requests.cpu"),
     ("spec.trainer.steps", 0, "spec.trainer.steps"),
-    ("spec.trainer.environment.id", "MoveToTarget", "spec.trainer.environment.id"),
+    ("spec.trainer.environment.id", "Move To Target", "spec.trainer.environment.id"),
     ("spec.trainer.environment.reward", "Medium", "spec.trainer.environment.reward: Unsupported value"),
     ("spec.trainer.algorithm.name", "DDQN", "spec.trainer.algorithm.name"),
     ("spec.trainer.evaluation", {"stopAtSuccessRate": 0}, "stopAtSuccessRate"),

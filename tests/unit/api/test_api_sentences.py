@@ -91,8 +91,8 @@ SENTENCES = [
     ({"simulators.0.world": {"file": "hall.wbt"}},
      ('spec.simulators[0].world.file: "hall.wbt" is not the path of a world; '
      "give the absolute path of a .wbt or .xml file")),
-    ({"trainer.environment.id": "MoveToTarget"},
-     ('spec.trainer.environment.id: "MoveToTarget" is not the id of an environment; '
+    ({"trainer.environment.id": "Move To Target"},
+     ('spec.trainer.environment.id: "Move To Target" is not the id of an environment; '
      "write it as in gymnasium's registry, such as MoveToTargetEnv-v0")),
     ({"storage": {"existingClaim": "runs", "resumeFrom": "../other"}},
      ('spec.storage.resumeFrom: "../other" is not the name of a folder; '

@@ -9,7 +9,7 @@ def test_the_page_has_a_row_for_each_check_in_its_order():
     rows = page.table().splitlines()[2:]
 
     assert len(rows) == len(JUDGED)
-    assert rows[0] == "| 1 | ended | `job_is_complete` | The Job is complete, and so is the training. |"
+    assert rows[1] == "| 2 | ended | `job_is_complete` | The Job is complete, and so is the training. |"
 
 
 def test_the_first_line_of_a_check_fits_into_a_cell():

@@ -221,3 +221,27 @@ def test_what_the_trainer_said_last_stays_in_the_status(training, last_word, sim
     replica = scene.replica()
     assert (replica.step, replica.target, replica.success_rate) == (100, 100, 0.9)
     assert (replica.mean_return, replica.steps_per_second) == (1.5, None)
+
+
+def complete(training, *, word="", **spec):
+    """Return the status of a job whose trainer has ended with exit code 0."""
+    scene, pod = training(**spec)
+    scene.end(pod, 0, word)
+    scene.end_job("Complete")
+    scene.settle()
+    return scene.status
+
+
+def test_an_exit_code_0_without_a_report_is_no_complete_training(training, last_word):
+    """A library that calls exit(0) leaves no model; a program of the author's own reports nothing."""
+    silent = complete(training)
+    reported = complete(training, word=last_word(reason="Completed: the training is complete"))
+    own = complete(training, trainer={"command": ["python", "train.py"]})
+
+    assert [each.phase for each in (silent, reported, own)] == [
+        Phase.FAILED,
+        Phase.SUCCEEDED,
+        Phase.SUCCEEDED,
+    ]
+    assert silent.replicas[0].reason == "TrainerFailed"
+    assert "exit code 0, and did not report that it was complete" in silent.replicas[0].message

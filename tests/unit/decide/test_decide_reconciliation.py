@@ -24,10 +24,10 @@ def test_a_job_that_trains_is_as_its_spec_asks(training):
     assert gaps(scene.status) == {}
 
 
-def test_a_job_that_has_succeeded_is_as_its_spec_asks(training):
+def test_a_job_that_has_succeeded_is_as_its_spec_asks(training, last_word):
     """It stays in the repository after its end."""
     scene, pod = training()
-    scene.end(pod, 0)
+    scene.end(pod, 0, last_word(reason="Completed: the training is complete"))
     scene.end_job("Complete")
     scene.settle()
 

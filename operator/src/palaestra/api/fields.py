@@ -57,7 +57,7 @@ POLICY = f"^([A-Za-z_][A-Za-z0-9_]*|{CLASS})$"
 CLASS_NAME = f"^{CLASS}$"
 ROBOT = f"^({'|'.join(ROBOTS)}|{CLASS})$"
 POLICY_FILE = "^(/.+|[A-Za-z0-9_][-A-Za-z0-9._]*(/[A-Za-z0-9_][-A-Za-z0-9._]*)*)[.]zip$"
-ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+-v[0-9]+$"
+ENVIRONMENT_ID = "^([A-Za-z0-9_.]+:)?([-A-Za-z0-9_.]+/)?[-A-Za-z0-9_.]+$"  # -vN may be missing
 
 # The message for a value that does not match: <value> is not <first text>; <second text>
 PATTERNS: dict[str, tuple[str, str]] = {

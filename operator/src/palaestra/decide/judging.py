@@ -143,6 +143,7 @@ _NO_TROUBLE = frozenset({Reason.STARTING, Reason.TRAINING, Reason.DISRUPTED, Rea
 SHOWN = frozenset({Kind.COUNTED, Kind.WAITING, Kind.SHOWN})  # sets the reason of a replica that continues
 
 JUDGED: tuple[tuple[Kind, Check], ...] = (
+    (Kind.ENDED, outcomes.ended_by_others),
     (Kind.ENDED, outcomes.job_is_complete),
     (Kind.ENDED, outcomes.stopped),
     (Kind.ENDED, outcomes.would_end_the_same),
