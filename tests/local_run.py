@@ -157,17 +157,17 @@ class LocalRun:
         return found[0]["counters"] if found else {}
 
     def processes(self):
-        """Return pid and command line of everything below the runner."""
+        """Return pid and words of the command line of everything below the runner."""
         return list(below(self.process.pid))
 
     def pids(self, program, simulator=""):
         """Return the processes of a program, of those that serve one simulator if it is named."""
         return [
             pid
-            for pid, command in self.processes()
-            if any(word.endswith(program) for word in command.split()[:4])
-            and simulator in command
-            and (program == REAPER or REAPER not in command)
+            for pid, words in self.processes()
+            if any(word.endswith(program) for word in words[:4])
+            and any(simulator in word for word in words)
+            and (program == REAPER or not any(REAPER in word for word in words))
         ]
 
     def pid_of(self, program, simulator=""):
@@ -191,15 +191,15 @@ def running(job):
 
 
 def below(ancestor):
-    """Yield pid and command line of every process below `ancestor`."""
+    """Yield pid and words of the command line of every process below `ancestor`."""
     table = {}
     for directory in Path("/proc").glob("[0-9]*"):
         try:
             parent = int((directory / "stat").read_text().rpartition(")")[2].split()[1])
-            command = (directory / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+            words = (directory / "cmdline").read_bytes().decode().split("\0")
         except OSError:
             continue
-        table[int(directory.name)] = (parent, command)
+        table[int(directory.name)] = (parent, words)
     wanted = {ancestor}
     while wanted:
         wanted = {pid for pid, (parent, _) in table.items() if parent in wanted}

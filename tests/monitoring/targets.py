@@ -28,7 +28,8 @@ def of_operator(address: str, pod: str = "palaestra-operator-0") -> Target:
 def _sidecars(run: LocalRun) -> Iterator[tuple[str, str]]:
     """Yield the name of each simulator and the address of its sidecar's port for health and metrics."""
     names = {simulator["control"]: simulator["name"] for simulator in run.training()["simulators"]}
-    for _, command in run.processes():
+    for _, words in run.processes():
+        command = " ".join(words)
         if "palaestra-sidecar" in command and (found := ADDRESSES.search(command)):
             control, health = found.groups()
             yield names[f"http://{control}"], health

@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from palaestra.cluster import connect
+from tests.control_plane.programs import programs
 from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[3]
@@ -41,7 +43,8 @@ def gone(pid):
 
 
 def owner(*arguments):
-    """Start `python -m tests.control_plane`, or another module of it."""
+    """Start `python -m tests.control_plane`, or another module of it, where the programs are built."""
+    programs()
     module = ".".join(("tests.control_plane", *arguments[:1]))
     command = [sys.executable, "-m", module, *arguments[1:]]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
@@ -86,14 +89,16 @@ def test_no_process_of_it_outlives_a_killed_owner():
 
 def test_the_control_plane_of_a_run_ends_with_the_run_however_that_ends(tmp_path):
     """Pytest's own process may be killed; another process, which no worker waits for, runs the plane."""
-    with subprocess.Popen(["sleep", "600"]) as run:
-        folder = tmp_path / "plane"
-        folder.mkdir()
-        with owner("shared", str(folder), str(run.pid)) as keeper:
-            started = eventually(lambda: set((found := children(keeper.pid)).values()) >= FIRST and found)
-            run.kill()
-            run.wait()
-            keeper.wait(60)
+    folder = tmp_path / "plane"
+    folder.mkdir()
+    with ExitStack() as stack:
+        run = stack.enter_context(subprocess.Popen(["sleep", "600"]))
+        stack.callback(run.kill)
+        keeper = stack.enter_context(owner("shared", str(folder), str(run.pid)))
+        started = eventually(lambda: set((found := children(keeper.pid)).values()) >= FIRST and found)
+        run.kill()
+        run.wait()
+        keeper.wait(60)
 
     assert all_gone(started)
     assert not folder.exists()

@@ -272,7 +272,9 @@ def test_kubectl_finds_the_plugin_and_hands_it_its_options(control_plane, place,
     """`kubectl palaestra get` is `palaestra get`."""
     place.train("a")
     plugin = tmp_path / "kubectl-palaestra"
-    plugin.write_text(f"#!{sys.executable}\nimport sys\nfrom palaestra.cli import main\nsys.exit(main())\n")
+    program = tmp_path / "program.py"
+    program.write_text("import sys\nfrom palaestra.cli import main\nsys.exit(main())\n")
+    plugin.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{program}" "$@"\n')
     plugin.chmod(0o755)
 
     done = subprocess.run(

@@ -188,7 +188,7 @@ def test_all_of_it_ends_with_the_program_also_after_sigkill(job, tmp_path, fork)
     try:
         program.stdout.readline()
         eventually((tmp_path / "desk/0/begun").exists, PATIENCE_S)
-        pids = [pid for pid, command in below(program.pid) if "palaestra.run(" not in command]
+        pids = [pid for pid, words in below(program.pid) if "palaestra.run(" not in " ".join(words)]
         program.kill()
         program.wait(PATIENCE_S)
 

@@ -102,7 +102,7 @@ class Desk:
         self.write(program)
         process = self.start()
         eventually((self.run_directory / "begun").exists)
-        eventually(lambda: sum("palaestra-stub" in command for _, command in below(process.pid)) >= 2)
+        eventually(lambda: sum("palaestra-stub" in " ".join(words) for _, words in below(process.pid)) >= 2)
         return process, [pid for pid, _ in below(process.pid)]
 
     def run(self, *options: str) -> tuple[int, str]:

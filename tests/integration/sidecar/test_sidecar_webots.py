@@ -1,5 +1,6 @@
 """Driver webots, with a program that looks for controllers as Webots does."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ Robot { name "robotino" controller "ros" supervisor TRUE }
 Robot { name "ball" controller "roll" }
 """
 # Source: WbRobot.cpp, updateControllerDir: controllers/<name> beside the world's folder, else <generic>.
-WEBOTS = f"""#!{sys.executable} -ISu
+WEBOTS = f"""#!{os.path.realpath(sys.executable)} -ISu
 import pathlib, signal, sys
 world = next(pathlib.Path(option) for option in sys.argv if option.endswith(".wbt"))
 roll = world.parent.parent / "controllers" / "roll" / "roll.py"

@@ -25,8 +25,9 @@ PROGRAMS = {
     "tools/images.sh": "echo stub=stub.tar",
     "bin/kubectl": "",
 }
+# The interpreter itself: the first line of a script may have no space, and a checkout's path may have one.
 # As pytest, it is interrupted by Ctrl-C only where that was not shut off, and then cleans up.
-TESTS = f"""#!{sys.executable} -IS
+TESTS = f"""#!{os.path.realpath(sys.executable)} -IS
 import os, signal, sys, time
 
 def tell(what):
