@@ -2,7 +2,7 @@
 
 import time
 
-from palaestra_protocol.pod.status import TrainerStatus
+from palaestra_protocol.pod.status import Termination, TrainerStatus
 from tests.bench import crowd
 from tests.integration.operator.cluster import Place
 from tests.integration.operator.installed import READS, asked
@@ -23,7 +23,7 @@ def requests_of_one_job(plane, api):
     with training() as address:
         place.run(pod, address)
         time.sleep(TRAINS_S)  # it trains
-        place.end(pod)
+        place.end(pod, word=Termination(step=100, reason="Completed: the training is complete"))
         place.until("Succeeded")
     crowd.wait_for_silence(plane)
     return {"to_the_pod": to_the_pod, "to_the_end": counted(asked(plane)[before:])}

@@ -18,6 +18,7 @@ from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode, Termination
 
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # possible results of a deletion
+SILENT = "the trainer ended with exit code 0, and did not report that it was complete"
 GONE = "its pod is gone; no last word"
 TAKEN, AGAIN = ", which took it back", "; it goes on from the last checkpoint"
 _HUNG = "SimulatorHung"  # how a last word begins
@@ -60,6 +61,14 @@ EndCheck = Callable[[Attempt], Explanation | None]
 def of_pod(situation: Situation, pod: PodView, number: int) -> Attempt:
     """Return the attempt of a pod that still exists."""
     return Attempt(situation=situation, number=number, name=pod.name, pod=pod, code=exit_code(pod))
+
+
+def ended_silently(attempt: Attempt) -> Explanation | None:
+    """The built-in loop did not say that it was complete: a library has ended its process."""
+    if attempt.code != ExitCode.DONE or attempt.pod is None or attempt.word is not None:
+        return None
+    own = attempt.situation.job.spec.trainer.command
+    return None if own else explain(Reason.TRAINER_FAILED, how=SILENT)
 
 
 def completed(attempt: Attempt) -> Explanation | None:
@@ -181,6 +190,7 @@ CAUSES: tuple[EndCheck, ...] = (
     storage_full,
 )
 ENDS: tuple[EndCheck, ...] = (
+    ended_silently,
     completed,
     evicted_for_storage,
     replaced,

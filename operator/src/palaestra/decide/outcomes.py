@@ -9,28 +9,25 @@ from dataclasses import replace
 
 from palaestra.api.reasons import Reason
 from palaestra.api.status import Phase
-from palaestra.decide.attempts import CAUSES, Attempt, first, stop_of, success
+from palaestra.decide.attempts import CAUSES, Attempt, ended_silently, first, of_pod, stop_of, success
 from palaestra.decide.conditions import Explanation
 from palaestra.decide.counting import exit_code
 from palaestra.decide.situation import Finding, Situation, after, explain
 from palaestra.decide.times import Wait
 from palaestra.decide.troubles import how_it_failed
 from palaestra.observe.views import JobEnd, JobView, PodView
-from palaestra_protocol.pod.status import ExitCode
 
 LAST_WORD_S = 30  # after the end of a Job, to wait until the end of its pod is seen too
-SILENT = "the trainer ended with exit code 0, and did not report that it was complete"
 _EXIT_CODE = re.compile(r"exit code (\d{1,3})\b")  # in the Job's message, if the pod is gone
 
 
 def ended_by_others(situation: Situation) -> Finding | None:
     """The Job is complete, but the built-in loop did not say so: a library has ended its process."""
     job, pod = situation.seen.job, situation.seen.pod
-    if job is None or job.end is not JobEnd.COMPLETE or situation.job.spec.trainer.command:
+    if job is None or job.end is not JobEnd.COMPLETE or pod is None:
         return None
-    if pod is None or exit_code(pod) != ExitCode.DONE or situation.seen.termination is not None:
-        return None
-    return _ended(situation, job, explain(Reason.TRAINER_FAILED, how=SILENT))
+    why = ended_silently(of_pod(situation, pod, situation.counted.attempt))
+    return None if why is None else _ended(situation, job, why)
 
 
 def job_is_complete(situation: Situation) -> Finding | None:
