@@ -27,9 +27,9 @@ setup: .venv/ready ## install ROS from the distribution and everything else into
 run: setup ## train move-to-target on this machine, from a TrainingJob to a policy; SIM=mujoco: in MuJoCo
 	@$(BIN)/palaestra run $(JOB)
 
-# Five at once, also on two processors: many tests wait for processes, leases and deadlines most of their time.
+# Four at once, also on two processors: many tests wait for processes, leases and deadlines most of their time.
 test: setup ## run every test; also that generated files are current
-	@$(BIN)/pytest -n 5 --dist loadfile --no-loadscope-reorder --durations=10
+	@$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder --durations=10
 
 # Side by side, what takes longest first; each prints as a whole, and all are told that fail.
 CHECKS := check-mypy check-pyright check-lint check-format check-imports
