@@ -16,9 +16,9 @@ from palaestra.decide.troubles import full_volume, how_it_failed, mark_of, stora
 from palaestra.observe.views import JobView, PodView
 from palaestra.plan.replica import TRAINER
 from palaestra_protocol.pod.status import ExitCode, Termination
+from palaestra_protocol.pod.terms import SILENT
 
 BY_SIGNAL = frozenset({None, ExitCode.INTERRUPTED, 128 + 9, 128 + 15})  # possible results of a deletion
-SILENT = "the trainer ended with exit code 0, and did not report that it was complete"
 GONE = "its pod is gone; no last word"
 TAKEN, AGAIN = ", which took it back", "; it goes on from the last checkpoint"
 _HUNG = "SimulatorHung"  # how a last word begins

@@ -21,10 +21,11 @@ from palaestra.local.volumes import mount
 from palaestra.plan import ReplicaPlan
 from palaestra.plan.containers import BUILT_IN
 from palaestra_protocol.pod.status import ExitCode
+from palaestra_protocol.pod.terms import SILENT
 
 FAILED = 1
 DEADLINE_EXCEEDED = "DeadlineExceeded"
-ENDED_BY_OTHERS = "ProgramEnded: the trainer ended with exit code 0, and did not report that it was complete"
+ENDED_BY_OTHERS = f"ProgramEnded: {SILENT}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

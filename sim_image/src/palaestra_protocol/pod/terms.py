@@ -2,6 +2,9 @@
 
 from enum import IntEnum, StrEnum
 
+# Why a trainer's exit code 0 is no complete training.
+SILENT = "the trainer ended with exit code 0, and did not report that it was complete"
+
 
 class ExitCode(IntEnum):
     """The exit codes of a trainer; after any other code a retry may help.

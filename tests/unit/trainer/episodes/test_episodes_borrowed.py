@@ -1,6 +1,6 @@
 """What an environment lends and borrows: it may keep and write into all that it gets or returns.
 
-A hostile environment is played beside one that makes everything anew; nobody may see a difference.
+Each test plays a hostile environment, and an honest one that returns new objects. The results must be equal.
 """
 
 from __future__ import annotations
@@ -116,27 +116,27 @@ def actions():
 
 
 def collected(keeper):
-    """Return what the training loop gets, and the actions that an exact resume would repeat."""
+    """Return the rows of the training loop, and the actions that an exact resume repeats."""
     env = SimulatorsVecEnv([keeper], 1)
     rows = [env.reset(), *(env.step(action) for action in actions())]
     return rows, env.reset_infos, env.snapshot()[0].actions
 
 
 def tolerated(keeper):
-    """Return what a loop over Stable-Baselines3's interface gets."""
+    """Return the rows of Stable-Baselines3's interface."""
     env = TolerantVecEnv(Players([keeper], lambda: None))
     env.seed(1)
     return [env.reset(), *(env.step(action) for action in actions())], env.reset_infos
 
 
 def vectorized(keeper):
-    """Return what a loop over gymnasium's vector interface gets."""
+    """Return the rows of gymnasium's vector interface."""
     env = TolerantVectorEnv(Players([keeper], lambda: None))
     return [env.reset(seed=1, options={"word": 1}), *(env.step(action) for action in actions())]
 
 
 def alone(keeper):
-    """Return what a loop over a single environment gets."""
+    """Return the rows of a single environment."""
     env = TolerantEnv(Players([keeper], lambda: None))
     rows = []
     for number, [action] in enumerate(actions()):

@@ -120,7 +120,7 @@ def test_the_options_of_the_next_reset_reach_the_environments_once(keepers, make
 
 @pytest.mark.parametrize("make", VECTORS.values(), ids=VECTORS)
 def test_an_attribute_that_is_set_is_the_one_that_the_environment_reads(keepers, make):
-    """The commonest curriculum; one that nobody defines is set where the environment looks for it too."""
+    """Curricula set attributes. A new attribute is set in the environment, and not in a wrapper."""
     env = make(keepers())
     env.reset()
 
@@ -150,13 +150,13 @@ def test_a_simulator_that_takes_over_has_the_attributes_that_were_set(keepers):
 def test_an_attribute_that_is_set_while_a_simulator_is_mended_is_there_in_its_next_episode(
     keepers, monkeypatch
 ):
-    """Nobody may touch it meanwhile."""
+    """The keeper's own thread uses the simulator meanwhile."""
     [keeper, *_] = keepers()
     env = SimulatorsVecEnv([keeper], 1)
     env.reset()
 
-    with monkeypatch.context() as mended:
-        mended.setattr(Keeper, "busy", True)
+    with monkeypatch.context() as patch:
+        patch.setattr(Keeper, "busy", True)
         env.set_attr("level", 2)
         meanwhile = keeper.member.env.unwrapped.level
     env.reset()

@@ -1,11 +1,12 @@
 """The learning algorithms: Stable-Baselines3's, sb3-contrib's and users' own, made safe against faults."""
 
 from palaestra_trainer.algorithms.entries import ALGORITHMS, entry_of
+from palaestra_trainer.algorithms.fitting import refuse_spaces
 from palaestra_trainer.algorithms.futile import futile
 from palaestra_trainer.algorithms.kept import begin_with, begun_with, keep
 from palaestra_trainer.algorithms.normalization import normalizer_of, policy_of
 from palaestra_trainer.algorithms.reinforce import REINFORCE
-from palaestra_trainer.algorithms.table import check, make_model, refuse_spaces
+from palaestra_trainer.algorithms.table import check, make_model
 
 __all__ = [
     "ALGORITHMS",

@@ -15,7 +15,7 @@ from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.preprocessing import is_image_space, is_image_space_channels_first
 
 from palaestra_trainer import own
-from palaestra_trainer.algorithms.entries import Entry
+from palaestra_trainer.algorithms.entries import Entry, entry_of
 from palaestra_trainer.configuration import Algorithm, Cnn, nearest
 from palaestra_trainer.errors import ConfigurationError
 
@@ -32,19 +32,19 @@ def policy_of_spaces(
     Raises:
         ConfigurationError: the algorithm does not fit the environment; one line for each reason.
     """
-    refuse_misfits(algorithm.name, entry, seen, acted)
+    refuse_spaces(algorithm, seen, acted)
     if lines := [*_about_images(algorithm, seen), *_about_normalization(algorithm, seen)]:
         raise ConfigurationError("\n".join(lines))
     return named_policy(algorithm, entry) or _usual_policy(algorithm.name, entry, seen)
 
 
-def refuse_misfits(name: str, entry: Entry, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse observations and actions that an algorithm takes wrongly, or not at all.
+def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
+    """Refuse observations and actions that the algorithm takes wrongly, or not at all.
 
     Raises:
         ConfigurationError: one line for each reason.
     """
-    if lines := [*_about_observations(seen), *_about_actions(name, entry, acted)]:
+    if lines := [*_about_observations(seen), *_about_actions(algorithm.name, acted)]:
         raise ConfigurationError("\n".join(lines))
 
 
@@ -112,8 +112,8 @@ def _about_observations(seen: spaces.Space[Any]) -> Iterator[str]:
             yield f"{what} {flaw}"
 
 
-def _about_actions(name: str, entry: Entry, acted: spaces.Space[Any]) -> Iterator[str]:
-    known = KINDS if entry.actions is None else entry.actions
+def _about_actions(name: str, acted: spaces.Space[Any]) -> Iterator[str]:
+    known = entry_of(name).actions or KINDS
     if not isinstance(acted, known):
         kinds = " or ".join(kind.__name__ for kind in known)
         fact = f"{name} needs {kinds} actions, not {type(acted).__name__}"

@@ -17,7 +17,7 @@ from palaestra_trainer.algorithms import her, noise, values
 from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.elsewhere import ELSEWHERE
 from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
-from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces, refuse_misfits
+from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
 from palaestra_trainer.algorithms.images import with_channels_first, with_network
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.configuration import Algorithm, Device, nearest
@@ -74,15 +74,6 @@ def with_defaults(algorithm: Algorithm, better: Mapping[str, Any]) -> Algorithm:
     """Return the algorithm with all its hyperparameters; those of `better` precede the class's defaults."""
     known = entry_of(algorithm.name).defaults
     return algorithm.model_copy(update={"hyperparameters": {**known, **better, **algorithm.hyperparameters}})
-
-
-def refuse_spaces(algorithm: Algorithm, seen: spaces.Space[Any], acted: spaces.Space[Any]) -> None:
-    """Refuse observations and actions that the algorithm takes wrongly, or not at all.
-
-    Raises:
-        ConfigurationError: one line for each reason.
-    """
-    refuse_misfits(algorithm.name, entry_of(algorithm.name), seen, acted)
 
 
 def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "cpu") -> BaseAlgorithm:

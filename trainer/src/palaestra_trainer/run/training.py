@@ -62,6 +62,9 @@ NOTHING_LEARNED = End(
     "Completed",
     "the training is complete, but nothing was learned: no update was made",
 )
+STOPPED_S = 60.0  # for closing environments and stopping simulators
+# Code of the job's author may end the program, as by sys.exit.
+ENDING = (Exception, SystemExit, KeyboardInterrupt)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,11 +131,6 @@ def _logged(error: BaseException) -> End:
     if end.reason in {"Unexpected", "CallbackFailed", "ProgramEnded"}:
         log.error("unexpected error", exc_info=error)
     return end
-
-
-STOPPED_S = 60.0  # for closing environments and stopping simulators
-# Code of the job's author may end the program, as by sys.exit.
-ENDING = (Exception, SystemExit, KeyboardInterrupt)
 
 
 class Learning(NamedTuple):
