@@ -15,6 +15,7 @@ import torch
 from stable_baselines3 import DQN
 from stable_baselines3.common.callbacks import EvalCallback
 from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.monitor import Monitor
 
 from palaestra_trainer.algorithms.values import arguments
@@ -71,6 +72,7 @@ def train(spec):
     evaluating = EvalCallback(
         other, eval_freq=evaluation["everySteps"], n_eval_episodes=evaluation["episodes"], verbose=0
     )
+    model.set_logger(Logger(None, []))  # else Stable-Baselines3 leaves a folder behind for each run
     model.learn(trainer["steps"], callback=evaluating)
     evaluate_policy(model, other, n_eval_episodes=evaluation["confirmEpisodes"])
 
