@@ -44,7 +44,7 @@ def wanted(algorithm: Algorithm) -> bool:
 def mistakes(given: Mapping[str, Any], field: str) -> Iterator[str]:
     """Yield field, fact and remedy of each wrong one of the two hyperparameters."""
     chosen, options = given.get(NAMES[0]), given.get(NAMES[1])
-    if chosen not in {None, NAME}:
+    if chosen not in (None, NAME):
         yield f"{field}.{NAMES[0]}: {chosen!r} is refused; use {NAME}, or leave it out"
     if options is None:
         return

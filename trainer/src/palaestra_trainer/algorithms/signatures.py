@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator, Mapping
+from functools import cache
+from types import MappingProxyType
 from typing import Any, get_type_hints
 
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import BasePolicy
 from stable_baselines3.common.vec_env import VecEnv
 
 from palaestra_trainer.arguments import named, takes_any
 
+Configurable = type[BaseAlgorithm] | type[BasePolicy]
 
-def parameters(cls: type[object]) -> Mapping[str, inspect.Parameter]:
+
+@cache
+def parameters(cls: Configurable) -> Mapping[str, inspect.Parameter]:
     """Return the named parameters of a class by name, with those that its `**kwargs` pass on."""
     found: dict[str, inspect.Parameter] = {}
     for constructor in _constructors(cls):
         these = named(inspect.signature(constructor))
         found |= {name: parameter for name, parameter in these.items() if name not in found}
-    return found
+    return MappingProxyType(found)
 
 
-def types(cls: type[object]) -> Mapping[str, Any]:
+def types(cls: Configurable) -> Mapping[str, Any]:
     """Return the annotations of these parameters; Any for one that has none, or that cannot be resolved."""
     found: dict[str, Any] = {}
     for constructor in _constructors(cls):

@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from gymnasium import spaces
+from sb3_contrib import TQC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv
 
-from palaestra_trainer.algorithms import her, noise, values
+from palaestra_trainer.algorithms import her, limits, noise, values
 from palaestra_trainer.algorithms.device import usable
 from palaestra_trainer.algorithms.elsewhere import ELSEWHERE
 from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
@@ -40,7 +41,7 @@ def check(algorithm: Algorithm) -> Entry:
         if name not in known
     ]
     plain = {name: value for name, value in given.items() if name in known and name not in her.NAMES}
-    lines += values.mistakes(entry.original, policy, plain)
+    lines += list(values.mistakes(entry.original, policy, plain)) or _out_of_range(algorithm.name, plain)
     lines += noise.mistakes(given, values.FIELD) if entry.takes_noise else []
     lines += her.mistakes(given, values.FIELD) if entry.replays else []
     if given.get("n_steps", 1) != 1 and "train_freq" in known:
@@ -57,6 +58,24 @@ def _unknown(algorithm: str, name: str, known: list[str]) -> str:
     if name in ELSEWHERE:
         return f"is no hyperparameter here; {ELSEWHERE[name]}"
     return f"{algorithm} has no such hyperparameter; {nearest(name, known)}"
+
+
+def _out_of_range(algorithm: str, given: Mapping[str, Any]) -> list[str]:
+    return [f"{values.FIELD}.{name}: {fact}" for name, fact in limits.out_of_range(algorithm, given)]
+
+
+def _refuse_members(chosen: Mapping[str, Any], members: int) -> None:
+    """Refuse hyperparameters that this number of collecting simulators does not allow."""
+    if limits.needs_one_member(chosen) and members > 1:
+        raise ConfigurationError(
+            f"{values.FIELD}.train_freq: counts in episodes, which only one collecting simulator allows, not "
+            f"{members}; count in steps, or collect in one"
+        )
+    if chosen.get("normalize_advantage") and (chosen.get("n_steps"), members) == (1, 1):
+        raise ConfigurationError(
+            f"{values.FIELD}.n_steps: 1 step of 1 collecting simulator is 1 row, and normalize_advantage "
+            "needs 2; raise n_steps, add a simulator, or set normalize_advantage: false"
+        )
 
 
 def resolve(algorithm: Algorithm, environment: str) -> Algorithm:
@@ -108,19 +127,28 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
         if not algorithm.normalize.observations or isinstance(env.observation_space, spaces.Dict):
             env = with_channels_first(env)
         env = ValidNormalize(env, algorithm.normalize, chosen["gamma"])
-    if chosen.get("normalize_advantage") and (chosen.get("n_steps"), env.num_envs) == (1, 1):
-        raise ConfigurationError(
-            f"{values.FIELD}.n_steps: 1 step of 1 collecting simulator is 1 row, and normalize_advantage "
-            "needs 2; raise n_steps, add a simulator, or set normalize_advantage: false"
-        )
+    _refuse_members(chosen, env.num_envs)
     try:
-        return entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
+        model = entry.cls(policy, env, seed=seed, device=usable(device), **chosen)
     except ConfigurationError:
         raise
-    except (AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError) as error:
         # Stable-Baselines3 checks values and spaces by assertions; a policy of the job's author, or a part
         # of one, may raise anything. A RuntimeError may be a device without memory, which a retry may have.
         raise ConfigurationError(
             f"algorithm: {algorithm.name} refuses its hyperparameters or the environment's spaces "
             f"({fact_of(error)}); change them, or use another algorithm"
         ) from error
+    _refuse_dropping_all(model)
+    return model
+
+
+def _refuse_dropping_all(model: BaseAlgorithm) -> None:
+    """Refuse a TQC that drops all quantiles of its critics: the mean of none is NaN."""
+    if not isinstance(model, TQC) or model.top_quantiles_to_drop_per_net < model.critic.n_quantiles:
+        return
+    raise ConfigurationError(
+        f"{values.FIELD}.top_quantiles_to_drop_per_net: {model.top_quantiles_to_drop_per_net} of "
+        f"{model.critic.n_quantiles} quantiles of each critic leaves none; lower it, or raise "
+        "policy_kwargs.n_quantiles"
+    )
