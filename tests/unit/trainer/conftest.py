@@ -113,7 +113,7 @@ class FakeMember:
         name: str = "collect-0",
         *,
         steps: Mapping[int, SimulatorFault] | Sequence[int] = (),
-        resets: Sequence[int] = (),
+        resets: Mapping[int, SimulatorFault] | Sequence[int] = (),
         starts: Mapping[int, SimulatorFault] | Sequence[int] = (),
         recycle_after: int | None = None,
         held: bool = False,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import gymnasium
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from gymnasium import spaces
 
 from palaestra_trainer.configuration import Environment
-from palaestra_trainer.environments.checking import mismatch
+from palaestra_trainer.environments.contract import mismatch
 from palaestra_trainer.environments.making import keywords, make_environment
 from palaestra_trainer.errors import ConfigurationError, SimulatorDead
 from palaestra_trainer.testing import fake_arena
@@ -292,6 +293,65 @@ def test_a_wrong_environment_is_refused_at_its_first_reset_or_step(made, creator
     assert message.startswith("environment.id: Hall-v0: expected ")
     assert message.endswith("; fix the environment")
     assert [fact for fact in facts if fact not in message] == []
+
+
+RIGHT = (np.zeros(2, np.float32), 1.0, False, False, {})
+LATER = [
+    ("no reward", (RIGHT[0], None, *RIGHT[2:]), "got a NoneType as reward, in step 3 of its episode 2"),
+    ("a truth as reward", (RIGHT[0], True, *RIGHT[2:]), "got a bool as reward"),
+    ("an array as reward", (RIGHT[0], np.ones(1), *RIGHT[2:]), "got a ndarray as reward"),
+    ("four values", RIGHT[:4], "got a tuple of 4: (ndarray, float, bool, bool), in step 3"),
+    ("no tuple", None, "got a NoneType, in step 3"),
+    ("a number as end", (*RIGHT[:2], 0, False, {}), "got a int as terminated"),
+    ("no info", (*RIGHT[:4], None), "got a NoneType as info"),
+    ("another shape", (np.zeros(3, np.float32), *RIGHT[1:]), "of another kind (shape (3,), not (2,))"),
+    ("another dtype", (np.zeros(2), *RIGHT[1:]), "of another kind (dtype float64, not float32)"),
+    ("a list", ([0.0, 0.0], *RIGHT[1:]), "of another kind (a list)"),
+]
+
+
+@pytest.mark.parametrize("limit", [None, 10])
+@pytest.mark.parametrize(("answer", "fact"), [row[1:] for row in LATER], ids=[row[0] for row in LATER])
+def test_a_step_that_breaks_the_contract_later_is_refused_with_its_number(made, answer, fact, limit):
+    """It was an error of a tensor, of numpy or of nothing at all, a thousand steps after the run began."""
+
+    class Later(Hall):
+        steps = resets = 0
+
+        def reset(self, *, seed=None, options=None):
+            self.steps, self.resets = 0, self.resets + 1
+            return super().reset(seed=seed, options=options)
+
+        def step(self, action):
+            self.steps += 1
+            return answer if (self.resets, self.steps) == (2, 3) else super().step(action)
+
+    env = made(Later, registration={"max_episode_steps": limit})
+    for _ in range(2):
+        env.reset(seed=1)
+        env.step(0)
+        env.step(0)
+
+    with pytest.raises(ConfigurationError, match=re.escape(fact)):
+        env.step(0)
+
+
+def test_a_later_reset_that_breaks_the_contract_is_refused(made):
+    """A reset that forgets its info in one of two branches is the commonest."""
+
+    class Later(Hall):
+        resets = 0
+
+        def reset(self, *, seed=None, options=None):
+            self.resets += 1
+            right = super().reset(seed=seed, options=options)
+            return right if self.resets == 1 else right[0]
+
+    env = made(Later)
+    env.reset(seed=1)
+
+    with pytest.raises(ConfigurationError, match="got a ndarray, in a later reset; fix the environment"):
+        env.reset(seed=2)
 
 
 def test_a_wrapper_of_the_registration_is_checked_too(made):

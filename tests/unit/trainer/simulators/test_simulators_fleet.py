@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import structlog
 
+from palaestra_protocol.pod.status import ExitCode
 from palaestra_trainer.configuration import parse
 from palaestra_trainer.errors import (
     ConfigurationError,
@@ -18,6 +19,7 @@ from palaestra_trainer.errors import (
     SimulatorDead,
     SimulatorHung,
     WorldMisfit,
+    WrongData,
 )
 from palaestra_trainer.simulators.budget import RestartLimit
 from palaestra_trainer.simulators.fleet import Fleet, resting
@@ -115,6 +117,37 @@ def test_a_run_that_has_stepped_before_mends_misfits_like_other_faults(make_flee
     fleet.start(stepped=True)
 
     assert members[0].log == ["start", *["restart"] * 3]
+
+
+def refusals(*numbers, fact="refused a step of 50 ms; use a multiple of the world's basicTimeStep"):
+    """Starts, resets or steps at which the simulator refuses what it is asked for."""
+    return {number: WrongData("collect-0", fact) for number in numbers}
+
+
+@pytest.mark.parametrize("what", ["starts", "resets", "steps"])
+def test_what_two_processes_refuse_in_the_same_words_is_a_mistake(play, make_configuration, last_word, what):
+    """A period that is no multiple of the basic step ended as a simulator that broke ten times."""
+    code, members = play(make_configuration(), faults={"collect-0": {what: refusals(1, 2, 3)}})
+
+    assert code == ExitCode.CONFIGURATION
+    assert "use a multiple of the world's basicTimeStep" in last_word().reason
+    assert members["collect-0"].log.count("restart") == 1
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        {"steps": refusals(2, 3)},
+        {"steps": refusals(1) | refusals(2, fact="sent 3 of 4 bytes")},
+        {"starts": refusals(1), "steps": [1, 2]},
+    ],
+    ids=["after a step", "in other words", "then something else"],
+)
+def test_what_one_process_refuses_is_mended(play, make_configuration, faults):
+    """A simulator that has worked before is broken, not the configuration."""
+    code, _ = play(make_configuration(), faults={"collect-0": faults})
+
+    assert code == ExitCode.DONE
 
 
 def test_simulators_that_take_long_to_come_up_are_named(make_fleet, make_member, monkeypatch):

@@ -1,8 +1,9 @@
-"""Check an environment's first reset and first step against gymnasium's API.
+"""Check what an environment returns against gymnasium's API.
 
-gymnasium's own wrapper only warns, and training would continue with wrong rows. Here the same checks raise
-an error that names the expected and the actual value. Numbers that are not finite are not checked here: the
-learner reports them as divergence.
+gymnasium's own wrapper only warns, and training would continue with wrong rows. Here its checks of the first
+reset and the first step raise an error that names the expected and the actual value. Types and shapes of
+later ones are checked too, as `contract` says. Numbers that are not finite are not checked here: the learner
+reports them as divergence.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from gymnasium.utils.passive_env_checker import (
 )
 from gymnasium.wrappers import NormalizeObservation, NormalizeReward, OrderEnforcing, TimeLimit
 
+from palaestra_trainer.environments.contract import broken_by_reset, broken_by_step, kind_of, mismatch
 from palaestra_trainer.errors import ConfigurationError
 
 RESET = "reset(self, *, seed=None, options=None) that returns (observation, info)"
@@ -65,7 +67,7 @@ def refuse_statistics(env: gymnasium.Env[Any, Any], name: str) -> None:
 
 
 class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """An environment whose first reset and first step are checked; its results are not changed.
+    """An environment whose resets and steps are checked, the first ones most; its results are not changed.
 
     Args:
         env: the environment.
@@ -79,30 +81,37 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
         super().__init__(env)
         self._name = name
         self._reset_seen = self._step_seen = False
+        self._episodes = self._steps = 0
         self._check_made()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         """Return the result of the environment's reset.
 
         Raises:
-            ConfigurationError: the first reset is wrong.
+            ConfigurationError: it is wrong.
         """
         result = self.env.reset(seed=seed, options=options)
+        self._episodes, self._steps = self._episodes + 1, 0
         if not self._reset_seen:
             self._check("reset", RESET, result, env_reset_passive_checker)
             self._reset_seen = True
+        elif fact := broken_by_reset(self.observation_space, result):
+            raise self._wrong(RESET, f"{fact}, {self._where()}")
         return result
 
     def step(self, action: Any) -> Any:
         """Return the result of the environment's step.
 
         Raises:
-            ConfigurationError: the first step is wrong.
+            ConfigurationError: it is wrong.
         """
         result = self.env.step(action)
+        self._steps += 1
         if not self._step_seen:
             self._check("step", STEP, result, env_step_passive_checker)
             self._step_seen = True
+        elif fact := broken_by_step(self.observation_space, result):
+            raise self._wrong(STEP, f"{fact}, {self._where()}")
         return result
 
     def _check_made(self) -> None:
@@ -126,13 +135,16 @@ class Checked(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _check(self, method: str, expected: str, result: Any, check: Callable[..., Any]) -> None:
         lengths = {"reset": 2, "step": 5}
         if not isinstance(result, tuple) or len(result) != lengths[method]:
-            raise self._wrong(expected, _kind(result))
+            raise self._wrong(expected, kind_of(result))
         if not _finite(result[0]) or (method == "step" and not _finite(result[1])):
             return
         if fact := mismatch(self.observation_space, result[0]):
             raise self._wrong(f"from {method} an observation of {self.observation_space}", fact)
         for fact in _objections(check, _Returned(self.observation_space, result)):
             raise self._wrong(expected, fact)
+
+    def _where(self) -> str:
+        return f"in step {self._steps} of its episode {self._episodes}" if self._steps else "in a later reset"
 
     def _wrong(self, expected: str, came: str) -> ConfigurationError:
         return ConfigurationError(
@@ -158,47 +170,6 @@ class _Returned(gymnasium.Env[Any, Any]):
         return self._result
 
 
-def mismatch(space: spaces.Space[Any], observation: Any) -> str:
-    """Return why an observation does not belong to its space, as text; "" if it does."""
-    if isinstance(space, spaces.Dict):
-        return _mismatch_of_dict(space, observation)
-    if isinstance(space, spaces.Box):
-        return _mismatch_of_box(space, observation)
-    if space.contains(observation):
-        return ""
-    return _mismatch_of_shape(space, observation) or repr(observation)
-
-
-def _mismatch_of_dict(space: spaces.Dict, observation: Any) -> str:
-    if not isinstance(observation, dict):
-        return _kind(observation)
-    if observation.keys() != space.keys():
-        return f"the keys {', '.join(map(str, observation))}, not {', '.join(space)}"
-    facts = ((key, mismatch(part, observation[key])) for key, part in space.items())
-    return "; ".join(f"{key}: {fact}" for key, fact in facts if fact)
-
-
-def _mismatch_of_shape(space: spaces.Space[Any], observation: Any) -> str:
-    """Return how the shape differs; "" if it does not, or if there is none."""
-    shape = getattr(observation, "shape", space.shape)
-    return "" if shape == space.shape else f"shape {shape}, not {space.shape}"
-
-
-def _mismatch_of_box(space: spaces.Box, observation: Any) -> str:
-    if not isinstance(observation, np.ndarray | np.generic):
-        return _kind(observation)
-    if fact := _mismatch_of_shape(space, observation):
-        return fact
-    if observation.dtype != space.dtype:
-        return f"dtype {observation.dtype}, not {space.dtype}"
-    numbers = np.asarray(observation)
-    outside = np.argwhere((numbers < space.low) | (numbers > space.high))
-    if not len(outside):
-        return ""
-    place = tuple(int(index) for index in outside[0])
-    return f"{numbers[place]} at {list(place)}, not within {space.low[place]} and {space.high[place]}"
-
-
 def _objections(check: Callable[..., Any], returned: _Returned) -> list[str]:
     """Return the complaints of one of gymnasium's checkers, from warnings and exceptions."""
     arguments = {"action": None} if check is env_step_passive_checker else {}
@@ -214,12 +185,6 @@ def _objections(check: Callable[..., Any], returned: _Returned) -> list[str]:
 def _plain(warning: str) -> str:
     """Return the text of one of gymnasium's warnings without its color and its level."""
     return re.sub(r"^(\x1b\[\d+m)?WARN: |\x1b\[\d+m", "", warning)
-
-
-def _kind(result: Any) -> str:
-    if isinstance(result, tuple):
-        return f"a tuple of {len(result)}: ({', '.join(type(part).__name__ for part in result)})"
-    return f"a {type(result).__name__}"
 
 
 def _finite(value: Any) -> bool:

@@ -21,7 +21,13 @@ import structlog
 
 from palaestra_protocol.pod.status import Cause
 from palaestra_trainer.copies import copied
-from palaestra_trainer.errors import ConfigurationError, FaultBudgetSpent, SimulatorFault, WorldMisfit
+from palaestra_trainer.errors import (
+    ConfigurationError,
+    FaultBudgetSpent,
+    SimulatorFault,
+    WorldMisfit,
+    WrongData,
+)
 from palaestra_trainer.simulators.attributes import Attributes
 from palaestra_trainer.simulators.background import in_background
 from palaestra_trainer.simulators.budget import Group, RestartBudget, RestartLimit
@@ -65,7 +71,7 @@ class Keeper:
         self.watcher: Watcher = watcher or NullWatcher()
         self.group = group or Group()
         self.tried = self.lost = self.stepped = False
-        self._misfit = False  # whether the last process had a world that lacks what is needed
+        self._refusal = ""  # how the last process showed a mistake of the configuration
         self._budget = RestartBudget(member.name, limit or RestartLimit(), clock)
         self._clock = clock
         self._recycled, self._log_next = 0, -math.inf
@@ -95,7 +101,8 @@ class Keeper:
 
         Raises:
             FaultBudgetSpent: it broke more often than its budget allows.
-            ConfigurationError: before any step, two of its processes lacked what the environment needs.
+            ConfigurationError: before any step, two of its processes lacked what the environment needs, or
+                refused it in the same words.
             MasterLost: it could not be mended without a ROS master.
             SimulatorFault: it could not be recycled; begin to mend it.
         """
@@ -231,7 +238,7 @@ class Keeper:
     def _may_restart(self, fault: SimulatorFault) -> bool:
         if self._abandoned:
             raise FaultBudgetSpent(f"{self.name}: was abandoned ({fault}); start the run again") from fault
-        self._judge_world(fault)
+        self._judge(fault)
         try:
             self._budget.spend(fault)
         except FaultBudgetSpent as spent:
@@ -243,11 +250,17 @@ class Keeper:
             self.watcher.flapping(self.name)
         return True
 
-    def _judge_world(self, fault: SimulatorFault) -> None:
-        """Raise ConfigurationError if the second process in a row lacks what is needed, before any step."""
-        before, self._misfit = self._misfit, isinstance(fault, WorldMisfit) and not self.stepped
-        if before and self._misfit:
+    def _judge(self, fault: SimulatorFault) -> None:
+        """Raise ConfigurationError if the second process in a row shows the same mistake, before any step."""
+        before, self._refusal = self._refusal, self._refusal_of(fault)
+        if before and before == self._refusal:
             raise ConfigurationError(f"{self.name}: {fault}") from fault
+
+    def _refusal_of(self, fault: SimulatorFault) -> str:
+        """Return what a fault of another process must be equal to, to show a mistake; "" if it shows none."""
+        if isinstance(fault, WorldMisfit):
+            return "" if self.stepped else WorldMisfit.__name__
+        return str(fault) if isinstance(fault, WrongData) and not self.meter.stepped else ""
 
     def _lose(self, spent: FaultBudgetSpent) -> None:
         log.error("simulator given up: the others go on", simulator=self.name, fact=str(spent))

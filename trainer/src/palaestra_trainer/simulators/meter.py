@@ -52,6 +52,7 @@ class Meter:
     Attributes:
         steps: seconds that each environment step took.
         resets: episodes begun.
+        stepped: whether an environment step was taken.
 
     Args:
         member: the member that is played in.
@@ -60,13 +61,14 @@ class Meter:
 
     def __init__(self, member: Member, budget: RestartBudget) -> None:
         self.steps: Tally = families.STEP_DURATION.tally()
-        self.resets = 0
+        self.resets, self.stepped = 0, False
         self._member = member
         self._budget = budget
         self._pace = Pace()
 
     def count_step(self, seconds: float) -> bool:
         """Count an environment step that took `seconds`; return whether it was slow."""
+        self.stepped = True
         self.steps.observe(seconds)
         return self._pace.slow(seconds)
 

@@ -76,7 +76,7 @@ class Sensor:
         """Return the error for a period that the simulator refused."""
         return WrongData(
             self._enable.simulator,
-            f"{self.device} refuses a period of {period_ms} ms; use a multiple of the step",
+            f"{self.device} refuses a period of {period_ms} ms; use a multiple of the world's basicTimeStep",
         )
 
     def read(self) -> bool:

@@ -226,7 +226,10 @@ class Simulation:
         wanted = [(step, {"value": self.period_ms}) for step in self._steps]
         answers = call_together(wanted, meanwhile=let_others)
         if not all(answer.success for answer in answers):
-            raise WrongData(self._supervisor.node_name, f"refused a step of {self.period_ms} ms")
+            raise WrongData(
+                self._supervisor.node_name,
+                f"refused a step of {self.period_ms} ms; use a multiple of the world's basicTimeStep",
+            )
         self.simulated_s += self.period_ms / 1000.0
 
     def _paused(self) -> Paused:
