@@ -63,6 +63,20 @@ class Doubled(FlattenExtractor):
         return 2.0 * super().forward(observations)
 
 
+class Scribbling(FlattenExtractor):
+    """It scales the observation in its place."""
+
+    def forward(self, observations):
+        return super().forward(observations.mul_(0.5))
+
+
+class ScribblingPolicy(ActorCriticPolicy):
+    """It scales the observation in its place."""
+
+    def forward(self, obs, deterministic=False):
+        return super().forward(obs.mul_(0.5), deterministic)
+
+
 class Picky(FlattenExtractor):
     """It wants a Dict."""
 
@@ -232,6 +246,42 @@ def test_parts_of_a_policy_may_be_classes_of_ones_own(lab, make):
 
     kinds = {type(part).__name__ for part in (policy, *policy.modules(), policy.optimizer)}
     assert {"OwnPolicy", "Doubled", "Calm", "Slow"} <= kinds
+
+
+@pytest.mark.parametrize("name", ["PPO", "A2C", "TRPO"])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"policy_kwargs": {"features_extractor_class": "my_lab:Scribbling"}},
+        {"policy": "my_lab:ScribblingPolicy"},
+    ],
+    ids=["extractor", "policy"],
+)
+def test_a_network_that_writes_into_its_input_changes_no_row(lab, make, name, parts):
+    """Stable-Baselines3 stores the observation after the network had its memory."""
+    del lab
+    steps = {"n_steps": 16} | ({} if name == "A2C" else {"batch_size": 8})
+    named = Algorithm(
+        name=name,
+        policy=parts.get("policy"),
+        hyperparameters=steps | {"policy_kwargs": parts.get("policy_kwargs", {})},
+    )
+    model = make(named)
+    seen = []
+    step = model.env.step_wait
+
+    def step_wait():
+        row = step()
+        seen.append(row[0].copy())
+        return row
+
+    model.env.step_wait = step_wait
+
+    model.learn(16)
+
+    played = np.stack(seen, axis=1)  # (simulators, steps, *observation)
+    stored = model.rollout_buffer.observations.reshape(played.shape)
+    assert np.array_equal(stored[:, 1:], played[:, :-1])
 
 
 @pytest.mark.parametrize(

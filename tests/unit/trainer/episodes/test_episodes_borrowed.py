@@ -188,6 +188,54 @@ def test_actions_of_the_training_loop_stay_as_they_are(keeper):
     assert (given == actions()[0]).all()
 
 
+class Judge(Honest):
+    """Computes rewards of goals in the memory of the goals."""
+
+    def compute_reward(self, achieved, desired, _info):
+        """Return the distance."""
+        achieved -= desired
+        return np.abs(achieved).sum(axis=1)
+
+
+def test_goals_whose_reward_was_computed_stay_as_they_are(keeper):
+    """Hindsight replay learns from them afterwards."""
+    env = SimulatorsVecEnv([keeper(Honest)], 1, judge=Judge())
+    achieved, desired = np.ones((4, 2)), np.zeros((4, 2))
+
+    [rewards] = env.env_method("compute_reward", achieved, desired, {})
+
+    assert rewards.tolist() == [2.0] * 4
+    assert achieved.tolist() == np.ones((4, 2)).tolist()
+
+
+class Rising(Honest):
+    """Raises its own level at each reset, and keeps its list."""
+
+    level, words = 0, ()
+
+    def reset(self, *, seed=None, options=None):
+        """Begin on the next level."""
+        self.level += 1
+        self.words = [*self.words, self.level]
+        return super().reset(seed=seed, options=options)
+
+
+def test_an_attribute_is_set_once_and_what_the_environment_makes_of_it_stays(keeper):
+    """A level that a curriculum sets once, and that the environment raises, fell back at the next reset."""
+    env = SimulatorsVecEnv([keeper(Rising)], 1)
+    env.reset()
+    words = ["first"]
+    env.set_attr("level", 5)
+    env.set_attr("words", words)
+    words.append("mine")
+
+    env.reset()
+    env.reset()
+
+    assert env.get_attr("level") == [7]
+    assert env.get_attr("words") == [["first", 6, 7]]
+
+
 class WithWords(Honest):
     """Its infos have words of their own that mean something else here, and in Stable-Baselines3."""
 

@@ -20,6 +20,7 @@ from palaestra_trainer.algorithms.elsewhere import ELSEWHERE
 from palaestra_trainer.algorithms.entries import ARENA_ENVIRONMENTS, Entry, entry_of
 from palaestra_trainer.algorithms.fitting import named_policy, policy_of_spaces
 from palaestra_trainer.algorithms.images import with_channels_first, with_network
+from palaestra_trainer.algorithms.inputs import give_copies
 from palaestra_trainer.algorithms.normalization import ValidNormalize
 from palaestra_trainer.configuration import Algorithm, Device, nearest
 from palaestra_trainer.errors import ConfigurationError, fact_of
@@ -140,6 +141,7 @@ def make_model(algorithm: Algorithm, env: VecEnv, seed: int, device: Device = "c
             f"({fact_of(error)}); change them, or use another algorithm"
         ) from error
     _refuse_dropping_all(model)
+    give_copies(model)
     return model
 
 

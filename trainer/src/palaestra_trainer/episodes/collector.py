@@ -19,6 +19,7 @@ import structlog
 from gymnasium import spaces
 from gymnasium.vector.utils import create_empty_array
 
+from palaestra_trainer.copies import copied
 from palaestra_trainer.episodes.episode_state import ActionLog, EpisodeState
 from palaestra_trainer.episodes.position import reset_options
 from palaestra_trainer.episodes.seeds import COLLECT, episode_seed
@@ -215,7 +216,8 @@ class Collector:
         """Return a row that nothing is learned from; the first one after a fault has its `sim_fault`."""
         words = {"valid": False} | words | self._news
         self._news = {}
-        return Row(self._observation, 0.0, done, {OURS: words, TRUNCATED: done, "terminal_observation": seen})
+        info = {OURS: words, TRUNCATED: done, "terminal_observation": copied(seen)}
+        return Row(self._observation, 0.0, done, info)
 
     def _summary(self) -> dict[str, float]:
         seconds = time.monotonic() - self._started

@@ -18,6 +18,7 @@ import structlog
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
 from palaestra_protocol.pod.status import Cause
+from palaestra_trainer.copies import copied
 from palaestra_trainer.episodes.collector import Collector, Row
 from palaestra_trainer.episodes.episode_state import EpisodeState
 from palaestra_trainer.episodes.members_vec_env import MembersVecEnv
@@ -146,11 +147,12 @@ class SimulatorsVecEnv(MembersVecEnv):
     ) -> list[Any]:
         """Return what a method of the chosen environments returns.
 
-        `compute_reward` is called on the judge, because members may be restarting.
+        `compute_reward` is called on the judge, because members may be restarting, with copies: the goals
+        are learned from afterwards.
         """
         if self._judge is None or method_name != COMPUTE_REWARD:
             return super().env_method(method_name, *method_args, indices=indices, **method_kwargs)
-        return [self._judge.get_wrapper_attr(method_name)(*method_args, **method_kwargs)]
+        return [self._judge.get_wrapper_attr(method_name)(*copied(method_args), **copied(method_kwargs))]
 
     def _await_somebody(self) -> None:
         """Return when a member can step or has become ready; a vector of only invalid rows is useless."""
