@@ -47,6 +47,10 @@ class Course:
         """Whether nobody is served now."""
         return self._clock() < self._away_until
 
+    def leave(self, seconds: float) -> None:
+        """Serve nobody from now on for so long."""
+        self._away_until = self._clock() + seconds
+
     def request(self, asked: Asked) -> Fault | None:
         """Count a request; return the fault that it meets."""
         with self._lock:
@@ -76,5 +80,5 @@ class Course:
             return None
         self.met = words
         if fault.kind == Kind.AWAY:
-            self._away_until = self._clock() + fault.seconds
+            self.leave(fault.seconds)
         return fault

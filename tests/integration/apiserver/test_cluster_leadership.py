@@ -7,15 +7,24 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from prometheus_client import CollectorRegistry, Histogram
 
-from palaestra.cluster import Leadership
+from palaestra.cluster import Leadership, WorkQueue, connect
 from palaestra.cluster.resources import LEASES
+from palaestra.operator.workers import Workers
+from palaestra.operator.writing import Writer
+from tests.faults.course import Course
+from tests.faults.proxy import Proxy
 
 PROGRAM = Path(__file__).with_name("candidate.py")
 DURATION_S = 3
+ABSENT_S = 6.0  # the duration of the leases of leaders whose API server goes away, for up to 8 s
+SOON_S = 5.0
+WAIT_S = 20.0
 
 
 class Candidate:
@@ -193,3 +202,74 @@ def test_a_lease_that_was_lost_and_regained_is_another_tenure(real, namespace):
     leadership.stop()
 
     assert (first, lost, again, leadership.term()) == (1, None, 2, None)
+
+
+class Absent:
+    """A leader with one worker, and an API server that is away for some time.
+
+    Attributes:
+        absence_s: for how long it is away.
+        renewed: set once the lease was renewed after a renewal had failed.
+    """
+
+    def __init__(self, control_plane, namespace, folder, absence_s):
+        self.absence_s = absence_s
+        self._name = f"absent-{absence_s:g}".replace(".", "-")
+        self._course = Course(None)
+        self._proxy = Proxy(control_plane.kubeconfig, self._course)
+        self._namespace = namespace
+        self._api = connect(str(self._proxy.kubeconfig(folder / self._name)))
+        self._queue, self._gate, self.written = WorkQueue(), threading.Event(), set()
+        self.renewed = threading.Event()
+        self._leadership = Leadership(
+            self._api, namespace, self._name, "me", duration_s=ABSENT_S, renew_s=ABSENT_S / 5
+        )
+        self._writer = Writer(self._api, self._leadership.term)
+        self._workers = Workers(
+            self._queue,
+            self._reconcile,
+            gate=self._gate,
+            seconds=Histogram("seconds", "Time", ["result"], registry=CollectorRegistry()),
+            count=1,
+        )
+
+    def play(self):
+        """Lead, meet the absence amid changes, and return the keys that are not written soon after it."""
+        keys = {f"{self._name}-{number}" for number in range(5)}
+        self._workers.start()
+        self._leadership.start(self._gate.set, self._gate.clear, self.renewed.set)
+        try:
+            assert self._gate.wait(WAIT_S)
+            self._course.leave(self.absence_s)
+            self._proxy.break_all()
+            for key in sorted(keys):  # some come while it is away, and some when it is back
+                self._queue.add((self._namespace, key))
+                time.sleep(self.absence_s / 4)
+            ends = time.monotonic() + SOON_S
+            while keys - self.written and time.monotonic() < ends:
+                time.sleep(0.05)
+            return keys - self.written
+        finally:
+            self._workers.stop(WAIT_S)
+            self._leadership.stop(WAIT_S)
+            self._proxy.close()
+
+    def _reconcile(self, key):
+        self._writer.begin()
+        metadata = {"namespace": self._namespace, "name": key[1]}
+        self._writer.apply({"apiVersion": "v1", "kind": "ConfigMap", "metadata": metadata})
+        self.written.add(key[1])
+
+
+def test_no_change_is_forgotten_after_an_absence_of_any_length(control_plane, namespace, tmp_path):
+    """Between two thirds of a lease's duration and the next renewal, a leader writes nothing and still leads.
+
+    What it gave up then was forgotten: no change followed, and no new tenure began.
+    """
+    absences = [Absent(control_plane, namespace, tmp_path, step * ABSENT_S / 30) for step in range(1, 41)]
+
+    with ThreadPoolExecutor(len(absences)) as together:
+        forgotten = list(together.map(Absent.play, absences))
+
+    assert {it.absence_s: keys for it, keys in zip(absences, forgotten, strict=True) if keys} == {}
+    assert all(it.renewed.is_set() for it in absences if ABSENT_S / 3 < it.absence_s < ABSENT_S / 2)

@@ -64,17 +64,26 @@ class Leadership:
         self._version = ""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="leadership", daemon=True)
+        self._in_doubt = False  # whether the last renewal failed
         self._started: Callable[[], None] = _nothing
         self._stopped: Callable[[], None] = _nothing
+        self._renewed: Callable[[], None] = _nothing
 
-    def start(self, started: Callable[[], None] = _nothing, stopped: Callable[[], None] = _nothing) -> None:
+    def start(
+        self,
+        started: Callable[[], None] = _nothing,
+        stopped: Callable[[], None] = _nothing,
+        renewed: Callable[[], None] = _nothing,
+    ) -> None:
         """Stand for election; once.
 
         Args:
             started: called when this process becomes the leader; must return soon.
             stopped: called when it is no longer the leader, maybe some time after `leads()` is false.
+            renewed: called when it is still the leader after a renewal failed, in the same tenure: what was
+                given up meanwhile can be done now; must return soon.
         """
-        self._started, self._stopped = started, stopped
+        self._started, self._stopped, self._renewed = started, stopped, renewed
         self._thread.start()
 
     def stop(self, deadline_s: float = 2.0) -> None:
@@ -105,6 +114,7 @@ class Leadership:
             try:
                 self._turn()
             except ApiError as error:
+                self._in_doubt = True
                 log.warning("lease not renewed", lease=self._name, reason=error.reason, error=str(error))
             if self._tenure is not None and not self._tenure.holds(time.monotonic()):
                 self._lose()
@@ -172,9 +182,12 @@ class Leadership:
         self._terms += first
         self._version = str(written["metadata"]["resourceVersion"])
         self._tenure = Tenure(sent=sent, duration_s=self._duration_s)
+        after_doubt, self._in_doubt = self._in_doubt, False
         if first:
             log.info("leads", lease=self._name, identity=self._identity)
             self._started()
+        elif after_doubt:
+            self._renewed()
 
     def _lose(self) -> None:
         self._tenure = None

@@ -109,7 +109,7 @@ class Operator:
     def _stand(self) -> None:
         """Lead, or stand for election; call it after the caches are complete, so that a leader can work."""
         if self._options.leader_elect:
-            self._leadership.start(self._lead, self._gate.clear)
+            self._leadership.start(self._lead, self._gate.clear, self._look_at_all)
         else:
             self._lead()
 

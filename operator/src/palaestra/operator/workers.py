@@ -18,6 +18,7 @@ from palaestra.operator.writing import NotLeading
 
 IDLE_S = 1.0  # between two checks whether to stop
 REPEATS = 4  # conflicts in a row before the first log line; then each power of two is logged
+IN_DOUBT_S = 1.0  # between two tries of a key while a lease is in doubt
 STUCK_S = 300.0  # on one key; every call has a deadline, so no reconcile takes this long
 
 log = structlog.get_logger(__name__)
@@ -96,7 +97,8 @@ class Workers:
         except (Conflict, Outdated) as error:  # another client wrote; the cache receives it soon
             self._retry_conflict(key, error)
             return "conflict"
-        except NotLeading:  # the leader reconciles all jobs
+        except NotLeading:  # another leader reconciles all jobs; but the lease may only be renewed late
+            self._queue.add_after(key, IN_DOUBT_S)
             return "conflict"
         except ApiError as error:
             log.warning("refused", job=key, error=str(error), again_in_s=self._retry(key))
