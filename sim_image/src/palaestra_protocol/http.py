@@ -1,8 +1,8 @@
 """The HTTP server of operator, trainer and sidecar: a table of routes, and a bound for everything.
 
 Each connection has one request, with a deadline and a largest size; a slow or endless request is closed
-without an answer. The number of connections is limited, and one beyond it is closed at once. Errors are
-JSON, {"error": "<field>: <fact>"}. 404 is for an unknown path and 405 for a wrong method, 411 for a POST
+without an answer. The number of connections is limited: a new one takes the place of one that is waited for,
+as `places` says. Errors are JSON, {"error": "<field>: <fact>"}. 404 is for an unknown path and 405 for a wrong method, 411 for a POST
 without Content-Length and 413 for a body that is too long. No request is logged, because probes and scrapes
 come every few seconds.
 """
@@ -24,8 +24,8 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self, cast
 
 from palaestra_protocol.numbers import MOST_PORT
+from palaestra_protocol.places import MOST_CONNECTIONS, Places
 
-MOST_CONNECTIONS = 32
 MOST_REQUEST_BYTES = 2**17  # enough to answer a path of 64 KiB, the longest of http.server, with 414
 MOST_BODY_BYTES = 4096
 DEADLINE_S = 5.0
@@ -117,7 +117,7 @@ class Server(socketserver.ThreadingTCPServer):
         self.routes = routes
         self.name = name
         self.deadline_s = deadline_s
-        self._places = threading.BoundedSemaphore(MOST_CONNECTIONS)
+        self.places = Places()
         self._thread: threading.Thread | None = None
         super().__init__((address.host, address.port), _Handler)
 
@@ -155,8 +155,8 @@ class Server(socketserver.ThreadingTCPServer):
         self.close()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give a connection a thread, or close it if too many are open."""
-        if self._places.acquire(blocking=False):
+        """Give a connection a thread, or close it if there is no place for it."""
+        if self.places.take(request, client_address[0]):
             super().process_request(request, client_address)
         else:
             self.shutdown_request(request)
@@ -166,7 +166,7 @@ class Server(socketserver.ThreadingTCPServer):
         try:
             super().process_request_thread(request, client_address)
         finally:
-            self._places.release()
+            self.places.leave(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002 - socketserver's
         """Log an error of a route; a client that goes away is none."""
@@ -210,13 +210,21 @@ class _Handler(BaseHTTPRequestHandler):
         routes, path = self._server.routes, self.path.partition("?")[0]
         route = routes.get((self.command, path))
         if route is not None:
-            self._send(route(body))
+            self._send(self._called(route, body))
         elif any(known == path for _, known in routes):
             fact = f"{path}: does not take {self.command}"
             self._send(error_response(HTTPStatus.METHOD_NOT_ALLOWED, fact))
         else:
             known = ", ".join(sorted({known for _, known in routes}))
             self._send(error_response(HTTPStatus.NOT_FOUND, f"path: is not one of {known}"))
+
+    def _called(self, route: Route, body: bytes) -> Response:
+        """Return the answer of a route; meanwhile the connection keeps its place."""
+        self._server.places.answering(self.connection, now=True)
+        try:
+            return route(body)
+        finally:
+            self._server.places.answering(self.connection, now=False)
 
     def _send(self, response: Response) -> None:
         self.connection.settimeout(self._server.deadline_s)

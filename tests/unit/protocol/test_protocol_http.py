@@ -1,8 +1,10 @@
 """The server of operator, trainer and sidecar: what it answers, and its bounds."""
 
+import contextlib
 import json
 import logging
 import socket
+import threading
 import time
 from functools import partial
 from http import HTTPStatus
@@ -11,7 +13,6 @@ import pytest
 
 from palaestra_protocol.http import (
     MOST_BODY_BYTES,
-    MOST_CONNECTIONS,
     MOST_REQUEST_BYTES,
     Address,
     Response,
@@ -19,6 +20,7 @@ from palaestra_protocol.http import (
     json_response,
     probe_response,
 )
+from palaestra_protocol.places import MOST_OF_PEER
 from tests.waiting import eventually
 
 LOOPBACK = Address("127.0.0.1", 0)
@@ -177,19 +179,68 @@ def test_a_head_without_end_is_closed_unanswered(server) -> None:
     assert ask(server, b"GET /healthz HTTP/1.1\r\n" + lines) is None
 
 
-def test_connections_beyond_the_bound_are_closed_and_the_others_keep_their_place() -> None:
-    """A place is free again when its connection ends."""
-    with Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server:
-        kept = [connect(server) for _ in range(MOST_CONNECTIONS)]
-        with connect(server) as refused:
-            assert refused.recv(1) == b""
+REQUEST = b"GET /healthz HTTP/1.1\r\n\r\n"
 
-        kept[0].sendall(b"GET /healthz HTTP/1.1\r\n\r\n")
-        assert b"200" in kept[0].makefile("rb").readline()
-        kept[1].close()
-        assert eventually(lambda: ask(server, b"GET /healthz HTTP/1.1\r\n\r\n"))
+
+@contextlib.contextmanager
+def half_open(server, count, host="127.0.0.1"):
+    """Keep connections of one peer that begin a request and never end it."""
+    with contextlib.ExitStack() as stack:
+        kept = [
+            stack.enter_context(socket.create_connection(server.address, source_address=(host, 0)))
+            for _ in range(count)
+        ]
         for connection in kept:
-            connection.close()
+            connection.settimeout(60.0)
+            with contextlib.suppress(OSError):  # its place is another's already
+                connection.sendall(REQUEST[:9])
+        yield kept
+
+
+def test_a_probe_is_answered_while_others_keep_half_open_connections() -> None:
+    """Forty renewed ones starved every probe, and a kubelet restarts what does not answer."""
+    with Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server:
+        for host in ("127.0.0.1", "127.0.0.2", "127.0.0.3"):
+            with half_open(server, 2 * MOST_OF_PEER, host):
+                assert [ask(server, REQUEST)[0] for _ in range(5)] == [200] * 5
+
+
+def test_a_peer_with_many_connections_takes_no_place_of_another() -> None:
+    """Its own oldest one is closed, and the half request of the other is answered when it is whole."""
+    with (
+        Server(LOOPBACK, ROUTES, name="palaestra-test", deadline_s=60.0) as server,
+        half_open(server, 1, "127.0.0.2") as [other],
+        half_open(server, MOST_OF_PEER + 1) as [first, *rest],
+    ):
+        assert first.recv(1) == b""
+
+        for connection in (other, rest[-1]):
+            connection.sendall(REQUEST[9:])
+            assert b"200" in connection.makefile("rb").readline()
+
+
+def test_a_connection_whose_request_is_answered_keeps_its_place() -> None:
+    """An answer may take long; without a place for it, a new connection of its peer is closed."""
+    begun, going_on = threading.Semaphore(0), threading.Event()
+
+    def answer(_):
+        begun.release()
+        assert going_on.wait(60.0)
+        return probe_response()
+
+    slow = {("GET", "/healthz"): answer}
+    with (
+        Server(LOOPBACK, slow, name="palaestra-test", deadline_s=60.0) as server,
+        contextlib.ExitStack() as stack,
+    ):
+        asking = [stack.enter_context(connect(server)) for _ in range(MOST_OF_PEER)]
+        for connection in asking:
+            connection.sendall(REQUEST)
+            assert begun.acquire(timeout=60.0)
+        assert ask(server, REQUEST) is None
+        going_on.set()
+
+        assert all(b"200" in connection.makefile("rb").readline() for connection in asking)
 
 
 def test_an_error_of_a_route_is_logged_and_the_server_goes_on(server, caplog) -> None:
