@@ -2,9 +2,9 @@
 
 Each connection has one request, with a deadline and a largest size; a slow or endless request is closed
 without an answer. The number of connections is limited: a new one takes the place of one that is waited for,
-as `places` says. Errors are JSON, {"error": "<field>: <fact>"}. 404 is for an unknown path and 405 for a wrong method, 411 for a POST
-without Content-Length and 413 for a body that is too long. No request is logged, because probes and scrapes
-come every few seconds.
+as `places` says. Errors are JSON, {"error": "<field>: <fact>"}. 404 is for an unknown path and 405 for a
+wrong method, 411 for a POST without Content-Length and 413 for a body that is too long. No request is logged,
+because probes and scrapes come every few seconds.
 """
 
 import io

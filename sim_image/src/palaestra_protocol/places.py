@@ -23,7 +23,7 @@ class _Place:
 
 
 class Places:
-    """Who has a place now; safe to use from several threads."""
+    """The connections that have a place; safe to use from several threads."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
