@@ -12,6 +12,7 @@ from palaestra.api import API_VERSION, KIND, Metadata, Spec, TrainingJob, as_dat
 from palaestra.api.paths import Pruned, path_of, shown
 from palaestra.api.yaml_text import NotYaml, read
 from palaestra.errors import SpecErrors
+from palaestra.reading import MOST_JOB_BYTES, read_bounded
 
 Given = TrainingJob | Mapping[str, Any] | Path | str
 
@@ -24,6 +25,7 @@ def job_of(job: Given) -> TrainingJob:
     Raises:
         SpecErrors: the job is wrong; lists every mistake.
         OSError: the file cannot be read.
+        TooLarge: the file is too large for a job.
     """
     return job if isinstance(job, TrainingJob) else validate(data_of(job), name_of(job))
 
@@ -39,6 +41,7 @@ def changed(job: Given, changes: Mapping[str, Any]) -> TrainingJob:
     Raises:
         SpecErrors: a path or a value is wrong; lists every mistake.
         OSError: the file cannot be read.
+        TooLarge: the file is too large for a job.
     """
     data = Pruned(data_of(job)).data()  # a copy
     if not isinstance(data, dict):
@@ -55,6 +58,7 @@ def data_of(job: Given) -> Any:
     Raises:
         SpecErrors: the text is not YAML.
         OSError: the file cannot be read.
+        TooLarge: the file is too large for a job.
     """
     if isinstance(job, TrainingJob):
         given = job.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"status"})
@@ -62,7 +66,7 @@ def data_of(job: Given) -> Any:
     if isinstance(job, Mapping):
         return job
     is_text = isinstance(job, str) and "\n" in job
-    text = str(job) if is_text else Path(job).read_text(encoding="utf-8")
+    text = str(job) if is_text else read_bounded(Path(job), MOST_JOB_BYTES).decode()
     try:
         return read(text, name_of(job))
     except NotYaml as error:

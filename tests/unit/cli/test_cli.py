@@ -1,5 +1,7 @@
 """The command line: what each command reads, prints, and returns."""
 
+import re
+
 import pytest
 import yaml
 
@@ -50,6 +52,31 @@ def fails(capsys):
         return err.splitlines()
 
     return run
+
+
+@pytest.mark.parametrize("command", [["plan"], ["run"], ["sweep"], ["world", "--check"]])
+@pytest.mark.parametrize("endless", [False, True], ids=["a disk image", "a device without end"])
+def test_a_file_too_large_for_what_it_should_be_is_refused_by_its_size(fails, tmp_path, command, endless):
+    """It filled the memory of a laptop before anybody looked at it."""
+    file = tmp_path / "disk.img"
+    if endless:
+        file.symlink_to("/dev/zero")
+    else:
+        with file.open("wb") as image:
+            image.truncate(2**30)
+
+    [line] = fails(*command, file)
+
+    assert re.fullmatch(
+        rf"{file}: has more than (8|64) MiB, more than such a file can have; name another one", line
+    )
+
+
+def test_text_of_others_gives_a_terminal_no_orders(fails, tmp_path):
+    """A file name or a pod's message may have escape sequences, which rename a window or hide lines."""
+    [line] = fails("plan", tmp_path / "\x1b]0;mine\x07\x1b[2J.yaml")
+
+    assert line.isprintable()
 
 
 def test_plan_prints_the_objects_of_every_replica_for_kubectl(job, capsys):

@@ -10,6 +10,11 @@ def one_line(text: str, most: int) -> str:
     return flat(text.strip(), most).strip()
 
 
+def printable(text: str) -> str:
+    """Return text of any number of lines without characters that a terminal obeys."""
+    return "".join(letter if letter.isprintable() or letter in "\n\t" else " " for letter in text)
+
+
 def flat(text: str, most: int) -> str:
     """Return the same, but keep a space at either end if `text` has one there."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text[: most * 4])

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
+from palaestra.api.lines import printable
 from palaestra.cli.parsing import CONTEXT, KUBECONFIG, NAMESPACE, Commands, command
 from palaestra.client import Client, ClientError
 from palaestra.cluster import ApiError, Forbidden
@@ -42,9 +43,9 @@ def add_cluster(parser: argparse.ArgumentParser) -> None:
 
 
 def say(lines: Iterable[str]) -> None:
-    """Write lines to standard output and flush each at once."""
+    """Write lines to standard output and flush each at once; pods and other clients wrote some of them."""
     for line in lines:
-        sys.stdout.write(f"{line}\n")
+        sys.stdout.write(f"{printable(line)}\n")
         sys.stdout.flush()
 
 
@@ -82,5 +83,5 @@ def connected(work: Work) -> Callable[[argparse.Namespace], int]:
 
 
 def _refused(line: str) -> int:
-    sys.stderr.write(f"{line}\n")
+    sys.stderr.write(f"{printable(line)}\n")
     return REFUSED

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from kubernetes.utils.quantity import parse_quantity
+
 from palaestra.cli.cluster import cleaned_up, cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client
@@ -25,6 +27,12 @@ def add(commands: Commands) -> None:
     parser.add_argument("--replica", metavar="N", type=whole(), default=0, help="number; default: 0")
     parser.add_argument("--dir", type=Path, default=Path("fetched"), help="target folder; default: fetched")
     parser.add_argument(
+        "--max-size",
+        metavar="SIZE",
+        type=_size,
+        help="most of all files, such as 500Mi; default: four times the volume that the job asks for",
+    )
+    parser.add_argument(
         "--timeout",
         metavar="S",
         type=seconds,
@@ -36,7 +44,26 @@ def add(commands: Commands) -> None:
 def _fetch(client: Client, options: argparse.Namespace) -> int:
     with cleaned_up():
         folder = client.fetch(
-            options.name, replica=options.replica, into=options.dir, deadline_s=options.timeout
+            options.name,
+            replica=options.replica,
+            into=options.dir,
+            deadline_s=options.timeout,
+            most_bytes=options.max_size,
         )
     say([str(folder), *uses(folder)])
     return 0
+
+
+def _size(text: str) -> int:
+    """Return the bytes of a quantity of Kubernetes, above 0.
+
+    Raises:
+        ArgumentTypeError: it is none.
+    """
+    try:
+        size = int(parse_quantity(text))
+    except (ArithmeticError, ValueError):
+        size = 0
+    if size < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 500Mi or 2Gi")
+    return size

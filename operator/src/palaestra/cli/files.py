@@ -5,6 +5,7 @@ from pathlib import Path
 
 from palaestra.api import TrainingJob, load
 from palaestra.errors import PalaestraError
+from palaestra.reading import MOST_JOB_BYTES, MOST_WORLD_BYTES, read_bounded
 
 
 def job(file: Path) -> TrainingJob:
@@ -14,20 +15,20 @@ def job(file: Path) -> TrainingJob:
         PalaestraError: it cannot be read, or is wrong.
     """
     try:
-        text = read(file).decode()
+        text = read(file, MOST_JOB_BYTES).decode()
     except UnicodeDecodeError:
         raise PalaestraError(f"{file}: is not UTF-8; save it as UTF-8") from None
     return load(text, str(file))
 
 
-def read(file: Path) -> bytes:
+def read(file: Path, most_bytes: int = MOST_WORLD_BYTES) -> bytes:
     """Return the content of a file.
 
     Raises:
-        PalaestraError: it cannot be read.
+        PalaestraError: it cannot be read, or is larger.
     """
     try:
-        return file.read_bytes()
+        return read_bounded(file, most_bytes)
     except OSError as error:
         raise PalaestraError(f"{file}: {error.strerror}; name a readable file") from error
 

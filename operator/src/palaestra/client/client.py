@@ -252,10 +252,19 @@ class Client:
             for _ in changes(self.api, TRAINING_JOBS, self.namespace, name, deadline=deadline, uid=uid):
                 pass
 
-    def fetch(self, name: str, *, replica: int = 0, into: Path, deadline_s: float = FETCH_S) -> Path:
+    def fetch(
+        self,
+        name: str,
+        *,
+        replica: int = 0,
+        into: Path,
+        deadline_s: float = FETCH_S,
+        most_bytes: int | None = None,
+    ) -> Path:
         """Copy policy, evaluations and TensorBoard data of a run; return the folder `into/<job>/<replica>`.
 
-        Needs the rights to create and delete pods and to run commands in them.
+        Needs the rights to create and delete pods and to run commands in them. What comes from the pod is
+        not trusted: `most_bytes` bounds its size, by default four times the volume that the job asks for.
 
         Raises:
             NoSuchJob: no job has this name.
@@ -263,7 +272,7 @@ class Client:
             TookTooLong: `deadline_s` passed; nothing was written.
         """
         deadline = time.monotonic() + deadline_s
-        return fetch(self.api, self.get(name), replica, into, deadline=deadline)
+        return fetch(self.api, self.get(name), replica, into, deadline=deadline, most_bytes=most_bytes)
 
     def _suspended(self, name: str, *, suspend: bool) -> TrainingJob:
         with asked(name, self.namespace):

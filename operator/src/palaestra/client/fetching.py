@@ -4,24 +4,23 @@ The target folder appears complete or not at all: the files are written to a tem
 is then renamed. docs/decisions/0011 explains why a command in a container sends the files.
 """
 
-import io
 import secrets
-import shutil
-import tarfile
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path, PurePosixPath
-from typing import Any
+from pathlib import Path
+
+from kubernetes.utils.quantity import parse_quantity
 
 from palaestra.api import TrainingJob
 from palaestra.api.status import Phase
 from palaestra.client.errors import ClientError, NotFetched, TookTooLong
 from palaestra.client.following import changes
 from palaestra.client.reading_pod import CONTAINER, reading_pod, run_directory
+from palaestra.client.unpacking import WrongArchive, unpack
 from palaestra.cluster import Api, ApiError, CommandFailed, NotFound, Unreachable
 from palaestra.cluster.resources import JOBS, PODS
 from palaestra.objects import Object
@@ -37,6 +36,8 @@ PARTS = (
     "attempts.jsonl",
     "tensorboard",
 )
+TIMES = 4  # provisioners round sizes up, and some do not limit a volume at all
+OF_EXISTING_BYTES = 2**34
 GOES_ON = frozenset({Phase.PENDING, Phase.RUNNING})  # A replica in these phases without a pod will get one.
 
 
@@ -50,8 +51,18 @@ class Source:
     directory: str
 
 
-def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: float) -> Path:
+def fetch(
+    api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: float, most_bytes: int | None = None
+) -> Path:
     """Return the new folder `into/<job>/<replica>`: policy, evaluations and TensorBoard data of a run.
+
+    Args:
+        api: the cluster.
+        job: whose run it is.
+        replica: its number.
+        into: the folder for results.
+        deadline: on the monotonic clock.
+        most_bytes: of all files; None: `TIMES` the volume that the job asks for.
 
     Raises:
         NotFetched: the folder exists already, the run does not exist, or one of them cannot be accessed.
@@ -62,8 +73,14 @@ def fetch(api: Api, job: TrainingJob, replica: int, into: Path, *, deadline: flo
     if target.exists():
         raise NotFetched(f"{target}: already exists; move it away, or choose another folder")
     with _source(api, job, replica, deadline) as source, _with_remedies(source, target, deadline):
-        _copy(api, source, target, deadline)
+        _copy(api, source, target, deadline, most_bytes or _usual_bytes(job))
     return target
+
+
+def _usual_bytes(job: TrainingJob) -> int:
+    """Return the bound for the files of a run; nobody asked for the size of a claim that existed before."""
+    storage = job.spec.storage
+    return TIMES * int(parse_quantity(storage.size)) if storage.existing_claim is None else OF_EXISTING_BYTES
 
 
 @contextmanager
@@ -84,11 +101,16 @@ def _with_remedies(source: Source, target: Path, deadline: float) -> Iterator[No
             f"{source.directory} in pod {source.pod}: cannot be read ({error}); "
             "run the same command again when the training has ended"
         ) from error
-    except (OSError, tarfile.TarError) as error:
+    except WrongArchive as error:
+        raise NotFetched(
+            f"{source.directory} in pod {source.pod}: was refused: {error}; nothing was written; look "
+            "into the run, and allow more with --max-size if it is only large"
+        ) from error
+    except OSError as error:
         raise NotFetched(f"{target}: {error}; choose a writable folder") from error
 
 
-def _copy(api: Api, source: Source, target: Path, deadline: float) -> None:
+def _copy(api: Api, source: Source, target: Path, deadline: float, most_bytes: int) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     program = files("palaestra.client").joinpath("packing.py").read_text(encoding="utf-8")
     command = ["python3", "-I", "-c", program, source.directory, *PARTS]
@@ -98,57 +120,13 @@ def _copy(api: Api, source: Source, target: Path, deadline: float) -> None:
     with tempfile.TemporaryDirectory(prefix=".fetch-", dir=target.parent) as beside:
         partial = Path(beside) / "run"
         partial.mkdir()
-        unpack(chunks, partial)
+        unpack(chunks, partial, PARTS, most_bytes)
         if not any(partial.iterdir()):
             raise NotFetched(
                 f"{source.directory} in pod {source.pod}: is still empty; "
                 "try again after the first evaluation"
             )
         partial.rename(target)
-
-
-def unpack(chunks: Iterator[bytes], into: Path) -> None:
-    """Write the files of a tar stream into a folder, and read the stream to its end.
-
-    Raises:
-        TarError: it is not a tar, or a member is not a file or has a path outside of the folder.
-        OSError: a file cannot be written.
-    """
-    with tarfile.open(fileobj=_Stream(chunks), mode="r|") as tar:
-        for member in tar:
-            path = PurePosixPath(member.name)
-            content = tar.extractfile(member) if member.isfile() else None
-            if content is None or path.is_absolute() or ".." in path.parts:
-                raise tarfile.ExtractError(f"{member.name} is not a file of the run")
-            file = into / path
-            file.parent.mkdir(parents=True, exist_ok=True)
-            with content, file.open("xb") as target:
-                shutil.copyfileobj(content, target)
-    for _ in chunks:  # The exit code of the command comes last.
-        pass
-
-
-class _Stream(io.RawIOBase):
-    """An iterator of chunks as a readable file."""
-
-    def __init__(self, chunks: Iterator[bytes]) -> None:
-        self._chunks = chunks
-        self._rest = b""
-
-    def readable(self) -> bool:
-        """Return True."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """Copy received bytes into the buffer and return their number; 0 at the end."""
-        while not self._rest:
-            try:
-                self._rest = next(self._chunks)
-            except StopIteration:
-                return 0
-        size = min(len(buffer), len(self._rest))
-        buffer[:size], self._rest = self._rest[:size], self._rest[size:]
-        return size
 
 
 @contextmanager

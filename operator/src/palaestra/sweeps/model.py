@@ -19,6 +19,7 @@ from palaestra.api.tree import fields_of, model_at
 from palaestra.api.yaml_text import NotYaml, read
 from palaestra.errors import SpecErrors
 from palaestra.given import data_of, full_path
+from palaestra.reading import MOST_JOB_BYTES, read_bounded
 
 LABEL = "palaestra.dev/sweep"
 MOST_TRIALS = 1000
@@ -152,9 +153,10 @@ def load(file: Path) -> Sweep:
     Raises:
         SpecErrors: the file is wrong; lists every mistake.
         OSError: it or the file of its job cannot be read.
+        TooLarge: one of them is too large.
     """
     try:
-        data = read(file.read_text(encoding="utf-8"), str(file))
+        data = read(read_bounded(file, MOST_JOB_BYTES).decode(), str(file))
     except NotYaml as error:
         raise SpecErrors(str(file), (error.problem,)) from None
     sweep = _validated(data, str(file))

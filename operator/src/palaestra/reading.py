@@ -1,0 +1,30 @@
+"""Read files that a person names, up to a size: one may be a disk image, or a device without end."""
+
+import os
+import stat
+from pathlib import Path
+
+from palaestra.errors import PalaestraError
+
+MOST_JOB_BYTES = 2**23  # eight times what an API server takes; YAML may escape each letter
+MOST_WORLD_BYTES = 2**26
+
+
+class TooLarge(PalaestraError):
+    """A file is larger than what it should be can be."""
+
+
+def read_bounded(file: Path, most_bytes: int) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        TooLarge: it has more than `most_bytes`; of a regular file, nothing is read then.
+        OSError: it cannot be read.
+    """
+    with file.open("rb") as content:
+        status = os.fstat(content.fileno())
+        if not stat.S_ISREG(status.st_mode) or status.st_size <= most_bytes:
+            found = content.read(most_bytes + 1)
+            if len(found) <= most_bytes:
+                return found
+    raise TooLarge(f"{file}: has more than {most_bytes >> 20} MiB, more than such a file can have; name another one")
