@@ -27,4 +27,6 @@ def read_bounded(file: Path, most_bytes: int) -> bytes:
             found = content.read(most_bytes + 1)
             if len(found) <= most_bytes:
                 return found
-    raise TooLarge(f"{file}: has more than {most_bytes >> 20} MiB, more than such a file can have; name another one")
+    raise TooLarge(
+        f"{file}: has more than {most_bytes >> 20} MiB, more than such a file can have; name another one"
+    )

@@ -18,6 +18,8 @@ from datetime import datetime
 from enum import StrEnum
 from typing import TypeVar, cast
 
+from palaestra_protocol.masking import masked
+
 T = TypeVar("T")
 Choice = TypeVar("Choice", bound=StrEnum)
 
@@ -50,8 +52,11 @@ def decoded(data: bytes, most_bytes: int = MOST_BYTES) -> object:
 
 
 def clipped(text: str, most: int = MOST_TEXT) -> str:
-    """Return the first `most` characters of `text`, with characters that UTF-8 cannot encode replaced."""
-    return text[:most].encode("utf-8", "replace").decode()
+    """Return the first `most` characters of `text`, without the passwords of addresses.
+
+    Characters that UTF-8 cannot encode are replaced.
+    """
+    return masked(text)[:most].encode("utf-8", "replace").decode()
 
 
 def enumerated(texts: Sequence[str], most: int, most_entries: int) -> list[str]:

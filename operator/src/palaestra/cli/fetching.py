@@ -3,13 +3,12 @@
 import argparse
 from pathlib import Path
 
-from kubernetes.utils.quantity import parse_quantity
-
 from palaestra.cli.cluster import cleaned_up, cluster_command, say
 from palaestra.cli.parsing import Commands
 from palaestra.client import Client
 from palaestra.client.client import FETCH_S
 from palaestra.local.outcome import uses
+from palaestra.plan.resources import in_bytes
 from palaestra_protocol.numbers import seconds, whole
 
 FETCH = """\
@@ -61,8 +60,8 @@ def _size(text: str) -> int:
         ArgumentTypeError: it is none.
     """
     try:
-        size = int(parse_quantity(text))
-    except (ArithmeticError, ValueError):
+        size = in_bytes(text)
+    except (ArithmeticError, LookupError):
         size = 0
     if size < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 500Mi or 2Gi")

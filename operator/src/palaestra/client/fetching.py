@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from kubernetes.utils.quantity import parse_quantity
-
 from palaestra.api import TrainingJob
 from palaestra.api.status import Phase
 from palaestra.client.errors import ClientError, NotFetched, TookTooLong
@@ -25,6 +23,7 @@ from palaestra.cluster import Api, ApiError, CommandFailed, NotFound, Unreachabl
 from palaestra.cluster.resources import JOBS, PODS
 from palaestra.objects import Object
 from palaestra.plan.replica import TRAINER
+from palaestra.plan.resources import in_bytes
 
 PARTS = (
     "training.yaml",
@@ -80,7 +79,7 @@ def fetch(
 def _usual_bytes(job: TrainingJob) -> int:
     """Return the bound for the files of a run; nobody asked for the size of a claim that existed before."""
     storage = job.spec.storage
-    return TIMES * int(parse_quantity(storage.size)) if storage.existing_claim is None else OF_EXISTING_BYTES
+    return TIMES * in_bytes(storage.size) if storage.existing_claim is None else OF_EXISTING_BYTES
 
 
 @contextmanager

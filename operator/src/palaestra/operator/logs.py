@@ -2,8 +2,13 @@
 
 import logging
 import sys
+from typing import Any
 
 import structlog
+
+from palaestra_protocol.masking import masked
+
+_JSON = structlog.processors.JSONRenderer(default=str)
 
 
 def configure_logs() -> None:
@@ -14,7 +19,12 @@ def configure_logs() -> None:
             structlog.processors.add_log_level,
             structlog.processors.TimeStamper(fmt="iso", utc=True),
             structlog.processors.dict_tracebacks,
-            structlog.processors.JSONRenderer(default=str),
+            _render,
         ],
         logger_factory=lambda *_: structlog.PrintLogger(sys.stderr),
     )
+
+
+def _render(logger: Any, name: str, fields: structlog.typing.EventDict) -> str:
+    """Return the line, in which the user information of addresses is masked."""
+    return masked(str(_JSON(logger, name, fields)))

@@ -12,9 +12,10 @@ from palaestra.api.container import Resources
 
 Quantities = Mapping[str, str]
 CORES = {"m": 0.001, "": 1.0, "k": 1000.0}  # what CPUs are counted in
-BYTES = {
-    "M": 10**6, "G": 10**9, "T": 10**12,
-    "Mi": 2**20, "Gi": 2**30, "Ti": 2**40,
+BYTES: dict[str, Decimal | int] = {
+    "m": Decimal("0.001"),
+    "": 1, "k": 10**3, "M": 10**6, "G": 10**9, "T": 10**12, "P": 10**15,
+    "Ki": 2**10, "Mi": 2**20, "Gi": 2**30, "Ti": 2**40, "Pi": 2**50,
 }  # fmt: skip
 
 Planned = dict[str, dict[str, str]]
@@ -61,7 +62,7 @@ def twice(quantity: str) -> str:
 def in_bytes(memory: str) -> int:
     """Return how many bytes an amount of memory such as 400Mi is."""
     number, unit = _split(memory)
-    return int(number) * BYTES[unit]
+    return int(Decimal(number) * BYTES[unit])
 
 
 def threads(planned: Planned) -> int:

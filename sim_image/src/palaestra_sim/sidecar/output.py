@@ -9,6 +9,8 @@ import logging
 import os
 import select
 
+from palaestra_protocol.masking import masked
+
 STDOUT = 1
 MOST_LINE = select.PIPE_BUF  # 4096: the most that POSIX writes into a pipe in one piece
 _CHUNK = 65536
@@ -28,7 +30,7 @@ class LineHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write one record."""
-        text = f"palaestra-sidecar: {record.getMessage()}".encode("utf-8", "replace")
+        text = f"palaestra-sidecar: {masked(record.getMessage())}".encode("utf-8", "replace")
         write_line(text[: MOST_LINE - 1].replace(b"\n", b" ") + b"\n")
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import structlog
 
+from palaestra_protocol.masking import masked
 from palaestra_protocol.pod.status import MOST_LINES
 
 _last_lines: deque[str] = deque(maxlen=MOST_LINES)
@@ -35,9 +36,9 @@ def last_lines() -> tuple[str, ...]:
 
 
 class _Renderer(structlog.dev.ConsoleRenderer):
-    """Renders, and keeps the last lines."""
+    """Renders without the passwords of addresses, and keeps the last lines."""
 
     def __call__(self, logger: Any, name: str, event_dict: structlog.typing.EventDict) -> str:
-        text = super().__call__(logger, name, event_dict)
+        text = masked(super().__call__(logger, name, event_dict))
         _last_lines.extend(line for line in text.splitlines() if line.strip())
         return text

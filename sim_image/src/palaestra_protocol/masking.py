@@ -1,0 +1,12 @@
+"""Texts that leave a process, without the passwords that addresses in them have."""
+
+import re
+
+# What stands between the scheme and the host of an address: a user, a password, or a token.
+_USER_INFORMATION = re.compile(r"(?<=://)[^\s/?#]{1,4096}@")
+MASK = "***@"
+
+
+def masked(text: str) -> str:
+    """Return text in which the user information of each address is masked."""
+    return _USER_INFORMATION.sub(MASK, text) if "://" in text else text
