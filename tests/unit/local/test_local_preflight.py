@@ -47,6 +47,15 @@ def test_the_error_for_a_missing_ros_names_what_to_install(request_for, monkeypa
     assert problems == [f"rosmaster: is not installed; {preflight.ROS}"]
 
 
+def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch, tmp_path):
+    """There the processes that a container leaves behind could not be found, and would live on."""
+    monkeypatch.setattr(preflight, "ENVIRONMENT", tmp_path / "environ")
+
+    [problem] = preflight.processes_can_be_found(request_for())
+
+    assert problem.startswith(f"{tmp_path}/environ: No such file or directory; run on Linux")
+
+
 def test_a_suspended_job_is_refused(request_for):
     """Nothing here would ever set it to false, and training that was put off must not begin."""
     [problem] = preflight.nothing_is_put_off(request_for(suspend=True))

@@ -31,6 +31,7 @@ class Request:
 
 
 Check = Callable[[Request], Iterator[str]]
+ENVIRONMENT = Path("/proc/self/environ")
 
 
 def check(request: Request) -> None:
@@ -41,6 +42,15 @@ def check(request: Request) -> None:
     """
     if problems := [problem for check in CHECKS for problem in check(request)]:
         raise Refused("\n".join(problems))
+
+
+def processes_can_be_found(request: Request) -> Iterator[str]:
+    """The system has Linux' /proc, by which the runner finds the processes that a container leaves behind."""
+    del request
+    try:
+        ENVIRONMENT.read_bytes()
+    except OSError as error:
+        yield f"{ENVIRONMENT}: {error.strerror}; run on Linux with /proc mounted, such as in a container or WSL 2"
 
 
 def ros_is_installed(request: Request) -> Iterator[str]:
@@ -109,6 +119,7 @@ def space_is_left(request: Request) -> Iterator[str]:
 
 
 CHECKS: tuple[Check, ...] = (
+    processes_can_be_found,
     ros_is_installed,
     nothing_is_put_off,
     programs_exist,
