@@ -13,6 +13,7 @@ from palaestra.local import watchdog
 from palaestra.local.errors import StartFailed
 from palaestra.local.process import marked
 from palaestra.local.spec import Probe
+from tests.failing import failing
 
 
 def ready(stage, file="ready"):
@@ -195,22 +196,13 @@ def test_what_a_container_left_behind_ends_with_the_pod(stage):
     assert code == 0
 
 
-def pidfd_fails_with(number):
-    """Return a `pidfd_open` of a kernel or container runtime without it."""
-
-    def pidfd_open(pid, flags=0):
-        raise OSError(number, os.strerror(number))
-
-    return pidfd_open
-
-
 @pytest.mark.parametrize("lack", [None, errno.ENOSYS, errno.EPERM])
 def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypatch):
     """Old kernels (ENOSYS), seccomp filters (EPERM), and a Python that was built for an old kernel."""
     if lack is None:
         monkeypatch.delattr(os, "pidfd_open")
     else:
-        monkeypatch.setattr(os, "pidfd_open", pidfd_fails_with(lack))
+        monkeypatch.setattr(os, "pidfd_open", failing(lack))
     with subprocess.Popen(["sleep", "60"], env=marked({}, "pod", "main")) as left:
         killed = watchdog.kill_marked("pod/")
         if not killed:
@@ -221,7 +213,7 @@ def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypa
 
 def test_a_pod_runs_on_a_system_without_pidfd(stage, monkeypatch):
     """The ends of its processes are seen without it."""
-    monkeypatch.setattr(os, "pidfd_open", pidfd_fails_with(errno.EPERM))
+    monkeypatch.setattr(os, "pidfd_open", failing(errno.EPERM))
 
     until = f"until grep -q start {stage.folder}/events; do sleep 0.01; done; exit 7"
 

@@ -1,7 +1,7 @@
 """The histograms that operator and trainer serve, by the rules of Prometheus' text format and OpenMetrics.
 
-Sources: https://prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Readers
-are strict where Prometheus is not: OpenTelemetry's Prometheus receiver drops a histogram without a `_count`.
+Sources: https://prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Some
+readers are stricter than Prometheus: OpenTelemetry's receiver drops a histogram without a `_count`.
 """
 
 from collections import defaultdict

@@ -50,7 +50,7 @@ def processes_can_be_found(request: Request) -> Iterator[str]:
     try:
         ENVIRONMENT.read_bytes()
     except OSError as error:
-        yield f"{ENVIRONMENT}: {error.strerror}; run on Linux with /proc mounted, such as in a container or WSL 2"
+        yield f"{ENVIRONMENT}: {error.strerror}; run on Linux with /proc, as in a container or WSL 2"
 
 
 def ros_is_installed(request: Request) -> Iterator[str]:

@@ -73,7 +73,7 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     that was started with the descriptor passes it as `taken`.
 
     Raises:
-        Refused: another runner has it.
+        Refused: another runner has it, or its file system has no locks.
         StorageFailed: its parent cannot be written.
     """
     path = directory.with_name(f"{directory.name}.lock")
@@ -100,6 +100,12 @@ def _take(directory: Path, path: Path) -> int:
             f"{directory}: `palaestra run` is at work there (process {holder}); "
             "wait for its end, or choose another folder with --dir"
         ) from None
+    except OSError as error:
+        os.close(descriptor)
+        raise Refused(
+            f"{path}: the file system has no locks ({error.strerror}), and without one two runs could write "
+            "into this directory; choose a folder on a local disk with --dir"
+        ) from error
     return descriptor
 
 
