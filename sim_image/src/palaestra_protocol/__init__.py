@@ -7,9 +7,10 @@
 - `metrics`: families of metrics, as data
 - `numbers`: numbers of command-line options
 - `imports`: imports of programs, without what they do not use
+- `shadowing`: a user's modules that shadow those of Python and of dependencies
 - `signals`: which signals a program obeys
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time, size and connections
 
-This package imports none of the others. All modules except `http`, `imports`, `signals` and `ros.sockets`
-are pure: values and bytes.
+This package imports none of the others. All modules except `http`, `imports`, `shadowing`, `signals` and
+`ros.sockets` are pure: values and bytes.
 """

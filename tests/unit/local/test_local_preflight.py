@@ -56,6 +56,22 @@ def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch,
     assert problem.startswith(f"{tmp_path}/environ: No such file or directory; run on Linux")
 
 
+def test_a_module_that_shadows_another_is_named(request_for, monkeypatch, tmp_path):
+    """On the machine's PYTHONPATH and on the job's own; both reach a process of the pod."""
+    for folder in ("machine", "job"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "queue.py").touch()
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "machine"))
+    own = {"name": "PYTHONPATH", "value": str(tmp_path / "job")}
+
+    problems = sorted(preflight.no_module_is_shadowed(request_for(trainer={"env": [own]})))
+
+    assert [problem.partition(":")[0] for problem in problems] == [
+        f"{tmp_path}/job/queue.py",
+        f"{tmp_path}/machine/queue.py",
+    ]
+
+
 def test_a_suspended_job_is_refused(request_for):
     """Nothing here would ever set it to false, and training that was put off must not begin."""
     [problem] = preflight.nothing_is_put_off(request_for(suspend=True))

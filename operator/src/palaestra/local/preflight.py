@@ -13,10 +13,12 @@ from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import Refused
 from palaestra.local.process import program_path
 from palaestra.local.simulators import PROGRAMS, lack
+from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
 from palaestra_sim.errors import WorldError
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
+PYTHON_PATH = "PYTHONPATH"
 POLICY = "policy.pth"  # in a zip of Stable-Baselines3
 INSTALLATION = "this installation"
 ROS = "install python3-rospy and python3-rosmaster (`make setup` does)"
@@ -60,6 +62,13 @@ def ros_is_installed(request: Request) -> Iterator[str]:
         yield f"rosmaster: is not installed; {ROS}"
     if importlib.util.find_spec("rospy") is None:
         yield f"rospy: cannot be imported by {sys.executable}; {ROS}"
+
+
+def no_module_is_shadowed(request: Request) -> Iterator[str]:
+    """No module on PYTHONPATH has the name of one that the ROS master or the trainer needs."""
+    own = (each.value for each in request.job.spec.trainer.env if each.name == PYTHON_PATH)
+    for python_path in {os.environ.get(PYTHON_PATH, ""), *own}:
+        yield from shadows(python_path or "")
 
 
 def nothing_is_put_off(request: Request) -> Iterator[str]:
@@ -120,6 +129,7 @@ def space_is_left(request: Request) -> Iterator[str]:
 
 CHECKS: tuple[Check, ...] = (
     processes_can_be_found,
+    no_module_is_shadowed,
     ros_is_installed,
     nothing_is_put_off,
     programs_exist,
