@@ -1,5 +1,6 @@
 """Problems of a machine or a job are found before anything is started."""
 
+import errno
 import zipfile
 
 import pytest
@@ -9,6 +10,7 @@ from palaestra.local import preflight
 from palaestra.local.errors import Refused
 from palaestra.local.preflight import Request
 from palaestra_sim.world import builtin
+from tests.failing import failing
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
 
@@ -156,6 +158,17 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
 
     with pytest.raises(Refused, match=r"MiB are free and a run takes .*--dir"):
         preflight.check(request_for())
+
+
+def test_a_file_system_without_locks_is_refused(request_for, monkeypatch, tmp_path):
+    """Before the folder of the run is made; the check leaves nothing behind."""
+    monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
+
+    [problem] = preflight.locks_work(request_for())
+
+    assert problem.startswith(f"{tmp_path}: the file system has no locks (No locks available)")
+    assert problem.endswith("; choose a folder on a local disk with --dir")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_all_problems_are_reported_at_once(request_for, monkeypatch):

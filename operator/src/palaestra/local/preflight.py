@@ -1,16 +1,20 @@
 """Checks before anything is started, each with its remedy."""
 
+import fcntl
 import importlib.util
 import os
 import shutil
 import sys
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import Refused
+from palaestra.local.files import without_locks
 from palaestra.local.process import program_path
 from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.shadowing import shadows
@@ -117,7 +121,7 @@ def initial_policy_is_there(request: Request) -> Iterator[str]:
 
 def space_is_left(request: Request) -> Iterator[str]:
     """The disk has space for the run."""
-    folder = next(parent for parent in (request.runs, *request.runs.parents) if parent.exists())
+    folder = _existing(request.runs)
     if not os.access(folder, os.W_OK):
         yield f"{folder}: cannot be written; choose another folder with --dir"
     elif (free := shutil.disk_usage(folder).free) < LEAST_FREE:
@@ -125,6 +129,16 @@ def space_is_left(request: Request) -> Iterator[str]:
             f"{folder}: {free // 2**20} MiB are free and a run takes {LEAST_FREE // 2**20}; "
             "make room, or choose another folder with --dir"
         )
+
+
+def locks_work(request: Request) -> Iterator[str]:
+    """The file system of the runs has locks; a file without a name is locked, so nothing is left behind."""
+    folder = _existing(request.runs)
+    with suppress(OSError), TemporaryFile(dir=folder) as file:  # not writable: `space_is_left` reports it
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            yield without_locks(folder, error)
 
 
 CHECKS: tuple[Check, ...] = (
@@ -136,7 +150,13 @@ CHECKS: tuple[Check, ...] = (
     worlds_are_right,
     initial_policy_is_there,
     space_is_left,
+    locks_work,
 )
+
+
+def _existing(path: Path) -> Path:
+    """Return the lowest existing folder on the way to a path."""
+    return next(parent for parent in (path, *path.parents) if parent.exists())
 
 
 def _simulator_program(group: SimulatorGroup) -> str:

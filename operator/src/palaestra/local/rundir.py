@@ -28,7 +28,7 @@ from palaestra.api.paths import shown
 from palaestra.api.tree import fields_of, walk
 from palaestra.errors import SpecErrors
 from palaestra.local.errors import Refused
-from palaestra.local.files import make_folder, storage, write
+from palaestra.local.files import make_folder, storage, without_locks, write
 from palaestra.local.outcome import Outcome
 from palaestra_protocol.pod.status import ExitCode
 
@@ -102,10 +102,7 @@ def _take(directory: Path, path: Path) -> int:
         ) from None
     except OSError as error:
         os.close(descriptor)
-        raise Refused(
-            f"{path}: the file system has no locks ({error.strerror}), and without one two runs could write "
-            "into this directory; choose a folder on a local disk with --dir"
-        ) from error
+        raise Refused(without_locks(path, error)) from error
     return descriptor
 
 
