@@ -28,14 +28,19 @@ def locked(file: Path, deadline_s: int) -> Iterator[None]:
     For the main thread, as the wait for the other call is ended by SIGALRM.
 
     Raises:
-        ImagesError: another call has held it for `deadline_s`.
+        ImagesError: another call has held it for `deadline_s`, or the file system has no locks.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("w") as handle:
         signal.signal(signal.SIGALRM, partial(_give_up, file))
         signal.alarm(deadline_s)
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        signal.alarm(0)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        except OSError as error:
+            fact = f"{file}: the file system has no locks ({error.strerror})"
+            raise ImagesError(f"{fact}; set XDG_CACHE_HOME to a folder on a local disk") from error
+        finally:
+            signal.alarm(0)
         yield
 
 

@@ -1,5 +1,9 @@
 """The control plane: the TrainingJob, its plan, the local runner, and a client of clusters."""
 
+from palaestra_protocol.shadowing import settle_imports
+
+settle_imports()
+
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

@@ -8,10 +8,11 @@
 - `numbers`: numbers of command-line options
 - `imports`: imports of programs, without what they do not use
 - `masking`: texts without the passwords of addresses
+- `shadowing`: a user's modules that shadow those of Python and of dependencies
 - `signals`: which signals a program obeys
 - `http`: the HTTP server of operator, trainer and sidecar, with limits for time and size
 - `places`: the connections that this server keeps
 
-This package imports none of the others. All modules except `http`, `imports`, `places`, `signals` and
-`ros.sockets` are pure: values and bytes.
+This package imports none of the others. All modules except `http`, `imports`, `places`, `shadowing`,
+`signals` and `ros.sockets` are pure: values and bytes.
 """

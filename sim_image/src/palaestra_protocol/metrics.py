@@ -131,8 +131,10 @@ class Tally:
         counts = list(accumulate(self._counts))
         for bound, count in zip((*self._bounds, "+Inf"), counts, strict=True):
             yield "_bucket", {"le": str(bound)}, count
-        if self._bounds[0] >= 0:  # else the sum may fall. Source: OpenMetrics 1.0, "Histogram"
-            yield "_count", {}, counts[-1]
+        yield "_count", {}, counts[-1]  # without it, OpenTelemetry's Prometheus receiver drops the histogram
+        # A sum that falls looks like a restart to Prometheus' rate() and to OpenTelemetry's receiver.
+        # Source: OpenMetrics 1.0, "Histogram"
+        if self._bounds[0] >= 0:
             yield "_sum", {}, self.total
 
 

@@ -1,1 +1,5 @@
 """The programs of a simulator's container: worlds, the sidecar, the stub simulator."""
+
+from palaestra_protocol.shadowing import settle_imports
+
+settle_imports()

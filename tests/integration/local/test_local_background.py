@@ -2,6 +2,7 @@
 
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -92,6 +93,8 @@ def begun(run):
 def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
     """A notebook is run again from the top."""
     with palaestra.run(job(END), runs=tmp_path) as run:
+        readable, _, _ = select.select([run], [], [], PATIENCE_S)
+        assert readable == [run]
         result = run.result(PATIENCE_S)
 
     assert (result.exit_code, result.succeeded, result.steps, result.faults) == (0, True, 7, 2)

@@ -1,12 +1,19 @@
 """A pod on this machine behaves as a kubelet's pod does: order, probes, restarts, shutdown."""
 
 import asyncio
+import errno
+import os
 import re
+import signal
+import subprocess
 
 import pytest
 
+from palaestra.local import watchdog
 from palaestra.local.errors import StartFailed
+from palaestra.local.process import marked
 from palaestra.local.spec import Probe
+from tests.failing import failing
 
 
 def ready(stage, file="ready"):
@@ -187,6 +194,33 @@ def test_what_a_container_left_behind_ends_with_the_pod(stage):
     code = stage.run(main=leave)
 
     assert code == 0
+
+
+@pytest.mark.parametrize("lack", [None, errno.ENOSYS, errno.EPERM])
+def test_what_was_left_behind_is_killed_on_a_system_without_pidfd(lack, monkeypatch):
+    """Old kernels (ENOSYS), seccomp filters (EPERM), and a Python that was built for an old kernel."""
+    if lack is None:
+        monkeypatch.delattr(os, "pidfd_open")
+    else:
+        monkeypatch.setattr(os, "pidfd_open", failing(lack))
+    with subprocess.Popen(["sleep", "60"], env=marked({}, "pod", "main")) as left:
+        killed = watchdog.kill_marked("pod/")
+        if not killed:
+            left.kill()
+
+    assert (killed, left.returncode) == (1, -signal.SIGKILL)
+
+
+def test_a_pod_runs_on_a_system_without_pidfd(stage, monkeypatch):
+    """The ends of its processes are seen without it."""
+    monkeypatch.setattr(os, "pidfd_open", failing(errno.EPERM))
+
+    until = f"until grep -q start {stage.folder}/events; do sleep 0.01; done; exit 7"
+
+    code = stage.run(stage.sidecar("a"), main=until)
+
+    assert code == 7
+    assert stage.events == ["a start", "a stop"]
 
 
 def test_a_program_that_does_not_exist_ends_as_in_a_shell(stage):

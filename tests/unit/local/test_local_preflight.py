@@ -1,5 +1,6 @@
 """Problems of a machine or a job are found before anything is started."""
 
+import errno
 import zipfile
 
 import pytest
@@ -9,6 +10,7 @@ from palaestra.local import preflight
 from palaestra.local.errors import Refused
 from palaestra.local.preflight import Request
 from palaestra_sim.world import builtin
+from tests.failing import failing
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "a"}}
 
@@ -45,6 +47,31 @@ def test_the_error_for_a_missing_ros_names_what_to_install(request_for, monkeypa
     problems = list(preflight.ros_is_installed(request_for()))
 
     assert problems == [f"rosmaster: is not installed; {preflight.ROS}"]
+
+
+def test_a_system_without_the_proc_of_linux_is_refused(request_for, monkeypatch, tmp_path):
+    """There the processes that a container leaves behind could not be found, and would live on."""
+    monkeypatch.setattr(preflight, "ENVIRONMENT", tmp_path / "environ")
+
+    [problem] = preflight.processes_can_be_found(request_for())
+
+    assert problem.startswith(f"{tmp_path}/environ: No such file or directory; run on Linux")
+
+
+def test_a_module_that_shadows_another_is_named(request_for, monkeypatch, tmp_path):
+    """On the machine's PYTHONPATH and on the job's own; both reach a process of the pod."""
+    for folder in ("machine", "job"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "queue.py").touch()
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "machine"))
+    own = {"name": "PYTHONPATH", "value": str(tmp_path / "job")}
+
+    problems = sorted(preflight.no_module_is_shadowed(request_for(trainer={"env": [own]})))
+
+    assert [problem.partition(":")[0] for problem in problems] == [
+        f"{tmp_path}/job/queue.py",
+        f"{tmp_path}/machine/queue.py",
+    ]
 
 
 def test_a_suspended_job_is_refused(request_for):
@@ -131,6 +158,17 @@ def test_a_nearly_full_disk_is_refused(request_for, monkeypatch):
 
     with pytest.raises(Refused, match=r"MiB are free and a run takes .*--dir"):
         preflight.check(request_for())
+
+
+def test_a_file_system_without_locks_is_refused(request_for, monkeypatch, tmp_path):
+    """Before the folder of the run is made; the check leaves nothing behind."""
+    monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
+
+    [problem] = preflight.locks_work(request_for())
+
+    assert problem.startswith(f"{tmp_path}: the file system has no locks (No locks available)")
+    assert problem.endswith("; choose a folder on a local disk with --dir")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_all_problems_are_reported_at_once(request_for, monkeypatch):

@@ -14,6 +14,7 @@ from palaestra.local import rundir
 from palaestra.local.errors import Refused, StorageFailed
 from palaestra.local.files import write
 from palaestra.local.outcome import Outcome, summary
+from tests.failing import failing
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}}
 SPEC = {"seed": 1, "replicas": 1, "simulators": [{"name": "a", "startDeadlineSeconds": 60}]}
@@ -196,6 +197,21 @@ def test_only_one_runner_at_a_time_has_a_directory(tmp_path):
 
     with rundir.locked(path), pytest.raises(Refused, match=rf"process {os.getpid()}"), rundir.locked(path):
         pass
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_refused(tmp_path, monkeypatch, number):
+    """NFS without its lock service, and Lustre without `flock`; two runs could not be kept apart."""
+    monkeypatch.setattr("fcntl.flock", failing(number))
+    path = tmp_path / "job" / "0"
+
+    with pytest.raises(Refused) as refused, rundir.locked(path):
+        pass
+
+    fact, _, remedy = str(refused.value).partition("; ")
+    assert fact.startswith(f"{path}.lock: the file system has no locks ({os.strerror(number)})")
+    assert remedy == "choose a folder on a local disk with --dir"
+    assert not path.exists()
 
 
 def test_a_lock_is_free_again_afterwards(tmp_path):

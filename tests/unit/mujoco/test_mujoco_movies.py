@@ -1,5 +1,6 @@
 """Movies by a supervisor: read back with the library that has written them."""
 
+import errno
 import math
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ from palaestra_sim.scene.movies import Movie, frame_step_ms
 from palaestra_sim.scene.simulation import Simulation
 from palaestra_sim.seam import UnsimulatedError
 from palaestra_sim.stub.physics import StubPhysics
+from tests.failing import failing
 
 SIZE = (64, 48)
 BLUE, GREEN, RED = range(3)
@@ -103,6 +105,20 @@ def test_a_movie_removes_what_a_killed_simulator_left_of_it(simulation, tmp_path
     assert len(underway) == 1
     assert {*tmp_path.iterdir()} == {path, *(each for each in left if each.name.startswith(".drive-2"))}
     assert not other.movies.failed
+
+
+def test_on_a_file_system_without_locks_a_movie_removes_nothing(simulation, tmp_path, monkeypatch):
+    """There a hidden file of a killed simulator looks like one that is being written."""
+    unfinished = tmp_path / ".drive.mp4-x.unfinished"
+    unfinished.touch()
+    monkeypatch.setattr("fcntl.flock", failing(errno.ENOLCK))
+
+    simulation.movies.start(movie(tmp_path / "drive.mp4"))
+    simulation.step(40)
+    simulation.movies.stop()
+
+    assert {*tmp_path.iterdir()} == {tmp_path / "drive.mp4", unfinished}
+    assert not simulation.movies.failed
 
 
 def test_a_movie_may_be_faster_than_the_simulation(simulation, tmp_path):

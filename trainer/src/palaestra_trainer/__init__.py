@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from palaestra_protocol.shadowing import settle_imports
+
+settle_imports()
+
 from typing import TYPE_CHECKING, Any
 
 from palaestra_trainer.compiler import defer_compiler

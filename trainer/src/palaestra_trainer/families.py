@@ -63,7 +63,7 @@ SECONDS = counter(
 EPISODES = counter("palaestra_trainer_episodes_total", "Training episodes that ended without a fault.")
 RETURN = histogram(
     "palaestra_trainer_episode_return",
-    "Return of each training episode of this attempt; no sum and count, as returns may be negative.",
+    "Return of each training episode of this attempt; no sum, as returns may be negative.",
     RETURNS,
 )
 RETURN_MEAN = gauge(

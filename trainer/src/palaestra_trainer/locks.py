@@ -10,8 +10,11 @@ from __future__ import annotations
 import fcntl
 import os
 import threading
+from errno import EACCES, EAGAIN
 from pathlib import Path
 from typing import Self
+
+from palaestra_trainer.errors import ConfigurationError
 
 _held: set[tuple[int, Path]] = set()
 _held_lock = threading.Lock()
@@ -26,17 +29,24 @@ class FileLock:
         self._owner = os.getpid()
 
     @classmethod
-    def acquire(cls, path: Path) -> Self | None:
+    def acquire(cls, path: Path, variable: str) -> Self | None:
         """Return the lock on a file, which is created if missing; None: this or another process holds it.
 
+        Args:
+            path: the file.
+            variable: the environment variable that names a folder above it, for messages.
+
         Raises:
-            OSError: the file cannot be written.
+            ConfigurationError: the file cannot be written, or its file system has no locks.
         """
         with _held_lock:
             mine = (os.getpid(), path)
             if mine in _held:  # to open and close the file again would release the lock
                 return None
-            descriptor = _locked(path)
+            try:
+                descriptor = _locked(path)
+            except OSError as error:
+                raise refusal(path, variable, error) from error
             if descriptor is None:
                 return None
             _held.add(mine)
@@ -56,14 +66,21 @@ class FileLock:
                 _held.discard((self._owner, self._path))
 
 
+def refusal(path: Path, variable: str, error: OSError) -> ConfigurationError:
+    """Return the error for a lock file that cannot be used; see `FileLock.acquire`."""
+    return ConfigurationError(
+        f"{path}: the lock file of a simulator cannot be written and locked ({error.strerror}); "
+        f"set {variable} to a folder on a local disk that this user can write"
+    )
+
+
 def _locked(path: Path) -> int | None:
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     try:
         fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    except OSError as error:
         os.close(descriptor)
-        return None
-    except OSError:
-        os.close(descriptor)
+        if error.errno in {EAGAIN, EACCES}:  # another process holds it. Source: fcntl(2)
+            return None
         raise
     return descriptor

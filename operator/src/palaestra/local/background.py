@@ -19,6 +19,7 @@ from palaestra.api.yaml_text import write
 from palaestra.given import Given, data_of, job_of
 from palaestra.local import rundir
 from palaestra.local.bound import Request
+from palaestra.local.ending import end_descriptor
 from palaestra.local.errors import KILLED, Refused, StillRunning
 from palaestra.local.files import storage
 from palaestra.local.outcome import Outcome
@@ -83,7 +84,7 @@ class Run:
                 pass_fds=[request.control, request.lock],
                 start_new_session=True,
             )
-        self._end = os.pidfd_open(self._process.pid)
+        self._end = end_descriptor(self._process.pid)
 
     def __enter__(self) -> Self:
         """Return the run."""

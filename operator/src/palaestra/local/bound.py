@@ -26,6 +26,8 @@ from palaestra.local.run import Options, run
 from palaestra_protocol.pod.status import ExitCode
 from palaestra_sim.errors import SimError
 
+PARENT_CHECK_S = 0.5  # the kernel reports the end of a parent only to a pidfd, which not every system has
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
@@ -56,10 +58,9 @@ class Request:
 def main() -> int:
     """Run the request on standard input, and return the exit code of `palaestra run`."""
     request = Request.from_json(sys.stdin.buffer.read())
-    process = os.pidfd_open(os.getppid())
     if os.getppid() != request.process:  # it has ended before, and another process is the parent now
         return int(ExitCode.INTERRUPTED)
-    Thread(target=_end_with, args=(request.control, process), daemon=True).start()
+    Thread(target=_end_with, args=(request.control, request.process), daemon=True).start()
     options = Options(
         runs=Path(request.runs),
         version=version("palaestra"),
@@ -79,7 +80,8 @@ def main() -> int:
 
 def _end_with(control: int, process: int) -> None:
     """Interrupt this process once, as Ctrl-C does, when the other program wants it or has ended."""
-    select.select([control, process], [], [])
+    while os.getppid() == process and not select.select([control], [], [], PARENT_CHECK_S)[0]:
+        pass
     os.kill(os.getpid(), signal.SIGTERM)
 
 

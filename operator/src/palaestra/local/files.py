@@ -40,6 +40,14 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
 
 
+def without_locks(path: Path, error: OSError) -> str:
+    """Return the message for a file or folder that cannot be locked."""
+    return (
+        f"{path}: the file system has no locks ({error.strerror}), and without one two runs could write "
+        "into the same directory; choose a folder on a local disk with --dir"
+    )
+
+
 @contextmanager
 def storage(path: Path) -> Iterator[None]:
     """Turn an OSError about `path` into one clear line.

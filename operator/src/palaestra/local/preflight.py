@@ -1,22 +1,28 @@
 """Checks before anything is started, each with its remedy."""
 
+import fcntl
 import importlib.util
 import os
 import shutil
 import sys
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import Refused
+from palaestra.local.files import without_locks
 from palaestra.local.process import program_path
 from palaestra.local.simulators import PROGRAMS, lack
+from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
 from palaestra_sim.errors import WorldError
 
 LEAST_FREE = 100 * 2**20  # bytes; logs and three checkpoints of the examples take 40 MB
+PYTHON_PATH = "PYTHONPATH"
 POLICY = "policy.pth"  # in a zip of Stable-Baselines3
 INSTALLATION = "this installation"
 ROS = "install python3-rospy and python3-rosmaster (`make setup` does)"
@@ -31,6 +37,7 @@ class Request:
 
 
 Check = Callable[[Request], Iterator[str]]
+ENVIRONMENT = Path("/proc/self/environ")
 
 
 def check(request: Request) -> None:
@@ -43,6 +50,15 @@ def check(request: Request) -> None:
         raise Refused("\n".join(problems))
 
 
+def processes_can_be_found(request: Request) -> Iterator[str]:
+    """The system has Linux' /proc, by which the runner finds the processes that a container leaves behind."""
+    del request
+    try:
+        ENVIRONMENT.read_bytes()
+    except OSError as error:
+        yield f"{ENVIRONMENT}: {error.strerror}; run on Linux with /proc, as in a container or WSL 2"
+
+
 def ros_is_installed(request: Request) -> Iterator[str]:
     """The ROS master is an installed program, and its client a module that the trainer can import."""
     del request
@@ -50,6 +66,13 @@ def ros_is_installed(request: Request) -> Iterator[str]:
         yield f"rosmaster: is not installed; {ROS}"
     if importlib.util.find_spec("rospy") is None:
         yield f"rospy: cannot be imported by {sys.executable}; {ROS}"
+
+
+def no_module_is_shadowed(request: Request) -> Iterator[str]:
+    """No module on PYTHONPATH has the name of one that the ROS master or the trainer needs."""
+    own = (each.value for each in request.job.spec.trainer.env if each.name == PYTHON_PATH)
+    for python_path in {os.environ.get(PYTHON_PATH, ""), *own}:
+        yield from shadows(python_path or "")
 
 
 def nothing_is_put_off(request: Request) -> Iterator[str]:
@@ -98,7 +121,7 @@ def initial_policy_is_there(request: Request) -> Iterator[str]:
 
 def space_is_left(request: Request) -> Iterator[str]:
     """The disk has space for the run."""
-    folder = next(parent for parent in (request.runs, *request.runs.parents) if parent.exists())
+    folder = _existing(request.runs)
     if not os.access(folder, os.W_OK):
         yield f"{folder}: cannot be written; choose another folder with --dir"
     elif (free := shutil.disk_usage(folder).free) < LEAST_FREE:
@@ -108,14 +131,32 @@ def space_is_left(request: Request) -> Iterator[str]:
         )
 
 
+def locks_work(request: Request) -> Iterator[str]:
+    """The file system of the runs has locks; a file without a name is locked, so nothing is left behind."""
+    folder = _existing(request.runs)
+    with suppress(OSError), TemporaryFile(dir=folder) as file:  # not writable: `space_is_left` reports it
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            yield without_locks(folder, error)
+
+
 CHECKS: tuple[Check, ...] = (
+    processes_can_be_found,
+    no_module_is_shadowed,
     ros_is_installed,
     nothing_is_put_off,
     programs_exist,
     worlds_are_right,
     initial_policy_is_there,
     space_is_left,
+    locks_work,
 )
+
+
+def _existing(path: Path) -> Path:
+    """Return the lowest existing folder on the way to a path."""
+    return next(parent for parent in (path, *path.parents) if parent.exists())
 
 
 def _simulator_program(group: SimulatorGroup) -> str:

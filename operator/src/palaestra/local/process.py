@@ -5,6 +5,7 @@ process that it starts is in its process group.
 """
 
 import asyncio
+import contextlib
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Self
 
 from palaestra.local import watchdog
+from palaestra.local.ending import when_ended
 
 NOT_RUNNABLE = 127  # a shell's exit code for a program that it cannot find
 
@@ -23,10 +25,9 @@ class Process:
 
     def __init__(self, started: "subprocess.Popen[bytes]") -> None:
         self._started = started
-        self._handle = os.pidfd_open(started.pid)
         self._loop = asyncio.get_running_loop()
         self._ended: asyncio.Future[int] = self._loop.create_future()
-        self._loop.add_reader(self._handle, self._reap)
+        when_ended(started.pid, self._report)
 
     @classmethod
     def start(cls, command: Sequence[str], env: Mapping[str, str], *, stdout: int, stderr: int) -> Self:
@@ -65,9 +66,11 @@ class Process:
         if not self._ended.done():
             self._started.send_signal(number)
 
+    def _report(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the loop is closed, so nothing waits for the end
+            self._loop.call_soon_threadsafe(self._reap)
+
     def _reap(self) -> None:
-        self._loop.remove_reader(self._handle)
-        os.close(self._handle)
         code = self._started.wait()
         if not self._ended.done():
             self._ended.set_result(code if code >= 0 else 128 - code)

@@ -28,7 +28,7 @@ from palaestra.api.paths import shown
 from palaestra.api.tree import fields_of, walk
 from palaestra.errors import SpecErrors
 from palaestra.local.errors import Refused
-from palaestra.local.files import make_folder, storage, write
+from palaestra.local.files import make_folder, storage, without_locks, write
 from palaestra.local.outcome import Outcome
 from palaestra_protocol.pod.status import ExitCode
 
@@ -73,7 +73,7 @@ def locked(directory: Path, taken: int | None = None) -> Iterator[int]:
     that was started with the descriptor passes it as `taken`.
 
     Raises:
-        Refused: another runner has it.
+        Refused: another runner has it, or its file system has no locks.
         StorageFailed: its parent cannot be written.
     """
     path = directory.with_name(f"{directory.name}.lock")
@@ -100,6 +100,9 @@ def _take(directory: Path, path: Path) -> int:
             f"{directory}: `palaestra run` is at work there (process {holder}); "
             "wait for its end, or choose another folder with --dir"
         ) from None
+    except OSError as error:
+        os.close(descriptor)
+        raise Refused(without_locks(path, error)) from error
     return descriptor
 
 

@@ -33,18 +33,45 @@ def kill_marked(prefix: str) -> int:
 
 
 def _kill_if_marked(pid: int, wanted: bytes) -> bool:
-    """Kill `pid` through a handle taken before its environment was read, so no reused pid is hit."""
+    """Kill `pid` through a handle taken before its environment was read, so no reused pid is hit.
+
+    Without such handles its pid has to stay unused for the microseconds after the environment was read.
+    """
     with contextlib.suppress(OSError):  # gone already, or another user's
-        handle = os.pidfd_open(pid)
+        handle = _handle(pid)
         try:
             with open(f"/proc/{pid}/environ", "rb") as file:
                 marks = file.read().split(b"\0")
             if any(mark.startswith(wanted) for mark in marks):
-                signal.pidfd_send_signal(handle, signal.SIGKILL)
+                _kill(pid, handle)
                 return True
         finally:
-            os.close(handle)
+            if handle is not None:
+                os.close(handle)
     return False
+
+
+def _handle(pid: int) -> int | None:
+    """Return a handle by which `pid` can be killed.
+
+    None: an old kernel or an old Python has no handles, or the container runtime forbids them.
+    """
+    with contextlib.suppress(AttributeError, OSError):
+        handle = os.pidfd_open(pid)
+        try:
+            signal.pidfd_send_signal(handle, 0)
+        except (AttributeError, OSError):
+            os.close(handle)
+            raise
+        return handle
+    return None
+
+
+def _kill(pid: int, handle: int | None) -> None:
+    if handle is None:
+        os.kill(pid, signal.SIGKILL)
+    else:
+        signal.pidfd_send_signal(handle, signal.SIGKILL)
 
 
 def sweep(prefix: str) -> None:

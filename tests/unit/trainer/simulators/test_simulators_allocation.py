@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -12,6 +13,7 @@ import pytest
 from palaestra_trainer.configuration import parse
 from palaestra_trainer.errors import ConfigurationError
 from palaestra_trainer.simulators.allocation import allocate
+from tests.failing import failing
 
 LONG_S = 60
 
@@ -129,6 +131,18 @@ def test_a_killed_process_leaves_no_lock(take):
 
     assert killed.exitcode == -signal.SIGKILL
     assert take(configuration) == "s-0"
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_scratch_folder_without_locks_is_named(monkeypatch, scratch, number):
+    """NFS without its lock service, and Lustre without the option `flock`; two environments could meet."""
+    monkeypatch.setattr("fcntl.lockf", failing(number))
+
+    with pytest.raises(ConfigurationError) as refused:
+        allocate(make_configuration("Collect"), "Collect")
+
+    assert str(refused.value).startswith(f"{scratch}/palaestra-claim-")
+    assert f"({os.strerror(number)}); set ROS_LOG_DIR to a folder on a local disk" in str(refused.value)
 
 
 def test_a_scratch_folder_that_cannot_be_written_is_named(monkeypatch, scratch):

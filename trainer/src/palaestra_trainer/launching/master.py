@@ -19,7 +19,7 @@ def ensure_master() -> None:
     try:
         Master("/palaestra").ping()
     except MasterLost:
-        module = [sys.executable, "-m", "palaestra_trainer.launching.own_master"]
+        module = [sys.executable, "-P", "-m", "palaestra_trainer.launching.own_master"]
         uri = first_line(start_child(module, stderr=subprocess.DEVNULL)).strip()
         if not uri.startswith("http://"):
             raise MasterLost("a ROS master could not be started; start rosmaster yourself") from None

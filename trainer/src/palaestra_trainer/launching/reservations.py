@@ -11,8 +11,10 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from palaestra_trainer.locks import FileLock
+from palaestra_trainer.locks import FileLock, refusal
 from palaestra_trainer.ros import Master
+
+TEMPORARY = "TMPDIR"  # the environment variable that names the folder for temporary files
 
 
 class Reservation:
@@ -26,6 +28,7 @@ class Reservation:
 
         Raises:
             MasterLost: no ROS master answers.
+            ConfigurationError: the folder for temporary files cannot be written, or has no locks.
         """
         master = Master("/palaestra")
         for name in names:
@@ -40,7 +43,7 @@ class Reservation:
             self._locks.pop().release()
 
     def _lock(self, what: str) -> bool:
-        lock = FileLock.acquire(_folder() / hashlib.sha256(what.encode()).hexdigest()[:16])
+        lock = FileLock.acquire(_folder() / hashlib.sha256(what.encode()).hexdigest()[:16], TEMPORARY)
         if lock is not None:
             self._locks.append(lock)
         return lock is not None
@@ -48,5 +51,8 @@ class Reservation:
 
 def _folder() -> Path:
     folder = Path(tempfile.gettempdir()) / f"palaestra-names-{os.getuid()}"
-    folder.mkdir(mode=0o700, exist_ok=True)
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+    except OSError as error:
+        raise refusal(folder, TEMPORARY, error) from error
     return folder

@@ -25,23 +25,13 @@ def allocate(configuration: Configuration, role: Role) -> Allocation:
     """Allocate the first simulator with this role that no environment of any process uses.
 
     Raises:
-        ConfigurationError: all are in use, or the lock file cannot be written.
+        ConfigurationError: all are in use, or the lock file cannot be written and locked.
     """
     simulators = configuration.with_role(role)
     for simulator in simulators:
-        if lock := _lock(_path(configuration, simulator)):
+        if lock := FileLock.acquire(_path(configuration, simulator), "ROS_LOG_DIR"):
             return Allocation(simulator, lock)
     raise ConfigurationError(_none_left(len(simulators), role, len(configuration.simulators)))
-
-
-def _lock(path: Path) -> FileLock | None:
-    try:
-        return FileLock.acquire(path)
-    except OSError as error:
-        raise ConfigurationError(
-            f"{path}: the lock file of a simulator cannot be written ({error.strerror}); "
-            "set ROS_LOG_DIR to a folder that this user can write"
-        ) from error
 
 
 def _path(configuration: Configuration, simulator: SimulatorConfiguration) -> Path:

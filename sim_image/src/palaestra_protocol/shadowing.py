@@ -1,0 +1,172 @@
+"""A user's modules, and the modules of Python and of Palaestra's dependencies that they shadow.
+
+PYTHONPATH and the folder of a script come before the standard library. All libraries then import a `queue.py`
+in them in place of Python's own, and fails with a traceback that does not name the file.
+
+Programs that run no code of the user import from such folders last. Other programs are refused, as the user's
+code may need its own `queue` and the libraries need Python's.
+
+This module runs before it is known what is shadowed. So it imports only modules that Python has built in or
+frozen, until no module of the standard library is shadowed.
+"""
+
+import os
+import sys
+from _frozen_importlib import BuiltinImporter, FrozenImporter, ModuleSpec
+from _frozen_importlib_external import PathFinder
+
+_WITH_CODE_OF_USERS = ("palaestra-train", "palaestra-eval", "palaestra-export")
+_WRONG_INPUT = 2
+_OURS = ("palaestra", "palaestra-sim", "palaestra-trainer")
+# Modules that no metadata names: ours in a checkout, the distribution's, and webots_ros, which we make.
+_UNNAMED = (
+    *("palaestra", "palaestra_protocol", "palaestra_sim", "palaestra_trainer"),
+    *("rospy", "rosgraph", "rosmaster", "roslib", "rospkg", "genpy", "genmsg", "catkin_pkg", "webots_ros"),
+    *("rosgraph_msgs", "roscpp", "std_msgs", "sensor_msgs", "geometry_msgs", "netifaces", "defusedxml"),
+)
+
+
+def settle_imports() -> None:
+    """Make this process import the modules that it needs; our packages call this before they import others.
+
+    Raises:
+        ImportError: a module of the user shadows another one.
+        SystemExit: the same, in a program of ours; it has printed the reason.
+    """
+    program = _program()
+    if _is_ours(program) and program not in _WITH_CODE_OF_USERS:
+        _import_last(_ahead())
+        return
+    if program in _WITH_CODE_OF_USERS and not sys.flags.safe_path:
+        _put_last(sys.path[:1])  # the folder of the program itself
+    folders = _ahead()
+    reasons = [reason for name, reason in _shadows(folders, _others(folders)) if not _loaded(name, folders)]
+    if reasons and program in _WITH_CODE_OF_USERS:
+        sys.stderr.write("".join(f"{program}: {reason}\n" for reason in reasons))
+        raise SystemExit(_WRONG_INPUT)
+    if reasons:
+        raise ImportError("\n".join(reasons))
+
+
+def shadows(python_path: str) -> list[str]:
+    """Return a line for each module that this PYTHONPATH shadows in a new process, with the remedy."""
+    folders = [os.path.abspath(folder) for folder in python_path.split(os.pathsep)] if python_path else []
+    return [reason for _, reason in _shadows(folders, _others([*folders, *_ahead()]))]
+
+
+def _program() -> str:
+    """Return the name of the program that this process runs, or of the module that `python -m` runs."""
+    if sys.argv[:1] == ["-m"] and "-m" in sys.orig_argv:
+        return sys.orig_argv[sys.orig_argv.index("-m") + 1]
+    return os.path.basename(sys.argv[0]) if sys.argv else ""
+
+
+def _is_ours(program: str) -> bool:
+    name = program.removeprefix("kubectl-")
+    return name == "palaestra" or name.startswith(("palaestra-", "palaestra.", "palaestra_"))
+
+
+def _ahead() -> list[str]:
+    """Return the folders that come before the standard library in this process."""
+    library = os.path.dirname(os.__file__)
+    if library not in sys.path:
+        return []
+    found = sys.path[: sys.path.index(library)]
+    return [folder for folder in found if not folder.endswith(".zip") or os.path.exists(folder)]
+
+
+def _import_last(folders: list[str]) -> None:
+    """Import from these folders last, and forget modules that the start of Python has imported from them."""
+    _put_last(folders)
+    for folder in folders:
+        for name, file, _ in _hidden(folder, _others(folders)):
+            if name in sys.modules and getattr(sys.modules[name], "__file__", None) == file:
+                del sys.modules[name]
+
+
+def _put_last(folders: list[str]) -> None:
+    sys.path[:] = [*_others(folders), *folders]
+
+
+def _others(folders: list[str]) -> list[str]:
+    return [folder for folder in sys.path if folder not in folders]
+
+
+def _shadows(folders: list[str], others: list[str]) -> list[tuple[str, str]]:
+    """Return each shadowed module, and a line with file, fact and remedy."""
+    found = [each for folder in folders for each in _hidden(folder, others)]
+    library = [
+        (name, f"{file}: shadows the module {name} of Python's standard library; rename it")
+        for name, file, _ in found
+        if name in sys.stdlib_module_names
+    ]
+    # What follows imports much of the standard library.
+    return library or [
+        (name, f"{file}: shadows the module {name}, which Palaestra needs; rename it")
+        for name, file, folder in found
+        if not _holds_installed(folder) and _is_needed(name, others)
+    ]
+
+
+def _hidden(folder: str, others: list[str]) -> list[tuple[str, str, str]]:
+    """Return name, file and folder of each module in a folder that shadows a module of the others."""
+    try:
+        names = {file.partition(".")[0] for file in os.listdir(folder or os.curdir)}
+    except OSError:  # Python ignores it too
+        return []
+    found = []
+    for name in sorted(filter(str.isidentifier, names)):
+        mine, other = _spec(name, [folder]), _spec(name, others)
+        # A folder without `__init__.py` shadows nothing, but may be shadowed.
+        if mine and mine.origin and other and not _same(mine.origin, other.origin):
+            found.append((name, mine.origin, folder))
+    return found
+
+
+def _spec(name: str, folders: list[str]) -> ModuleSpec | None:
+    """Return the description of a module in these folders; None also if it is built into Python."""
+    if BuiltinImporter.find_spec(name) or FrozenImporter.find_spec(name):
+        return None
+    return PathFinder.find_spec(name, folders)
+
+
+def _same(file: str, other: str | None) -> bool:
+    return other is not None and os.path.realpath(file) == os.path.realpath(other)
+
+
+def _loaded(name: str, folders: list[str]) -> bool:
+    """Return whether this process has already imported a module from another folder than these."""
+    origin = getattr(getattr(sys.modules.get(name), "__spec__", None), "origin", None)
+    mine = _spec(name, folders)
+    return origin is not None and mine is not None and origin != mine.origin
+
+
+def _holds_installed(folder: str) -> bool:
+    """Return whether a folder holds installed packages: somebody has chosen their versions."""
+    return any(name.endswith((".dist-info", ".egg-info")) for name in os.listdir(folder or os.curdir))
+
+
+def _is_needed(name: str, folders: list[str]) -> bool:
+    """Return whether a module is from a package that ours need, directly or by another one."""
+    from importlib.metadata import distributions
+
+    installed = {_normal(each.name): each for each in distributions(path=folders)}
+    wanted, needed = list(_OURS), set[str]()
+    while wanted:
+        package = wanted.pop()
+        if package in installed and package not in needed:
+            needed.add(package)
+            wanted += _requirements(installed[package].requires or [], with_extras=package in _OURS)
+    files = (str(file) for package in needed for file in installed[package].files or ())
+    return name in _UNNAMED or any(file.partition("/")[0].partition(".")[0] == name for file in files)
+
+
+def _requirements(lines: list[str], *, with_extras: bool) -> list[str]:
+    import re
+
+    kept = [line for line in lines if with_extras or "extra ==" not in line]
+    return [_normal(match[0]) for match in map(re.compile(r"[\w.-]+").match, kept) if match]
+
+
+def _normal(name: str) -> str:
+    return name.lower().replace("_", "-").replace(".", "-")

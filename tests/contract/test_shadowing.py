@@ -1,0 +1,96 @@
+"""Programs beside which a user's files have the names of Python's modules and of our dependencies."""
+
+import os
+import subprocess
+import sys
+from importlib.metadata import distribution
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+PACKAGES = ("palaestra", "palaestra-sim", "palaestra-trainer")
+WITH_CODE_OF_USERS = {"palaestra-train", "palaestra-eval", "palaestra-export"}
+JOB = Path(__file__).parents[2] / "manifests/examples/tiny.yaml"
+TRAP = "raise RuntimeError(f'{__file__} was imported')\n"
+NEEDED = (
+    "yaml",
+    "numpy",
+    "gymnasium",
+    "torch",
+    "pydantic",
+    "structlog",
+    "prometheus_client",
+    "mujoco",
+    "PIL",
+)
+# Python itself does not start with these, before any program of ours: it reads text, and it is compiled.
+UNAVOIDABLE = {"encodings", "__future__"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a file for every module of the standard library that can be shadowed."""
+    made = tmp_path_factory.mktemp("own")
+    for name in {*sys.stdlib_module_names, *NEEDED} - UNAVOIDABLE:
+        if find_spec(name):  # the library's names of other systems are free on this one
+            (made / f"{name}.py").write_text(TRAP)
+    return made
+
+
+def ran(program, folder, *arguments):
+    """Run a program with a folder on PYTHONPATH; return its exit code and its output."""
+    done = subprocess.run(
+        [Path(sys.executable).with_name(program), *arguments],
+        env={**os.environ, "PYTHONPATH": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    "program",
+    sorted({each.name for name in PACKAGES for each in distribution(name).entry_points}),
+)
+def test_each_program_starts_or_names_the_files(program, folder):
+    """A program that runs code of users cannot start; the others import such a folder last."""
+    code, out, err = ran(program, folder, "--help")
+
+    if program in WITH_CODE_OF_USERS:
+        assert code == 2
+        assert f"{program}: {folder}/queue.py: shadows the module queue of Python's standard library" in err
+        assert out == ""
+    else:
+        assert (code, out.partition(":")[0]) == (0, "usage"), err
+
+
+def test_a_local_run_names_every_file_before_anything_starts(folder, tmp_path):
+    """The simulators would start, and the trainer would not."""
+    code, _, err = ran("palaestra", folder, "run", JOB, "--dir", tmp_path / "runs")
+
+    assert code == 2
+    for name in ("queue", "random", "types", "zoneinfo"):
+        assert f"{folder}/{name}.py: shadows the module {name} of Python's standard library; rename it" in err
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_script_or_notebook_beside_such_a_file_gets_its_name(tmp_path):
+    """As the error of its first import, before NumPy and PyTorch fail with something else."""
+    (tmp_path / "queue.py").write_text("waypoints = []\n")
+
+    done = subprocess.run(
+        [sys.executable, "-c", "import palaestra_trainer"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        f"ImportError: {tmp_path}/queue.py: shadows the module queue of Python's standard library; rename it"
+    )

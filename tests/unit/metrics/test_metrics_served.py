@@ -1,0 +1,74 @@
+"""The histograms that operator and trainer serve, by the rules of Prometheus' text format and OpenMetrics.
+
+Sources: https://prometheus.io/docs/instrumenting/exposition_formats/ and OpenMetrics 1.0, "Histogram". Some
+readers are stricter than Prometheus: OpenTelemetry's receiver drops a histogram without a `_count`.
+"""
+
+from collections import defaultdict
+from math import inf
+
+import pytest
+from prometheus_client import generate_latest
+from prometheus_client.parser import text_string_to_metric_families
+
+from palaestra.operator import families as of_operator
+from palaestra.operator.metrics import Metrics
+from palaestra_protocol.metrics import Kind
+from palaestra_trainer import families as of_trainer
+from palaestra_trainer.telemetry.metrics import registry
+from palaestra_trainer.telemetry.progress import Progress
+
+
+def operator():
+    """Return the text of an operator that has counted one event of each kind."""
+    metrics = Metrics()
+    metrics.request("get", "pods", 200, 0.02)
+    metrics.waited(0.3)
+    metrics.reconciled.labels("done").observe(0.1)
+    return metrics.text().decode()
+
+
+def trainer():
+    """Return the text of a trainer with episodes of negative and positive returns, and a checkpoint."""
+    progress = Progress(100, [("collect-0", "Collect")], lambda: 0.0)
+    progress.collected(7, [{"episode": {"r": number, "l": 3}} for number in (-2000.0, -7.0, 0.5, 3.0)])
+    progress.figures.saves.observe(0.2)
+    return generate_latest(registry(progress)).decode()
+
+
+def series(text):
+    """Return the samples of each histogram's series: by family and labels, the values by suffix or bound."""
+    found = defaultdict(dict)
+    for family in text_string_to_metric_families(text):
+        for sample in family.samples if family.type == "histogram" else ():
+            labels = dict(sample.labels)
+            part = float(labels.pop("le")) if sample.name.endswith("_bucket") else sample.name
+            found[family.name, *labels.values()][part] = sample.value
+    return found
+
+
+@pytest.mark.parametrize(("served", "declared"), [(operator, of_operator), (trainer, of_trainer)])
+def test_each_histogram_has_the_samples_that_a_strict_reader_needs(served, declared):
+    """Ascending buckets up to infinity, an equal count, and a sum unless it may fall."""
+    text = served()
+    found = series(text)
+
+    names = {family.name for family in declared.FAMILIES if family.kind is Kind.HISTOGRAM}
+    assert {f"# TYPE {name} histogram" for name in names} <= set(text.splitlines())
+    assert {name for name, *_ in found} >= names - {"palaestra_simulator_step_duration_seconds"}
+    for (name, *_), samples in found.items():
+        bounds = sorted(part for part in samples if isinstance(part, float))
+        counts = [samples[bound] for bound in bounds]
+        others = {part.removeprefix(name) for part in samples if isinstance(part, str)}
+        assert bounds[-1] == inf
+        assert counts == sorted(counts)
+        assert counts[-1] == samples[f"{name}_count"]
+        assert others == ({"_count"} if bounds[0] < 0 else {"_count", "_sum"})
+
+
+def test_an_episode_of_each_return_is_in_the_count():
+    """Also one below the lowest bound."""
+    samples = series(trainer())["palaestra_trainer_episode_return",]
+
+    assert samples["palaestra_trainer_episode_return_count"] == 4
+    assert (samples[-1000.0], samples[-5.0], samples[inf]) == (1, 2, 4)

@@ -1,0 +1,77 @@
+"""Which modules of a user shadow modules of Python and of Palaestra's dependencies."""
+
+import pytest
+
+from palaestra_protocol.shadowing import shadows
+
+
+@pytest.fixture
+def put(tmp_path):
+    """Return a function that puts a file into a folder of the user, and returns what the folder shadows."""
+
+    def shadowed_with(name):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+        return shadows(str(tmp_path))
+
+    return shadowed_with
+
+
+@pytest.mark.parametrize("file", ["queue.py", "random.py", "types.py", "code.py", "email/__init__.py"])
+def test_a_module_of_the_standard_library_is_named_with_the_file_and_the_remedy(put, tmp_path, file):
+    """Libraries fail with a traceback about a partially initialized module, which names neither."""
+    name = file.partition("/")[0].removesuffix(".py")
+
+    found = put(file)
+
+    assert found == [f"{tmp_path / file}: shadows the module {name} of Python's standard library; rename it"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "yaml",
+        "gymnasium",
+        "typing_extensions",
+        "mujoco",
+        "optuna",
+        "rospy",
+        "webots_ros",
+        "palaestra_trainer",
+    ],
+)
+def test_a_dependency_is_named_also_one_of_another_or_of_the_distribution(put, tmp_path, name):
+    """Packages that ours need, that those need, that an extra needs, and ROS."""
+    found = put(f"{name}.py")
+
+    assert found == [f"{tmp_path / name}.py: shadows the module {name}, which Palaestra needs; rename it"]
+
+
+@pytest.mark.parametrize(
+    "file",
+    [
+        pytest.param("corridor.py", id="a name of the user's own"),
+        pytest.param("pytest.py", id="a package that Palaestra does not need"),
+        pytest.param("gymnasium/README", id="a folder without __init__.py"),
+        pytest.param("queue.txt", id="a file that is no module"),
+        pytest.param("sys.py", id="a module that is built into Python"),
+    ],
+)
+def test_what_shadows_nothing_is_left_alone(put, file):
+    """Python imports the right module there."""
+    assert put(file) == []
+
+
+def test_folders_of_installed_packages_are_somebodys_choice(put):
+    """On clusters for computing, modules for `module load` put whole site-packages on PYTHONPATH."""
+    put("numpy-2.0.0.dist-info/METADATA")
+
+    assert put("numpy.py") == []
+
+
+def test_a_folder_that_is_missing_or_named_twice_changes_nothing(put, tmp_path):
+    """Python leaves it out."""
+    [reason] = put("queue.py")
+
+    assert shadows(f"{tmp_path}/missing:{tmp_path}") == [reason]
+    assert shadows("") == []
