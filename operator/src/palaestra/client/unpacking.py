@@ -46,7 +46,7 @@ def unpack(chunks: Iterator[bytes], into: Path, wanted: Collection[str], most_by
                 path = _path(member, wanted, seen)
                 seen.add(path)
                 left -= member.size
-                _require(left >= 0, f"its files have more than {most_bytes} bytes")
+                _refuse(f"its files have more than {most_bytes} bytes", when=left < 0)
                 stream.left = member.size + MOST_HEAD_BYTES
                 _write(tar, member, into / path)
     except WrongArchive:
@@ -82,19 +82,17 @@ def _path(member: tarfile.TarInfo, wanted: Collection[str], seen: _Seen) -> Pure
     name, path = member.name, PurePosixPath(member.name)
     shown = one_line(name, 100) or "a member without a name"
     asked_for = bool(path.parts) and (name in wanted or path.parts[0] in wanted) and ".." not in path.parts
-    _require(asked_for and name.isprintable(), f"{shown} is not a file of the run")
-    _require(member.isreg() and not member.issparse(), f"{shown} is not a plain file")
-    short = len(path.parts) <= MOST_PARTS and all(
-        len(part.encode()) <= MOST_NAME_BYTES for part in path.parts
-    )
-    _require(short, f"{shown} has too long a name")
-    _require(not seen.clashes_with(path), f"{shown} is there twice, or is a file and a folder")
-    _require(len(seen.files) < MOST_FILES, f"it has more than {MOST_FILES} files")
+    _refuse(f"{shown} is not a file of the run", when=not (asked_for and name.isprintable()))
+    _refuse(f"{shown} is not a plain file", when=not member.isreg() or member.issparse())
+    long = len(path.parts) > MOST_PARTS or any(len(part.encode()) > MOST_NAME_BYTES for part in path.parts)
+    _refuse(f"{shown} has too long a name", when=long)
+    _refuse(f"{shown} is there twice, or is a file and a folder", when=seen.clashes_with(path))
+    _refuse(f"it has more than {MOST_FILES} files", when=len(seen.files) >= MOST_FILES)
     return path
 
 
-def _require(right: bool, fact: str) -> None:  # noqa: FBT001 - a condition, as in an assertion
-    if not right:
+def _refuse(fact: str, *, when: bool) -> None:
+    if when:
         raise WrongArchive(fact)
 
 
