@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from palaestra_trainer.algorithms import check, make_model
+from palaestra_trainer.algorithms import ALGORITHMS, check, make_model
 from palaestra_trainer.configuration import Algorithm
 from palaestra_trainer.episodes.vec_env import SimulatorsVecEnv
 from palaestra_trainer.errors import ConfigurationError
@@ -349,8 +349,15 @@ def test_a_schedule_may_have_points(make):
     assert model.clip_range(0.5) == pytest.approx(0.15)
 
 
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_every_algorithm_takes_a_schedule(name):
+    """Some write the type of their learning rate as a bare Callable, without arguments."""
+    for rate in ("lin_0.001", POINTS):
+        check(Algorithm(name=name, hyperparameters={"learning_rate": rate}))
+
+
 def test_plain_stable_baselines_loads_a_schedule_of_points(make, tmp_path):
-    """model.zip contains the class of the schedule."""
+    """model.zip names a function of NumPy's, and has the points as its numbers."""
     make(Algorithm(name="PPO", hyperparameters=ROLLOUTS | {"learning_rate": POINTS})).save(
         tmp_path / "model.zip"
     )
@@ -358,14 +365,14 @@ def test_plain_stable_baselines_loads_a_schedule_of_points(make, tmp_path):
         import sys
         sys.modules["palaestra_trainer"] = None  # an import of it fails from now on
         from stable_baselines3 import PPO
-        print(PPO.load({str(tmp_path / "model.zip")!r}, device="cpu").lr_schedule(1.0))
+        print(PPO.load({str(tmp_path / "model.zip")!r}, device="cpu").lr_schedule(0.5))
     """
 
     shown = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(program)], check=True, capture_output=True, text=True
     )
 
-    assert shown.stdout == "0.01\n"
+    assert shown.stdout == "0.002\n"
 
 
 @pytest.mark.parametrize(

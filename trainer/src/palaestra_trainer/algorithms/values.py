@@ -125,7 +125,7 @@ def _refused(value: Any, annotation: Any) -> str:
 
 
 def _as_python(value: Any, annotation: Any) -> Any:
-    kinds = {get_origin(kind) for kind in (annotation, *get_args(annotation))}
+    kinds = {get_origin(kind) or kind for kind in (annotation, *get_args(annotation))}
     if isinstance(value, list) and tuple in kinds:
         return tuple(value)
     if collections.abc.Callable in kinds and (schedule := schedule_of(value)):
@@ -138,7 +138,7 @@ def _words(annotation: Any) -> str:
     origin, parts = get_origin(annotation), get_args(annotation)
     if annotation in _WORDS:
         return _WORDS[annotation]
-    if origin is collections.abc.Callable:
+    if collections.abc.Callable in {origin, annotation}:
         return "a schedule such as lin_0.001 or [[0, 0.001], [1, 0.0001]]"
     if origin is tuple:
         return "a list of " + " and ".join(map(_words, parts))
