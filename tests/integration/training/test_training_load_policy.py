@@ -1,11 +1,16 @@
 """A trained policy, loaded for use outside of its run."""
 
+import base64
+import json
+import zipfile
+
+import cloudpickle
 import gymnasium
 import numpy as np
 import pytest
 
 from palaestra_trainer import load_policy
-from palaestra_trainer.algorithms import make_model, policy_of
+from palaestra_trainer.algorithms import make_model, policy_of, small_cnn
 from palaestra_trainer.algorithms.kept import begun_with
 from palaestra_trainer.checkpoint import load_tensors
 from palaestra_trainer.configuration import load
@@ -56,6 +61,65 @@ def test_a_policy_that_sees_is_trained_and_loaded(write_job, play, tmp_path):
     assert observation.shape == (48, 64, 9)
     assert made.action_space.contains(policy.predict(observation)[0])
     assert type(policy.model.policy.features_extractor).__name__ == "SmallCnn"
+
+
+@pytest.fixture
+def stored_before(write_job, play, tmp_path):
+    """Train with the small network and a schedule, stored as byte code like the releases before did.
+
+    The file says that Python `version` wrote it; None leaves it as it is.
+    """
+    cloudpickle.register_pickle_by_value(small_cnn)
+
+    def run(version=None, cnn="small", schedule=b""):
+        environment = {"id": "SeeTarget-v0", "options": {"max_steps": 20}}
+        hyperparameters = PPO["hyperparameters"] | {"learning_rate": [[0, 0.01], [1, 0.001]]}
+        algorithm = PPO | {"hyperparameters": hyperparameters, "cnn": cnn}
+        assert play(write_job(environment=environment, algorithm=algorithm, steps=64))[0] == 0
+        model = tmp_path / "run/model.zip"
+        with zipfile.ZipFile(model) as archive:
+            parts = {name: archive.read(name) for name in archive.namelist()}
+        data = json.loads(parts["data"])
+        pickled = schedule or cloudpickle.dumps(lambda left: left / 100)
+        for name in ("learning_rate", "lr_schedule"):
+            data[name] = {":serialized:": base64.b64encode(pickled).decode()}
+        parts["data"] = json.dumps(data).encode()
+        if version:
+            parts["system_info.txt"] = f"- Python: {version}.1\n".encode()
+        with zipfile.ZipFile(model, "w") as archive:
+            for name, content in parts.items():
+                archive.writestr(name, content)
+        return model
+
+    yield run
+    cloudpickle.unregister_pickle_by_value(small_cnn)
+
+
+def test_a_file_of_before_is_read_by_the_python_that_wrote_it(stored_before):
+    """Its byte code runs there."""
+    model = load_policy(stored_before()).model
+
+    assert type(model.policy.features_extractor).__name__ == "SmallCnn"
+    assert model.lr_schedule(0.5) == pytest.approx(0.005)
+
+
+def test_a_schedule_of_another_python_is_the_run_s_own(stored_before):
+    """To unpickle this one raises; byte code of another Python would end the process."""
+    bomb = b"ccloudpickle.cloudpickle\n_no_such_function\n."
+
+    model = load_policy(stored_before("3.99", None, bomb)).model
+
+    assert [model.lr_schedule(left) for left in (1.0, 0.0)] == pytest.approx([0.01, 0.001])
+
+
+def test_a_network_of_another_python_is_refused_with_the_remedy(stored_before):
+    """The file lacks its name, so nothing else could take its place."""
+    fact = (
+        r"model\.zip: policy_kwargs has byte code of Python 3\.99, and this .*; use Python 3\.99, or export"
+    )
+
+    with pytest.raises(ConfigurationError, match=fact):
+        load_policy(stored_before("3.99"))
 
 
 def test_a_folder_without_a_model_is_refused(tmp_path):

@@ -5,9 +5,6 @@ from __future__ import annotations
 import io
 import os
 import signal
-import subprocess
-import sys
-import textwrap
 import zipfile
 
 import numpy as np
@@ -177,30 +174,6 @@ def test_a_run_with_the_small_network_resumes_as_others_do(play):
 
     assert code == 0
     assert outcome(directory) == outcome(reference)
-
-
-def test_stable_baselines3_loads_the_small_network_without_this_package(play):
-    """model.zip contains the class itself."""
-    _, directory = play("run", "PPO", cnn="small")
-    program = f"""
-        import sys
-        sys.modules["palaestra_trainer"] = None  # an import of it fails from now on
-        import numpy as np
-        from stable_baselines3 import PPO
-        model = PPO.load({str(directory.model)!r}, device="cpu")
-        action, _ = model.predict(np.zeros(({ROWS}, {COLUMNS}, 3), np.uint8))
-        print(type(model.policy.features_extractor).__name__, action)
-    """
-
-    result = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(program)],
-        check=True,
-        timeout=60,
-        capture_output=True,
-        text=True,
-    )
-
-    assert result.stdout.startswith("SmallCnn ")
 
 
 def test_a_network_for_images_is_refused_where_there_are_none(make_member):

@@ -2,16 +2,14 @@
 
 It has 16 and 32 channels and 128 units, where NatureCNN has 32, 64 and 64 channels and 512 units.
 
-`model.zip` contains this class itself, not only its name, so Stable-Baselines3 loads the file without this
-package. That is what the registration at the end does, for everything that this process pickles.
+A model.zip has only the name of this class, so Stable-Baselines3 loads the file where this package is
+installed. The class itself would be byte code, which only the Python that wrote it can read.
 """
 
 from __future__ import annotations
 
 import math
-import sys
 
-import cloudpickle
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
@@ -44,6 +42,3 @@ class SmallCnn(BaseFeaturesExtractor):
         """Return the features of a batch of images, shape (images, features_dim)."""
         features: torch.Tensor = self.layers(observations)
         return features
-
-
-cloudpickle.register_pickle_by_value(sys.modules[__name__])

@@ -13,10 +13,13 @@ import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from palaestra_trainer.algorithms import entry_of
+from palaestra_trainer.algorithms.kept import begun_with
+from palaestra_trainer.algorithms.values import arguments
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
-from palaestra_trainer.configuration import load
+from palaestra_trainer.configuration import Configuration, load
 from palaestra_trainer.environments.making import keywords
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.run import byte_code
 from palaestra_trainer.run_directory import RunDirectory
 
 
@@ -75,7 +78,8 @@ def load_policy(run_or_zip: str | Path) -> Policy:
     Stable-Baselines3 unpickles the zip, so load only files that you trust.
 
     Raises:
-        ConfigurationError: there is no model, or no training.yaml beside it.
+        ConfigurationError: there is no model, or no training.yaml beside it; or it has byte code of another
+            Python.
     """
     path = Path(run_or_zip)
     model = RunDirectory(path).model if path.is_dir() else path
@@ -84,11 +88,21 @@ def load_policy(run_or_zip: str | Path) -> Policy:
     configuration = load(RunDirectory(model.parent).configuration)
     environment = configuration.environment
     return Policy(
-        model=entry_of(configuration.algorithm.name).original.load(model, device="cpu"),
+        model=_load(model, configuration),
         environment_id=environment.id,
         environment_options=keywords(environment),
         scales=_scales(model),
     )
+
+
+def _load(model: Path, configuration: Configuration) -> BaseAlgorithm:
+    original = entry_of(configuration.algorithm.name).original
+
+    def given() -> dict[str, Any]:
+        known = begun_with(configuration, RunDirectory(model.parent)).hyperparameters
+        return arguments(original, {name: known[name] for name in byte_code.SCHEDULES if name in known})
+
+    return original.load(model, device="cpu", custom_objects=byte_code.replacements(model, given))
 
 
 def _scales(model: Path) -> dict[str, Scale]:
