@@ -92,15 +92,24 @@ class Acting(nn.Module):
 
     def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Return the actions for a batch, and the next state of a recurrent policy."""
-        parts = zip(self.spaces, self.normalizers, inputs, strict=False)
-        seen = {name: self._channels_first(name, normalize(part)) for name, normalize, part in parts}
-        observation = seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
+        observation = self.seen(inputs)
         if self.state_shape is None:
             return (self._bounded(self.policy._predict(observation, deterministic=True)),)
-        hidden, cell = inputs[len(self.spaces) :]
-        running = torch.zeros_like(hidden[0, :, 0])  # no episode begins: its state would be zeros
-        action, state = self.policy._predict(observation, (hidden, cell), running, deterministic=True)
+        action, state = self.policy._predict(observation, *self.memory(inputs), deterministic=True)
         return (self._bounded(action), *state)
+
+    def seen(self, inputs: tuple[torch.Tensor, ...]) -> Any:
+        """Return the observations of a batch as the networks take them."""
+        parts = zip(self.spaces, self.normalizers, inputs, strict=False)
+        seen = {name: self._channels_first(name, normalize(part)) for name, normalize, part in parts}
+        return seen if list(seen) != [OBSERVATION] else seen[OBSERVATION]
+
+    def memory(self, inputs: tuple[torch.Tensor, ...]) -> tuple[Any, ...]:
+        """Return the state in the inputs, and which episodes begin; empty if the policy has no state."""
+        if self.state_shape is None:
+            return ()
+        hidden, cell = inputs[len(self.spaces) :]
+        return (hidden, cell), torch.zeros_like(hidden[0, :, 0])  # none begins: its state would be zeros
 
     def _channels_first(self, name: str, part: torch.Tensor) -> torch.Tensor:
         """Return a batch of images with channels first; anything else unchanged."""
@@ -116,6 +125,33 @@ class Acting(nn.Module):
         if self.policy.squash_output:
             return low + 0.5 * (action + 1.0) * (high - low)
         return torch.minimum(torch.maximum(action, low), high)
+
+
+class Scoring(Acting):
+    """The scores of discrete actions, of which the policy takes the best; for a comparison, never for a file.
+
+    Its one output has the name of the action.
+    """
+
+    @property
+    def outputs(self) -> list[str]:
+        """The name of the scores."""
+        return ["action"]
+
+    def forward(self, *inputs: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Return the scores for a batch.
+
+        Raises:
+            AttributeError: the policy has none of the networks and distributions of Stable-Baselines3's.
+        """
+        observation = self.seen(inputs)
+        if hasattr(self.policy, "q_net"):
+            return (self.policy.q_net(observation),)
+        if hasattr(self.policy, "quantile_net"):
+            return (self.policy.quantile_net(observation).mean(dim=1),)
+        found = self.policy.get_distribution(observation, *self.memory(inputs))
+        made = (found[0] if isinstance(found, tuple) else found).distribution
+        return (torch.cat([one.logits for one in made], dim=1) if isinstance(made, list) else made.logits,)
 
 
 def parts_of(space: spaces.Space[Any]) -> dict[str, spaces.Space[Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -23,7 +22,7 @@ FORMATS: Mapping[str, str] = {"onnx": "onnx_file", "safetensors": "safetensors_f
 class Format(Protocol):
     """A module of this package that knows one format."""
 
-    def content(self, acting: Acting, sheet: str) -> bytes:
+    def content(self, acting: Acting, sheet: Mapping[str, Any]) -> bytes:
         """Return the bytes of a file."""
         ...
 
@@ -39,7 +38,7 @@ class Exported:
     Attributes:
         path: the file.
         observations: on which it was compared with the policy.
-        largest_difference: of an action's number there.
+        largest_difference: of an action's number there; of a continuous one as a share of its range.
     """
 
     path: Path
@@ -60,8 +59,13 @@ def export(run: Path, to: str, file: Path | None = None) -> Exported:
     loaded = load_policy(run)
     acting = Acting(loaded)
     sheet = data_sheet(acting, load(directory.configuration), directory)
-    content = known.content(acting, json.dumps(sheet))
-    difference = compare(known.runner(content, acting), acting, loaded)
+    content = known.content(acting, sheet)
+
+    def converted(module: Acting) -> Run:
+        file = content if module is acting else known.content(module, sheet)
+        return known.runner(file, module)
+
+    difference = compare(converted, acting, loaded)
     path = file or run / f"policy.{to}"
     replace_file(path, lambda name: name.write_bytes(content))
     return Exported(path=path, observations=OBSERVATIONS, largest_difference=difference)

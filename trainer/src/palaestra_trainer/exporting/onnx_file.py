@@ -2,25 +2,61 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 import onnxruntime
 import torch
 
+from palaestra_trainer.errors import ExportError, fact_of
 from palaestra_trainer.exporting.acting import STATE, Acting
-from palaestra_trainer.exporting.comparing import Arrays, Run, drawn
+from palaestra_trainer.exporting.comparing import Arrays, Run
 from palaestra_trainer.exporting.data_sheet import KEY
+from palaestra_trainer.exporting.sampling import drawn
 
 OPSET = 17  # of ONNX 1.12, of 2022
+# Types that PyTorch's exporter does not take, and a larger one that it takes.
+_UNTAKEN = {"uint16": "int32", "uint32": "int64", "uint64": "int64"}
 _BATCH = 3  # not 1, which the exporter could take for a constant
 
 
-def content(acting: Acting, sheet: str) -> bytes:
-    """Return the file with the data sheet in its metadata; any number of observations is one batch."""
+def content(acting: Acting, sheet: Mapping[str, Any]) -> bytes:
+    """Return the file with the data sheet in its metadata; any number of observations is one batch.
+
+    PyTorch leaves inputs out that do not reach an output. The sheet names them as `unused`.
+
+    Raises:
+        ExportError: PyTorch's exporter cannot convert the policy.
+    """
+    for name, space in acting.spaces.items():
+        if larger := _UNTAKEN.get(str(space.dtype)):
+            raise ExportError(
+                f"the input {name} is {space.dtype}, which PyTorch does not write to ONNX; nothing was "
+                f"written; use {larger} or float32 in the environment, or --to safetensors"
+            )
+    try:
+        model = _converted(acting)
+    except RuntimeError as error:
+        raise ExportError(
+            f"the policy cannot be converted to ONNX ({fact_of(error)}); nothing was written; use another "
+            "type or network, --to safetensors, or load_policy"
+        ) from error
+    inputs = [value.name for value in model.graph.input]
+    unused = [name for name in acting.inputs if name not in inputs]
+    model.producer_name = "palaestra"
+    onnx.helper.set_model_props(model, {KEY: json.dumps({**sheet, "inputs": inputs, "unused": unused})})
+    onnx.checker.check_model(model)
+    text: bytes = model.SerializeToString(deterministic=True)
+    return text
+
+
+def _converted(acting: Acting) -> onnx.ModelProto:
     examples = [torch.from_numpy(part) for part in drawn(acting, _BATCH).values()]
     axes = {name: {0: "batch"} for name in (*acting.spaces, "action")}
     axes |= {prefix + name: {1: "batch"} for name in STATE for prefix in ("", "next_")}
@@ -38,20 +74,17 @@ def content(acting: Acting, sheet: str) -> bytes:
             opset_version=OPSET,
             dynamo=False,
         )
-        model = onnx.load_model(written)
-    model.producer_name = "palaestra"
-    onnx.helper.set_model_props(model, {KEY: sheet})
-    onnx.checker.check_model(model)
-    text: bytes = model.SerializeToString(deterministic=True)
-    return text
+        return onnx.load_model(written)
 
 
 def runner(file: bytes, acting: Acting) -> Run:
-    """Return a function that runs the file."""
+    """Return a function that runs the file; it takes unused inputs too."""
     session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
+    used = {value.name for value in session.get_inputs()}
 
     def run(*inputs: np.ndarray) -> Arrays:
-        outputs = session.run(acting.outputs, dict(zip(acting.inputs, inputs, strict=True)))
+        given = zip(acting.inputs, inputs, strict=True)
+        outputs = session.run(acting.outputs, {name: part for name, part in given if name in used})
         return tuple(np.asarray(output) for output in outputs)
 
     return run

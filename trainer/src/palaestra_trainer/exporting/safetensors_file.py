@@ -6,7 +6,10 @@ statistics below `normalizers.<n>.`; the data sheet says where it clips.
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from copy import deepcopy
+from typing import Any
 
 import numpy as np
 import safetensors.torch
@@ -17,11 +20,11 @@ from palaestra_trainer.exporting.comparing import Arrays, Run
 from palaestra_trainer.exporting.data_sheet import KEY
 
 
-def content(acting: Acting, sheet: str) -> bytes:
+def content(acting: Acting, sheet: Mapping[str, Any]) -> bytes:
     """Return the file with the data sheet in its metadata."""
     # Some policies have one network under two names, and the format refuses shared memory.
     tensors = {name: tensor.detach().clone().contiguous() for name, tensor in acting.state_dict().items()}
-    return safetensors.torch.save(tensors, {KEY: sheet})
+    return safetensors.torch.save(tensors, {KEY: json.dumps(sheet)})
 
 
 def runner(file: bytes, acting: Acting) -> Run:
