@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 
 import gymnasium
 import pytest
+
+from tests.pages import blocks
+
+PAGE = Path(__file__).parents[3] / "docs/environments.md"
 
 HALL = """
     import gymnasium
@@ -44,7 +49,7 @@ def train(write_job, play, tmp_path, monkeypatch):
         module = f"hall_{tmp_path.name}_{number}".replace("-", "_")
         (tmp_path / f"{module}.py").write_text(textwrap.dedent(HALL).format(arguments=arguments, seen=seen))
         environment = {"id": f"{module}:Hall-v0"}
-        return play(write_job(environment=environment, steps=64, algorithm=PPO, **changes))
+        return play(write_job(**{"environment": environment, "steps": 64, "algorithm": PPO} | changes))
 
     yield run
     gymnasium.registry.pop("Hall-v0", None)
@@ -84,3 +89,19 @@ def test_nan_from_an_own_environment_names_it_and_ends_the_run_with_81(train):
     assert code == 81, log
     assert "episode 0, reset: collect-0: environment Hall-v0: observation[1] is nan" in log
     assert "simulator fault" not in log
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"), [("robot, scene", "PPO"), ("robot", "PPO"), ("scene, size=1", "RecurrentPPO")]
+)
+def test_its_policy_is_used_as_the_page_shows(train, tmp_path, arguments, name):
+    """The page's own block, typed for an environment that takes no `simulator`, and not always a scene."""
+    [block] = [text for text in blocks(PAGE.read_text(), "python") if "def drive(" in text]
+    code, log = train(arguments, algorithm=PPO | {"name": name})
+    typed = {}
+    exec(block, typed)
+
+    total = typed["drive"](tmp_path / "run")
+
+    assert code == 0, log
+    assert total == 5.0

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
 from stable_baselines3.common.base_class import BaseAlgorithm
 
@@ -16,9 +17,10 @@ from palaestra_trainer.algorithms import entry_of
 from palaestra_trainer.algorithms.kept import begun_with
 from palaestra_trainer.algorithms.values import arguments
 from palaestra_trainer.checkpoint.tensors import NORMALIZE
-from palaestra_trainer.configuration import Configuration, load
-from palaestra_trainer.environments.making import keywords
+from palaestra_trainer.configuration import Configuration, Environment, load
+from palaestra_trainer.environments.making import keywords, make_environment
 from palaestra_trainer.errors import ConfigurationError
+from palaestra_trainer.robots.base import RobotAbc, Scene
 from palaestra_trainer.run import byte_code
 from palaestra_trainer.run_directory import RunDirectory
 
@@ -48,6 +50,18 @@ class Policy:
     environment_id: str
     environment_options: dict[str, Any]
     scales: Mapping[str, Scale]
+
+    def make_env(self, robot: RobotAbc, scene: Scene) -> gymnasium.Env[Any, Any]:
+        """Return the environment that the policy learned in, with a robot and its scene.
+
+        The environment gets those of the two that its signature accepts, as in a run.
+
+        Raises:
+            ConfigurationError: it is not registered, or its signature does not fit.
+            MissingCapability: the robot lacks one of its `needs`.
+        """
+        wanted = Environment(id=self.environment_id, options=self.environment_options)
+        return make_environment(wanted, robot, scene)
 
     def predict(
         self,
