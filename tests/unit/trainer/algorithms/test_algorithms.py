@@ -155,6 +155,32 @@ def test_what_yaml_cannot_say_has_words(make_env):
     assert isinstance(model.policy.optimizer, optim.AdamW)
 
 
+@pytest.mark.parametrize("place", ["", "nn.", "th.nn.", "torch.nn."])
+def test_a_class_of_pytorch_may_have_its_module(make_env, place):
+    """RL-Zoo's files write it, by the name under which they import PyTorch."""
+    policy = {
+        "net_arch": [8],
+        "activation_fn": f"{place}Tanh",
+        "optimizer_class": f"{place.replace('nn', 'optim')}AdamW",
+    }
+    check(Algorithm(name="DQN", hyperparameters={"policy_kwargs": policy}))
+
+    model = model_of("DQN", make_env(), policy_kwargs=policy)
+
+    assert any(isinstance(part, nn.Tanh) for part in model.policy.modules())
+    assert isinstance(model.policy.optimizer, optim.AdamW)
+
+
+def test_a_misspelled_class_with_its_module_has_the_nearest_one_named():
+    """The module is right, so the name alone is compared."""
+    policy = {"activation_fn": "torch.nn.Tahn"}
+
+    with pytest.raises(
+        ConfigurationError, match=r"'torch\.nn\.Tahn' is not known; did you mean Tanh\?, or write"
+    ):
+        check(Algorithm(name="DQN", hyperparameters={"policy_kwargs": policy}))
+
+
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_defaults_have_the_types_of_the_signature(name):
     """A whole number stands for a number with a fraction, as everywhere in YAML."""

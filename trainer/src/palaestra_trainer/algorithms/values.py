@@ -8,6 +8,7 @@ takes may be written as `module:Class`.
 from __future__ import annotations
 
 import collections.abc
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, get_args, get_origin
 
@@ -40,6 +41,8 @@ BASES: Mapping[str, type[Any]] = {
     "optimizer_class": optim.Optimizer,
     "features_extractor_class": BaseFeaturesExtractor,
 }
+# RL-Zoo's files write the modules of PyTorch's classes, by any of the usual names.
+_MODULE = re.compile(r"^((torch|th)\.)?(nn|optim)\.(?=\w+$)")
 _GIVEN = frozenset({"self", "observation_space", "action_space", "lr_schedule", "use_sde", "return"})
 _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "text", type(None): "null"}
 
@@ -89,7 +92,7 @@ def _mistakes_of_policy(known: Mapping[str, Any], given: Mapping[str, Any]) -> I
         elif name in CLASSES:
             if _class(name, value) is None:
                 yield (
-                    f"{field}: {value!r} is not known; {nearest(str(value), dict(CLASSES[name]))}, "
+                    f"{field}: {value!r} is not known; {nearest(_bare(str(value)), dict(CLASSES[name]))}, "
                     "or write module:Class"
                 )
         elif fact := _refused(value, known[name]):
@@ -105,11 +108,19 @@ def _mistakes_of_class(field: str, name: str) -> Iterator[str]:
 
 
 def _class(argument: str, name: Any) -> type[Any] | None:
-    """Return the class for a policy's argument: `module:Class`, or a name of PyTorch's in any case."""
+    """Return the class for a policy's argument: `module:Class`, or a name of PyTorch's in any case.
+
+    The name may have its module, as in `torch.nn.Tanh`, `th.nn.Tanh` or `nn.Tanh`.
+    """
     if own.names_class(name):
         return own.class_named(name, f"{FIELD}.policy_kwargs.{argument}", BASES.get(argument, object))
     by_name = {known.lower(): cls for known, cls in CLASSES.get(argument, {}).items()}
-    return by_name.get(name.lower()) if isinstance(name, str) else None
+    return by_name.get(_bare(name).lower()) if isinstance(name, str) else None
+
+
+def _bare(name: str) -> str:
+    """Return the name of a class without its module, if that is one of PyTorch's."""
+    return _MODULE.sub("", name, count=1)
 
 
 def _refused(value: Any, annotation: Any) -> str:
