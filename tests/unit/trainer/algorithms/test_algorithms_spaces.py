@@ -45,6 +45,10 @@ ACTIONS = {
     "a matrix of bits": (spaces.MultiBinary((2, 3)), "flatten it"),
     "a single number": (spaces.Box(-1.0, 1.0, (), np.float32), r"give it the shape \(1,\)"),
     "whole numbers": (spaces.Box(-5, 5, (2,), np.int32), "a Box of int32, and algorithms send fractions"),
+    "as wide as floats": (
+        spaces.Box(np.finfo(np.float32).min, np.finfo(np.float32).max, (2,), np.float32),
+        "has bounds of which float32 cannot hold the difference; give narrower ones",
+    ),
     "no bounds": (spaces.Box(-np.inf, np.inf, (2,), np.float32), "has no bounds; give its Box a finite low"),
 }
 CASES = {f"observation: {name}": (seen, FEW, told) for name, (seen, told) in OBSERVATIONS.items()} | {

@@ -145,7 +145,13 @@ def _flaw_of_bounds(acted: spaces.Space[Any]) -> str:
         return ""
     if not np.issubdtype(acted.dtype, np.floating):
         return f"is a Box of {acted.dtype}, and algorithms send fractions; use float32, or MultiDiscrete"
-    return "" if acted.is_bounded() else "has no bounds; give its Box a finite low and high"
+    if not acted.is_bounded():
+        return "has no bounds; give its Box a finite low and high"
+    with np.errstate(over="ignore"):
+        narrow = np.isfinite(acted.high - acted.low).all()
+    return (
+        "" if narrow else f"has bounds of which {acted.dtype} cannot hold the difference; give narrower ones"
+    )
 
 
 def _about_images(algorithm: Algorithm, seen: spaces.Space[Any]) -> list[str]:
