@@ -47,6 +47,39 @@ def test_a_run_goes_on_with_the_job_that_it_was_started_with(directory):
     rundir.refuse_another_job(directory, record())
 
 
+def test_more_steps_prolong_a_run_and_change_nothing_else(tmp_path):
+    """What was learned stays explained, because the run was the same up to its last checkpoint."""
+    rundir.prepare(tmp_path, record(trainer={"steps": 100}))
+    longer = record(trainer={"steps": 150})
+
+    rundir.refuse_another_job(tmp_path, longer)
+
+    assert rundir.is_prolonged(tmp_path, longer)
+    assert not rundir.is_prolonged(tmp_path, record(trainer={"steps": 100}))
+    assert not rundir.is_prolonged(tmp_path / "new", longer)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({}, "spec.trainer.steps: was 100, is 50; raise it to prolong the run, it cannot be lowered"),
+        ({"seed": 2}, "spec.seed: was 1, is 2"),
+    ],
+    ids=["fewer steps", "another seed"],
+)
+def test_what_a_prolonged_run_cannot_change_is_refused(tmp_path, changes, line):
+    """Also together with more steps."""
+    rundir.prepare(tmp_path, record(trainer={"steps": 100}))
+    steps = 150 if changes else 50
+
+    with pytest.raises(Refused) as refused:
+        rundir.refuse_another_job(tmp_path, record(trainer={"steps": steps}, **changes))
+
+    first, remedy = str(refused.value).splitlines()
+    assert first == line
+    assert "begin anew with --fresh" in remedy
+
+
 def test_a_new_directory_takes_any_job(tmp_path):
     """There is nothing to contradict."""
     rundir.refuse_another_job(tmp_path / "new", record())

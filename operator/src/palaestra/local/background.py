@@ -190,7 +190,8 @@ def run(job: Given, *, runs: Path | str = "runs", replica: int | None = None, fr
     """Train a job on this machine, in the background, and return its handle.
 
     The run is that of `palaestra run`: it resumes from its newest checkpoint, and does nothing if it is
-    complete. It saves a checkpoint and ends when this process ends.
+    complete. A job with more `trainer.steps` prolongs it. It saves a checkpoint and ends when this process
+    ends.
 
     Args:
         job: the path of a file, YAML text, plain data or the model.
