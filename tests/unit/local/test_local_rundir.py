@@ -3,8 +3,10 @@
 import errno
 import json
 import os
+import shlex
 import uuid
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import yaml
@@ -13,7 +15,7 @@ from palaestra.api import validate
 from palaestra.local import rundir
 from palaestra.local.errors import Refused, StorageFailed
 from palaestra.local.files import write
-from palaestra.local.outcome import Outcome, summary
+from palaestra.local.outcome import Outcome, summary, uses
 from tests.failing import failing
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}}
@@ -326,6 +328,19 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     assert lines[2].endswith("93% of the wall clock")
     assert lines[4].endswith(f"tensorboard --logdir {directory}/tensorboard")
     assert lines[5].endswith(f"palaestra-eval {directory}")
+
+
+def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
+    """They are there to be copied, also from the folder of a person who writes names with spaces."""
+    directory = tmp_path / "Ada's runs" / "$HOME `x`" / "0"
+    (directory / "tensorboard").mkdir(parents=True)
+    for name in ("model.zip", "attempts.jsonl"):
+        (directory / name).touch()
+
+    commands = [shlex.split(line[20:]) for line in uses(directory)]
+
+    assert [words[1:] for words in commands] == [["--logdir", f"{directory}/tensorboard"], [str(directory)]]
+    assert [Path(words[0]).name for words in commands] == ["tensorboard", "palaestra-eval"]
 
 
 def test_the_summary_has_the_interval_of_the_success_rate(directory):
