@@ -161,6 +161,17 @@ def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_
     assert "spec.trainer.initialPolicy.path" in nothing[1]
 
 
+def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
+    """`palaestra run job.yaml | head` closes the pipe after ten lines, and training goes on."""
+    desk.write(ASK)
+
+    process = desk.start()
+    process.stdout.close()
+
+    assert process.wait(PATIENCE_S) == 0
+    assert (desk.run_directory / "summary.json").exists()
+
+
 def test_the_run_directory_holds_what_was_run(desk):
     """The source worlds, the configuration, the job, and a log for each container."""
     desk.write(ASK)

@@ -106,6 +106,9 @@ class Log:
 
 
 def say(text: str) -> None:
-    """Show a line to the person at once."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    """Show a line to the person at once; if nobody reads any more, as after `| head`, lines are dropped."""
+    try:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
