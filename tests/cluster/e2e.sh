@@ -21,7 +21,7 @@ finish() {
   [[ -z $images ]] || kill "$images" 2>/dev/null || true
   if [[ ${KEEP:-} == 1 ]]; then
     rm -f "$MARK"
-    say "KEEP=1: the cluster stands, KUBECONFIG=${KUBECONFIG:-$KUBECONFIG_FILE}; remove it with: make cluster-down"
+    say "KEEP=1: the cluster stands, KUBECONFIG=$(printf %q "${KUBECONFIG:-$KUBECONFIG_FILE}"); remove it with: make cluster-down"
   elif [[ ${PALAESTRA_CLUSTER:-} == existing ]]; then
     [[ -z $installed ]] || kubectl delete --ignore-not-found --timeout 120s -f "$INSTALLATION" >/dev/null || true
   elif [[ -f $MARK || ! -f $STATE/way ]]; then

@@ -108,7 +108,7 @@ up() {
     echo "$1" >"$STATE/way"
     trap - EXIT
   fi
-  [[ $found ]] || say "kubectl is not on the PATH; there is one here: export PATH=\$PATH:$programs"
+  [[ $found ]] || say "kubectl is not on the PATH; there is one here: export PATH=\$PATH:$(printf %q "$programs")"
   echo "$KUBECONFIG_FILE"
 }
 

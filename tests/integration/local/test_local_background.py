@@ -14,6 +14,7 @@ import pytest
 import palaestra
 from palaestra.errors import SpecErrors
 from palaestra.local.errors import Refused, StillRunning
+from palaestra.local.limited import FIRST, LAST
 from tests.local_run import below, left_of
 from tests.waiting import eventually
 
@@ -50,6 +51,10 @@ import os, pathlib
 run = pathlib.Path(os.environ["PALAESTRA_RUN"])
 (run / "model.zip").touch()
 (run / "summary.json").write_text('{"steps": 7, "success_rate": 0.5, "faults": 2}')
+"""
+PRINT = """\
+for _ in range(1000):
+    print("x" * 20_000)
 """
 FAIL = """\
 import os, pathlib, sys
@@ -103,6 +108,18 @@ def test_a_complete_run_has_a_result_and_is_not_repeated(job, tmp_path):
     again = palaestra.run(job(END), runs=tmp_path)
     assert again.result(PATIENCE_S) == result
     assert "finished already" in again.log.read_text()
+
+
+def test_the_log_of_a_run_has_a_limit(job, tmp_path):
+    """It has the trainer's lines too, and an environment may print at every step."""
+    with palaestra.run(job(PRINT + END), runs=tmp_path) as run:
+        result = run.result(PATIENCE_S)
+
+    log = run.log.read_text()
+    assert result.succeeded
+    assert len(log) <= FIRST + 2 * LAST < 1000 * 20_000
+    assert "bytes were left out here" in log
+    assert log.splitlines()[-1].split() == ["run", "directory", str(run.directory)]
 
 
 def test_a_result_is_not_that_of_an_earlier_run(job, tmp_path):

@@ -11,6 +11,7 @@ import pytest
 
 from palaestra.local import watchdog
 from palaestra.local.errors import StartFailed
+from palaestra.local.limited import FIRST, LAST
 from palaestra.local.process import marked
 from palaestra.local.spec import Probe
 from tests.failing import failing
@@ -244,3 +245,15 @@ def test_output_goes_to_a_file_for_each_container(stage):
 
     assert "hello\n" in (stage.folder / "logs" / "chatty.log").read_text()
     assert {"out", "err"} <= set((stage.folder / "logs" / "main.log").read_text().splitlines())
+
+
+def test_a_log_of_a_program_that_prints_without_end_has_a_limit(stage):
+    """It would fill the disk and so end the run; both ends stay, and the exit code is the program's own."""
+    code = stage.run(main='echo first; yes "$(printf %020000d 1)" | head -n 1500; echo last; exit 3')
+
+    log = (stage.folder / "logs" / "main.log").read_text()
+    assert code == 3
+    assert len(log) <= FIRST + 2 * LAST < 1500 * 20_000
+    assert log.startswith("first\n")
+    assert log.endswith("\nlast\n--- main ended with exit code 3\n")
+    assert "bytes were left out here" in log

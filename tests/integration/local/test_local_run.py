@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,11 @@ config = yaml.safe_load(pathlib.Path(os.environ["PALAESTRA_CONFIG"]).read_text()
 for simulator in config["simulators"]:
     assert pathlib.Path(simulator["world"]).is_file(), simulator
 (run / "summary.json").write_text('{"steps": 7, "success_rate": 0.5, "faults": 2}')
+"""
+TELL = """\
+import os, pathlib, yaml
+config = yaml.safe_load(pathlib.Path(os.environ["PALAESTRA_CONFIG"]).read_text())
+print("trains to", config["steps"], "from", config["initialPolicy"])
 """
 WAIT = """\
 import os, pathlib, signal, sys
@@ -132,6 +138,38 @@ def test_a_run_ends_with_a_summary_and_is_reported_when_it_is_typed_again(desk):
         assert line in out
         assert line in report
     assert "finished already" in report
+
+
+def test_a_finished_run_is_prolonged_by_more_steps_and_began_with_the_policy_of_another(desk):
+    """The policy is that of a run's directory, which a person types relative to the folder."""
+    other = desk.folder / "other"
+    other.mkdir()
+    with zipfile.ZipFile(other / "model.zip", "w") as archive:
+        archive.writestr("policy.pth", b"")
+    command = {"command": ["python", str(desk.folder / "program.py")]}
+    desk.write(TELL, trainer=command | {"steps": 40})
+    first = desk.run("--initial-policy", "other")
+    desk.write(TELL, trainer=command | {"steps": 80})
+
+    second = desk.run("--initial-policy", "other")
+    nothing = desk.run("--initial-policy", "nothing")
+
+    assert first[0] == second[0] == 0
+    assert f"trains to 40 from {other}/model.zip" in first[1]
+    assert f"trains to 80 from {other}/model.zip" in second[1]
+    assert nothing[0] == 2
+    assert "spec.trainer.initialPolicy.path" in nothing[1]
+
+
+def test_a_run_whose_output_is_no_longer_read_ends_as_it_would_have(desk):
+    """`palaestra run job.yaml | head` closes the pipe after ten lines, and training goes on."""
+    desk.write(ASK)
+
+    process = desk.start()
+    process.stdout.close()
+
+    assert process.wait(PATIENCE_S) == 0
+    assert (desk.run_directory / "summary.json").exists()
 
 
 def test_the_run_directory_holds_what_was_run(desk):

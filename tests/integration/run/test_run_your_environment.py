@@ -14,22 +14,39 @@ TEXT = (Path(__file__).parents[3] / "docs/your-environment.md").read_text()
 PAGE = dict(fenced(TEXT))
 FILES = ("python corridor.py", "python try.py", "yaml job.yaml")
 TYPED_S = 500
-MOST_LINES = 40
+MOST_LINES = 45
 
 
 @pytest.mark.minutes(1)
 @pytest.mark.timeout(600)
 def test_a_policy_is_trained_from_an_empty_folder(tmp_path):
     """With what the page shows and nothing else; the policy has learned the task."""
-    for name in FILES:
-        (tmp_path / name.split()[1]).write_text(PAGE[name])
-    [session] = blocks(TEXT, "sh")
-
-    printed = Terminal(tmp_path, path=PALAESTRA.parent).type_in(session, TYPED_S)
+    printed = typed(tmp_path, FILES, 0)
 
     run = tmp_path / "runs/corridor/0"
     assert (run / "model.zip").is_file()
-    assert json.loads((run / "summary.json").read_text())["success_rate"] >= 0.6, printed
+    assert success_rate(run) >= 0.6, printed
+
+
+@pytest.mark.minutes(1)
+@pytest.mark.timeout(600)
+def test_the_same_task_is_learned_by_an_e_puck(tmp_path):
+    """Another robot needs a class of its own way of driving, and two lines in the job."""
+    printed = typed(tmp_path, ("python corridor.py", "python puck.py", "yaml puck.yaml"), 1)
+
+    assert success_rate(tmp_path / "runs/puck/0") >= 0.6, printed
+
+
+def typed(folder, files, number):
+    """Write files of the page and type one of its sessions; return what was printed."""
+    for name in files:
+        (folder / name.split()[1]).write_text(PAGE[name])
+    return Terminal(folder, path=PALAESTRA.parent).type_in(blocks(TEXT, "sh")[number], TYPED_S)
+
+
+def success_rate(run):
+    """Return the success rate of a run that has ended."""
+    return json.loads((run / "summary.json").read_text())["success_rate"]
 
 
 def test_the_task_is_short_and_its_image_is_of_this_release():

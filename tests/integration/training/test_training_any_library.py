@@ -98,6 +98,7 @@ def test_stable_baselines3_survives_crashes(stubs):
     assert model.num_timesteps == 200
 
 
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 def test_the_checkers_accept_an_environment_of_one_simulator(stubs):
     """On a real stub; gymnasium's and Stable-Baselines3's."""
     stubs("")

@@ -9,8 +9,9 @@ from palaestra_trainer.robots import Pose
 from palaestra_trainer.robots.differential import EPuck, TurtleBot3Burger
 from palaestra_trainer.robots.robotino import Robotino
 from palaestra_trainer.robots.simulated import SimulatedScene
-from palaestra_trainer.testing import check_robot, check_scene
+from palaestra_trainer.testing import check_robot, check_scene, fake_pen
 from palaestra_trainer.testing.fake_burger import COURT
+from palaestra_trainer.testing.fake_epuck import PEN
 from palaestra_trainer.testing.fake_scene import arena as fake_floor
 from palaestra_trainer.webots import FLOOR, Webots
 from palaestra_trainer.webots.services import Services
@@ -63,10 +64,10 @@ def running(master, tmp_path):
     del master
     started = []
 
-    def start(kind, source, supervisor, options=()):
+    def start(kind, source, supervisor):
         world = tmp_path / "changed.wbt"
         world.write_bytes(source)
-        webots = Webots(supervisor, world, options=options, start_deadline_s=20.0)
+        webots = Webots(supervisor, world, start_deadline_s=20.0)
         robot = kind(webots)
         started.append((webots, robot))
         scene = SimulatedScene(webots, robot)
@@ -80,21 +81,33 @@ def running(master, tmp_path):
         webots.close()
 
 
-@pytest.mark.parametrize("kind", [TurtleBot3Burger, EPuck])
-def test_a_robot_on_two_wheels_passes_the_checks(running, kind):
+@pytest.mark.parametrize(
+    ("kind", "world", "near"),
+    [(TurtleBot3Burger, "court", START), (EPuck, "pen", Pose(-0.3, 0.0, 1.0))],
+    ids=["burger", "e-puck"],
+)
+def test_a_robot_on_two_wheels_passes_the_checks(running, kind, world, near):
     """It follows its commands, in the curve that its wheels allow."""
-    world = builtin("court")
-    if kind is EPuck:
-        world = world.replace(b"turtlebot/protos/TurtleBot3Burger.proto", b"e-puck/protos/E-puck.proto")
-        world = world.replace(b"robotis", b"gctronic").replace(
-            b"DEF BURGER TurtleBot3Burger", b"DEF EPUCK E-puck"
-        )
+    robot, scene = running(kind, builtin(world), kind.definition.lower())
 
-    robot, scene = running(kind, world, "burger", ["--leave-out", "LightSensor"] if kind is EPuck else [])
-
-    scene.reset(1, START, TARGET)
+    scene.reset(1, near, TARGET)
     check_robot(robot)
-    check_scene(robot, scene, START, TARGET)
+    check_scene(robot, scene, near, TARGET)
+
+
+def test_a_fake_e_puck_sees_what_one_in_a_simulator_sees(running):
+    """An experiment with rewards on the fake is worth something only then."""
+    robot, scene = running(EPuck, builtin("pen"), "epuck")
+    fake, fake_scene = fake_pen()
+
+    for near in (Pose(0.0, 0.13, 0.7), Pose(-0.54, 0.34, -2.5)):
+        for each in (scene, fake_scene):
+            each.reset(1, near, TARGET)
+
+        assert fake.distances().min() < 0.03
+        assert robot.distances() == pytest.approx(fake.distances(), abs=0.008)
+    for name in ("radius_m", "speed_m_s", "bearings_rad", "distance_range_m", "axle_m"):
+        assert getattr(fake, name) == getattr(robot, name)
 
 
 def test_a_robotino_uses_what_its_world_fits_it_with(running):
@@ -157,11 +170,10 @@ def things(layout):
 def test_the_layout_is_that_of_the_world(arena, running):
     """The fakes have the same floors."""
     court = running(TurtleBot3Burger, builtin("court"), "burger")[1].layout()
-    floor = arena.scene.layout()
+    pen = running(EPuck, builtin("pen"), "epuck")[1].layout()
 
-    assert (floor.low, floor.high) == (fake_floor().low, fake_floor().high)
-    assert (court.low, court.high) == (COURT.low, COURT.high)
-    for layout, fake in ((floor, fake_floor()), (court, COURT)):
+    for layout, fake in ((arena.scene.layout(), fake_floor()), (court, COURT), (pen, PEN)):
+        assert (layout.low, layout.high) == (fake.low, fake.high)
         assert set(things(layout)) == set(things(fake))
         for name, thing in things(fake).items():
             seen = things(layout)[name]

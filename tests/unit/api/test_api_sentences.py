@@ -14,7 +14,7 @@ SENTENCES = [
     ({"simulators.0.driver": "gazebo"},
      'spec.simulators[0].driver: "gazebo" is not a driver; use stub, mujoco, webots or command'),
     ({"simulators.0.world": {"builtin": "maze"}},
-     'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena, seeing or court'),
+     'spec.simulators[0].world.builtin: "maze" is not a builtin; use arena, seeing, court or pen'),
     ({"trainer.algorithm.name": "TD4"},
      ('spec.trainer.algorithm.name: "TD4" is not an algorithm; '
      "use DQN, PPO, A2C, SAC, TD3, DDPG, QRDQN, TQC, TRPO, CrossQ, RecurrentPPO, REINFORCE or module:Class")),

@@ -199,3 +199,14 @@ def test_an_initial_policy_must_be_a_model_on_this_machine(request_for, tmp_path
         f"{field}{tmp_path}/text.zip: is not a model of Stable-Baselines3; name a model.zip"
     ]
     assert problems(f"{tmp_path}/model.zip") == []
+
+
+def test_an_initial_policy_may_be_gone_once_the_run_has_a_checkpoint(request_for):
+    """A run that is prolonged resumes from that, and the run that the policy is of may have been deleted."""
+    request = request_for(trainer={"initialPolicy": {"path": "/deleted/model.zip"}})
+    before = list(preflight.initial_policy_is_there(request))
+
+    (request.runs / "a/0/checkpoints/100").mkdir(parents=True)
+
+    assert len(before) == 1
+    assert list(preflight.initial_policy_is_there(request)) == []

@@ -3,8 +3,10 @@
 import errno
 import json
 import os
+import shlex
 import uuid
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import yaml
@@ -13,7 +15,7 @@ from palaestra.api import validate
 from palaestra.local import rundir
 from palaestra.local.errors import Refused, StorageFailed
 from palaestra.local.files import write
-from palaestra.local.outcome import Outcome, summary
+from palaestra.local.outcome import Outcome, summary, uses
 from tests.failing import failing
 
 JOB = {"apiVersion": "palaestra.dev/v1alpha1", "kind": "TrainingJob", "metadata": {"name": "j"}}
@@ -45,6 +47,39 @@ def test_the_uid_of_a_job_follows_from_its_place(tmp_path):
 def test_a_run_goes_on_with_the_job_that_it_was_started_with(directory):
     """The same file, read again."""
     rundir.refuse_another_job(directory, record())
+
+
+def test_more_steps_prolong_a_run_and_change_nothing_else(tmp_path):
+    """What was learned stays explained, because the run was the same up to its last checkpoint."""
+    rundir.prepare(tmp_path, record(trainer={"steps": 100}))
+    longer = record(trainer={"steps": 150})
+
+    rundir.refuse_another_job(tmp_path, longer)
+
+    assert rundir.is_prolonged(tmp_path, longer)
+    assert not rundir.is_prolonged(tmp_path, record(trainer={"steps": 100}))
+    assert not rundir.is_prolonged(tmp_path / "new", longer)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({}, "spec.trainer.steps: was 100, is 50; raise it to prolong the run, it cannot be lowered"),
+        ({"seed": 2}, "spec.seed: was 1, is 2"),
+    ],
+    ids=["fewer steps", "another seed"],
+)
+def test_what_a_prolonged_run_cannot_change_is_refused(tmp_path, changes, line):
+    """Also together with more steps."""
+    rundir.prepare(tmp_path, record(trainer={"steps": 100}))
+    steps = 150 if changes else 50
+
+    with pytest.raises(Refused) as refused:
+        rundir.refuse_another_job(tmp_path, record(trainer={"steps": steps}, **changes))
+
+    first, remedy = str(refused.value).splitlines()
+    assert first == line
+    assert "begin anew with --fresh" in remedy
 
 
 def test_a_new_directory_takes_any_job(tmp_path):
@@ -293,6 +328,19 @@ def test_the_summary_tells_what_was_measured_and_how_to_look_at_it(directory):
     assert lines[2].endswith("93% of the wall clock")
     assert lines[4].endswith(f"tensorboard --logdir {directory}/tensorboard")
     assert lines[5].endswith(f"palaestra-eval {directory}")
+
+
+def test_a_shell_reads_the_commands_of_a_summary_as_they_are_meant(tmp_path):
+    """They are there to be copied, also from the folder of a person who writes names with spaces."""
+    directory = tmp_path / "Ada's runs" / "$HOME `x`" / "0"
+    (directory / "tensorboard").mkdir(parents=True)
+    for name in ("model.zip", "attempts.jsonl"):
+        (directory / name).touch()
+
+    commands = [shlex.split(line[20:]) for line in uses(directory)]
+
+    assert [words[1:] for words in commands] == [["--logdir", f"{directory}/tensorboard"], [str(directory)]]
+    assert [Path(words[0]).name for words in commands] == ["tensorboard", "palaestra-eval"]
 
 
 def test_the_summary_has_the_interval_of_the_success_rate(directory):

@@ -55,7 +55,7 @@ def sees(world: World) -> bool:
 
 def test_an_unknown_world_names_those_that_ship() -> None:
     """A path is not a name."""
-    message = 'no world "../secret" ships; choose one of arena, court, seeing, two_robots'
+    message = 'no world "../secret" ships; choose one of arena, court, pen, seeing, two_robots'
 
     with pytest.raises(UnknownWorldError, match=message):
         builtin("../secret")

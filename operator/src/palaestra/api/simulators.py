@@ -38,6 +38,7 @@ class Builtin(StrEnum):
     ARENA = "arena"
     SEEING = "seeing"
     COURT = "court"
+    PEN = "pen"
 
 
 class ConfigMapKey(ApiModel):
@@ -73,7 +74,8 @@ class World(ApiModel):
     builtin: Builtin | None = Field(default=None, strict=False)
     """A world that ships with Palaestra. `arena`: four by four meters with four cylinders and a Robotino.
     `seeing`: an arena without cylinders, with a red pole, and a Robotino with a color and a depth camera.
-    `court`: three by three meters with boxes and cylinders, and a TurtleBot3 Burger."""
+    `court`: three by three meters with boxes and cylinders, and a TurtleBot3 Burger. `pen`: 1.2 by 0.8 meters
+    with two cylinders, and an e-puck."""
 
     file: Annotated[str, Field(max_length=1024, pattern=WORLD_FILE)] | None = None
     """Absolute path of a `.wbt` file, or of a model of MuJoCo (`.xml`), in the simulator's image (`palaestra

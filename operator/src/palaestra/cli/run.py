@@ -4,17 +4,21 @@ import argparse
 from importlib.metadata import version
 from pathlib import Path
 
+from palaestra.api import TrainingJob
 from palaestra.cli.files import add_dir, job
 from palaestra.cli.parsing import Commands, command
+from palaestra.given import changed
 from palaestra.local.run import Options, run
 from palaestra_protocol.numbers import MOST_PORT, whole
 
+MODEL = "model.zip"  # the best policy of a run
 RUN = """\
 Trains as the TrainingJob in FILE specifies, and writes <dir>/<job name>/<replica>/: checkpoints/,
 tensorboard/, evaluations.jsonl, model.zip, the source worlds, training.yaml and logs/. The same command
-resumes from the newest checkpoint. Replicas run one after another; --replica chooses one. Ctrl-C saves a
-checkpoint and exits; a second Ctrl-C exits at once. SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP
-that was ignored at the start, as by nohup or in the background of a script, stays ignored.
+resumes from the newest checkpoint, and with more trainer.steps in FILE it prolongs a finished run. Replicas
+run one after another; --replica chooses one. Ctrl-C saves a checkpoint and exits; a second Ctrl-C exits at
+once. SIGTERM and SIGHUP act as Ctrl-C; a SIGINT or SIGHUP that was ignored at the start, as by nohup or in
+the background of a script, stays ignored.
 """
 
 
@@ -26,6 +30,12 @@ def add(commands: Commands) -> None:
     parser.add_argument("--replica", metavar="N", type=whole(), help="this replica only")
     parser.add_argument(
         "--fresh", action="store_true", help="start from the beginning; an existing run is moved aside"
+    )
+    parser.add_argument(
+        "--initial-policy",
+        metavar="PATH",
+        type=Path,
+        help="run directory or model.zip whose policy a new run begins with, as trainer.initialPolicy",
     )
     parser.add_argument(
         "--ros-port",
@@ -40,7 +50,7 @@ def add(commands: Commands) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     return run(
-        job(options.file),
+        _wanted(options),
         Options(
             runs=options.dir,
             version=version("palaestra"),
@@ -50,3 +60,16 @@ def _run(options: argparse.Namespace) -> int:
             ros_port=options.ros_port,
         ),
     )
+
+
+def _wanted(options: argparse.Namespace) -> TrainingJob:
+    """Return the job in the file, with the policy of the command line.
+
+    Raises:
+        PalaestraError: the file cannot be read, or the job is wrong.
+    """
+    given, policy = job(options.file), options.initial_policy
+    if policy is None:
+        return given
+    model = policy / MODEL if policy.is_dir() else policy
+    return changed(given, {"trainer.initialPolicy": {"path": str(model.absolute())}})

@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 from palaestra.api import TrainingJob
 from palaestra.api.yaml_text import write
@@ -73,7 +73,7 @@ class Run:
         self.log = directory.with_name(f"{directory.name}.log")
         self._control = os.fdopen(control, "wb", buffering=0)
         self._watch = Watch(directory)
-        with storage(self.log), self.log.open("wb") as log, tempfile.TemporaryFile() as file:
+        with storage(self.log), _emptied(self.log) as log, tempfile.TemporaryFile() as file:
             file.write(request.to_json())
             file.seek(0)
             self._process = subprocess.Popen(
@@ -190,7 +190,8 @@ def run(job: Given, *, runs: Path | str = "runs", replica: int | None = None, fr
     """Train a job on this machine, in the background, and return its handle.
 
     The run is that of `palaestra run`: it resumes from its newest checkpoint, and does nothing if it is
-    complete. It saves a checkpoint and ends when this process ends.
+    complete. A job with more `trainer.steps` prolongs it. It saves a checkpoint and ends when this process
+    ends.
 
     Args:
         job: the path of a file, YAML text, plain data or the model.
@@ -215,6 +216,12 @@ def run(job: Given, *, runs: Path | str = "runs", replica: int | None = None, fr
         if not fresh:
             rundir.refuse_another_job(directory / str(number), rundir.record_of(identified_job))
         return _started(given, directory / str(number), options, lock)
+
+
+def _emptied(log: Path) -> BinaryIO:
+    """Return a log file without content, as `LimitedFile` needs it."""
+    log.write_bytes(b"")
+    return log.open("a+b")
 
 
 def _replica(job: TrainingJob, replica: int | None) -> int:

@@ -1,7 +1,8 @@
 """Run one replica for another program, and end with it: `python -m palaestra.local.bound`.
 
 `palaestra.run` starts it in a session of its own, so that it has its own event loop and signals, and Ctrl-C
-in a terminal or notebook does not reach it. Standard input is a file with the request.
+in a terminal or notebook does not reach it. Standard input is a file with the request, and standard output a
+log file of limited size.
 
 The run ends, with a checkpoint, when the other program closes its end of a pipe, writes to it, or ends in any
 way. A copy of that end in a forked child keeps the pipe open, so the end of the process is watched too.
@@ -14,6 +15,7 @@ import signal
 import sys
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
+from io import BufferedWriter, TextIOWrapper
 from pathlib import Path
 from threading import Thread
 from typing import Self
@@ -21,6 +23,7 @@ from typing import Self
 from palaestra.api import load
 from palaestra.errors import PalaestraError
 from palaestra.local.errors import LocalError
+from palaestra.local.limited import LimitedFile
 from palaestra.local.output import say
 from palaestra.local.run import Options, run
 from palaestra_protocol.pod.status import ExitCode
@@ -58,6 +61,7 @@ class Request:
 def main() -> int:
     """Run the request on standard input, and return the exit code of `palaestra run`."""
     request = Request.from_json(sys.stdin.buffer.read())
+    sys.stdout = TextIOWrapper(BufferedWriter(LimitedFile(sys.stdout.fileno())), errors="replace")
     if os.getppid() != request.process:  # it has ended before, and another process is the parent now
         return int(ExitCode.INTERRUPTED)
     Thread(target=_end_with, args=(request.control, request.process), daemon=True).start()

@@ -1,6 +1,7 @@
 """The result of a replica's run, as it is written to the run directory and shown to a person."""
 
 import json
+import shlex
 import shutil
 import sys
 from collections.abc import Mapping
@@ -92,14 +93,19 @@ def uses(run_directory: Path) -> tuple[str, ...]:
     curves = run_directory / "tensorboard"
     measurable = all((run_directory / name).exists() for name in ("model.zip", "attempts.jsonl"))
     ways = {
-        "look at it": f"{typed('tensorboard')} --logdir {curves}" if curves.exists() else "",
-        "try the policy": f"{typed('palaestra-eval')} {run_directory}" if measurable else "",
+        "look at it": typed("tensorboard", "--logdir", curves) if curves.exists() else "",
+        "try the policy": typed("palaestra-eval", run_directory) if measurable else "",
     }
     return _lines(ways)
 
 
-def typed(program: str) -> str:
-    """Return the command for a program of this installation: its path, unless the shell finds it."""
+def typed(program: str, *words: str | Path) -> str:
+    """Return a command to type in a shell: every path is one word of it, also one with a space or a quote."""
+    return shlex.join([_place_of(program), *map(str, words)])
+
+
+def _place_of(program: str) -> str:
+    """Return the path of a program of this installation, or its name if the shell finds it."""
     beside = Path(sys.executable).with_name(program)
     if shutil.which(program) or not beside.exists():
         return program

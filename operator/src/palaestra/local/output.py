@@ -1,11 +1,10 @@
 """Write the output of containers to files, and show some of it.
 
-Every line goes to `logs/<container>.log`; those of some containers are also shown, after the container's
-name. The trainer may draw on the person's terminal (`terminal`) instead.
+Every line goes to `logs/<container>.log`, a file of limited size (`limited`). Those of some containers are
+also shown, after the container's name. The trainer may draw on the person's terminal (`terminal`) instead.
 """
 
 import asyncio
-import errno
 import os
 import sys
 from collections import deque
@@ -13,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from palaestra.local.errors import StorageFailed
+from palaestra.local.limited import LimitedFile
 from palaestra.local.terminal import RESTORED, as_seen, open_like, resize
 
 Show = Callable[[str], None]
@@ -37,9 +37,10 @@ class Log:
         self._open: set[asyncio.Future[None]] = set()
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._file = self.path.open("ab", buffering=0)
+            self._file = self.path.open("a+b", buffering=0)
         except OSError as error:
             raise StorageFailed(f"{self.path}: {error.strerror}; make room for it") from error
+        self._limited = LimitedFile(self._file.fileno())
 
     def begin(self, terminal: int | None = None) -> int:
         """Return a descriptor for the output of a program; the caller closes it after the start.
@@ -101,15 +102,13 @@ class Log:
             self._show(self._prefix + line)
 
     def _write(self, line: str) -> None:
-        """Append; if the disk is full, lines are lost, but the run continues until the trainer fails."""
-        try:
-            self._file.write(line.encode() + b"\n")
-        except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
-                raise
+        self._limited.write(line.encode(errors="replace") + b"\n")
 
 
 def say(text: str) -> None:
-    """Show a line to the person at once."""
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    """Show a line to the person at once; if nobody reads any more, as after `| head`, lines are dropped."""
+    try:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -16,6 +16,7 @@ from palaestra.api import Driver, SimulatorGroup, TrainingJob
 from palaestra.local.errors import Refused
 from palaestra.local.files import without_locks
 from palaestra.local.process import program_path
+from palaestra.local.rundir import job_directory
 from palaestra.local.simulators import PROGRAMS, lack
 from palaestra_protocol.shadowing import shadows
 from palaestra_sim import world
@@ -103,7 +104,10 @@ def worlds_are_right(request: Request) -> Iterator[str]:
 
 
 def initial_policy_is_there(request: Request) -> Iterator[str]:
-    """The file of the initial policy is a zip with a policy's tensors; the trainer compares their shapes."""
+    """The file of the initial policy is a zip with a policy's tensors; the trainer compares their shapes.
+
+    It may be gone once every replica has a checkpoint, because they resume from that.
+    """
     initial = request.job.spec.trainer.initial_policy
     if initial is None:
         return
@@ -111,7 +115,8 @@ def initial_policy_is_there(request: Request) -> Iterator[str]:
         with zipfile.ZipFile(initial.path) as archive:
             archive.getinfo(POLICY)
     except OSError as error:
-        yield f"spec.trainer.initialPolicy.path: {initial.path}: {error.strerror}; name a model.zip"
+        if not _all_have_learned(request):
+            yield f"spec.trainer.initialPolicy.path: {initial.path}: {error.strerror}; name a model.zip"
     except (zipfile.BadZipFile, KeyError):
         yield (
             f"spec.trainer.initialPolicy.path: {initial.path}: is not a model of Stable-Baselines3; "
@@ -157,6 +162,12 @@ CHECKS: tuple[Check, ...] = (
 def _existing(path: Path) -> Path:
     """Return the lowest existing folder on the way to a path."""
     return next(parent for parent in (path, *path.parents) if parent.exists())
+
+
+def _all_have_learned(request: Request) -> bool:
+    directory = job_directory(request.runs, request.job.metadata.name)
+    runs = (directory / str(replica) for replica in range(request.job.spec.replicas))
+    return all(any((run / "checkpoints").glob("[0-9]*")) for run in runs)
 
 
 def _simulator_program(group: SimulatorGroup) -> str:

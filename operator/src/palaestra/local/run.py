@@ -111,8 +111,11 @@ def _run_one(job: TrainingJob, path: Path, replica: int, options: Options) -> Ou
             say(f"{path}: the run that was there is now {aside}")
         rundir.refuse_another_job(path, record)
         before = Outcome.of(path)
-        if before is not None and before.finished:
-            say(f"{job.metadata.name}-{replica}: finished already; --fresh begins anew")
+        if before is not None and before.finished and not rundir.is_prolonged(path, record):
+            say(
+                f"{job.metadata.name}-{replica}: finished already; "
+                "more spec.trainer.steps prolong it, --fresh begins anew"
+            )
             _tell(before, path)
             return before
         rundir.prepare(path, record)

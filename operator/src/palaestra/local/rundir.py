@@ -33,6 +33,7 @@ from palaestra.local.outcome import Outcome
 from palaestra_protocol.pod.status import ExitCode
 
 RECORD = "job.yaml"
+STEPS = "spec.trainer.steps"
 _INDEX = re.compile(r"\[[0-9]+\]")
 
 Record = Mapping[str, Any]
@@ -50,7 +51,7 @@ def _mutable() -> Iterator[str]:
                 yield shown((*path, name))
 
 
-MUTABLE = frozenset(_mutable())
+MUTABLE = frozenset(_mutable())  # `STEPS` may be raised, which prolongs the run
 # In records up to a5276f3; since then the plan decides these.
 DEFAULTS_UNTIL_A5276F3 = {"spec.simulators.recycle.afterResets": 24}
 
@@ -134,13 +135,28 @@ def is_correction(directory: Path, record: Record) -> bool:
     return bool(_changes(directory, record)) and _learned_nothing(directory)
 
 
+def is_prolonged(directory: Path, record: Record) -> bool:
+    """Return whether a job has more steps than the run in the directory was to train."""
+    before = _before(directory)
+    return before is not None and _raised(dict(_flat(before)).get(STEPS), dict(_flat(record)).get(STEPS))
+
+
 def _changes(directory: Path, record: Record) -> tuple[str, ...]:
     """Return the changed fields that a run cannot change; () without a run in the directory."""
+    before = _before(directory)
+    return () if before is None else tuple(changed_fields(before, record))
+
+
+def _before(directory: Path) -> Record | None:
+    """Return the record of the run in the directory; None: there is no run."""
     try:
-        before = yaml.safe_load((directory / RECORD).read_bytes())
+        return _completed(yaml.safe_load((directory / RECORD).read_bytes()))
     except FileNotFoundError:
-        return ()
-    return tuple(changed_fields(_completed(before), record))
+        return None
+
+
+def _raised(was: Any, is_now: Any) -> bool:
+    return isinstance(was, int) and isinstance(is_now, int) and is_now > was
 
 
 def _learned_nothing(directory: Path) -> bool:
@@ -163,8 +179,10 @@ def changed_fields(before: Record, now: Record) -> Iterator[str]:
     for field in sorted(old.keys() | new.keys()):
         name, was, is_now = _INDEX.sub("", field), old.get(field), new.get(field)
         left_out = is_now is None and DEFAULTS_UNTIL_A5276F3.get(name) == was
-        if was != is_now and name not in MUTABLE and not left_out:
-            yield f"{field}: was {_short(was)}, is {_short(is_now)}"
+        allowed = name in MUTABLE or left_out or (name == STEPS and _raised(was, is_now))
+        if was != is_now and not allowed:
+            remedy = "; raise it to prolong the run, it cannot be lowered" if name == STEPS else ""
+            yield f"{field}: was {_short(was)}, is {_short(is_now)}{remedy}"
 
 
 def _completed(record: Any) -> Record:

@@ -178,5 +178,6 @@ class LocalLayout:
         """Refuse: a laptop has no claims."""
         raise PlanError(
             "spec.storage.resumeFrom: names a run on a claim of a cluster, which is not to be had here; "
-            "remove it, as a job that is run again goes on from its own run directory"
+            "remove it. A job that is run again resumes from its own run directory, and more "
+            "spec.trainer.steps prolong it"
         )

@@ -19,6 +19,7 @@ from palaestra_trainer.testing import (
     check_robot,
     check_scene,
     fake_arena,
+    fake_pen,
     fake_seeing,
 )
 from palaestra_trainer.testing import conformance as rules
@@ -32,6 +33,33 @@ def test_the_fake_is_a_robotino():
 def test_the_fake_with_cameras_is_a_robotino():
     """Its images are checked too."""
     check_robot(fake_seeing()[0])
+
+
+def test_the_fake_e_puck_is_a_robot_with_a_scene():
+    """On a floor that is smaller than those of the other fakes."""
+    robot, scene = fake_pen()
+
+    check_robot(robot)
+    check_scene(robot, scene, Pose(-0.3, 0.0, 1.0), (0.4, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("pose", "sensor", "meters"),
+    [
+        (Pose(0.53, 0.1, 0.0), 0, 0.04 / math.cos(math.radians(17.1))),
+        (Pose(0.0, 0.12, 0.0), 2, 0.25 - 0.06 - 0.12 - 0.031),
+        (Pose(0.0, -0.12, 0.0), 5, 0.25 - 0.06 - 0.12 - 0.031),
+    ],
+    ids=["wall ahead", "cylinder to the left", "cylinder to the right"],
+)
+def test_each_infrared_sensor_of_the_fake_e_puck_looks_its_way(pose, sensor, meters):
+    """From its place on the rim; the order of the sensors is that of the bearings."""
+    robot, _ = fake_pen()
+
+    robot.place(pose, seed=1)
+
+    assert robot.distances()[sensor] == pytest.approx(meters, abs=0.004)
+    assert robot.distances()[3] == pytest.approx(0.07, abs=0.004)  # nothing is behind it
 
 
 def test_the_fake_has_a_scene():

@@ -7,6 +7,7 @@ import os
 import signal
 
 import pytest
+from stable_baselines3.common.save_util import load_from_zip_file
 
 from palaestra_trainer import checkpoint
 from palaestra_trainer.run_directory import RunDirectory, read_lines
@@ -158,14 +159,43 @@ def test_a_finished_run_is_reported_and_not_repeated(play, job, directory, last_
     assert len(list(read_lines(directory.attempts))) == 1
 
 
-def test_a_run_is_prolonged_by_more_steps(play, job, directory):
-    """It goes on from its last checkpoint."""
-    play(job())
+CONSTANT = {"exploration_initial_eps": 0.1, "exploration_final_eps": 0.1}  # nothing follows `steps`
 
-    code, _ = play(job(steps=150))
+
+@pytest.mark.parametrize(("name", "constant"), [("DQN", CONSTANT), ("PPO", {})])
+def test_a_finished_run_that_is_prolonged_is_the_run_that_was_that_long(
+    play, job, directory, tmp_path, name, constant
+):
+    """Steps 96 and 192 are boundaries of both algorithms, so it resumes from a state of the long run."""
+    algorithm = {"name": name, "hyperparameters": job(name).algorithm.hyperparameters | constant}
+    at_once = RunDirectory(tmp_path / "at-once")
+    play(job(algorithm=algorithm, steps=192), into=at_once)
+    play(job(algorithm=algorithm, steps=96))
+
+    code, _ = play(job(algorithm=algorithm, steps=192))
 
     assert code == 0
-    assert json.loads(directory.summary.read_text())["steps"] == 150
+    assert json.loads(directory.summary.read_text())["steps"] == 192
+    assert [line["reason"] for line in read_lines(directory.attempts)] == ["new run", "resumed at step 96"]
+    assert parameters(directory) == parameters(at_once)
+
+
+def parameters(directory):
+    """Return every parameter of the policy in the newest checkpoint."""
+    _, found, _ = load_from_zip_file(
+        checkpoint.newest(directory.checkpoints).path / "model.zip", device="cpu", load_data=False
+    )
+    return {name: tensor.tolist() for name, tensor in found["policy"].items()}
+
+
+def test_a_prolonged_run_is_not_finished_until_it_ends(play, job, directory):
+    """The summary of its first end would be reported as the result of the second."""
+    play(job())
+
+    code, _ = play(job(steps=150), on_step=signal_after(20))
+
+    assert code == 75
+    assert not directory.summary.exists()
 
 
 def test_a_directory_of_another_run_is_refused(play, job, last_word):

@@ -206,9 +206,9 @@ class Seated:
 
     name = "collect-0"
 
-    def __init__(self, deaths=()):
-        self.robot, scene = fake_arena(deaths)
-        self.env = make_environment(Environment(id="MoveToTargetEnv-v0"), self.robot, scene)
+    def __init__(self, deaths=(), environment="MoveToTargetEnv-v0"):
+        self.robot, self.scene = fake_arena(deaths)
+        self.env = make_environment(Environment(id=environment), self.robot, self.scene)
 
     def due(self, episodes=1):
         """It does not wear out."""
@@ -223,6 +223,83 @@ class Seated:
     abandon = pause = unpause = start = stop
 
 
+class Painted(gymnasium.Env):
+    """An environment of a user's own, with attributes and a method of its own."""
+
+    observation_space = gymnasium.spaces.Discrete(2)
+    action_space = gymnasium.spaces.Discrete(2)
+    color = "red"
+
+    def __init__(self, robot, scene):
+        self.robot, self.scene = robot, scene
+
+    def reset(self, *, seed=None, options=None):
+        """Return nothing new."""
+        del options
+        super().reset(seed=seed)
+        return 0, {}
+
+    def step(self, action):
+        """Return the color in the info."""
+        del action
+        return 0, 0.0, False, False, {"color": self.color}
+
+    def paint(self, color):
+        """Change the color."""
+        self.color = color
+        return f"painted {color}"
+
+
+gymnasium.register("Painted-v0", Painted)
+
+
+def seen_from_outside(env):
+    """Return what a program sees of an environment's own attributes, and what it can do with them."""
+    env.reset(seed=4)
+    painted = env.get_wrapper_attr("paint")("blue")
+    after_painting = env.step(0)[4]
+    set_ = env.set_wrapper_attr("color", "green")
+    unknown = [env.has_wrapper_attr("price"), env.set_wrapper_attr("price", 3, force=False)]
+    with pytest.raises(AttributeError, match="price"):
+        env.get_wrapper_attr("price")
+    return {
+        "kind": type(env.unwrapped),
+        "robot": env.unwrapped.robot is env.get_wrapper_attr("robot"),
+        "colors": [painted, after_painting, set_, env.step(0)[4], env.unwrapped.color],
+        "unknown": [*unknown, env.set_wrapper_attr("price", 5), env.get_wrapper_attr("price")],
+        "on the environment": hasattr(env.unwrapped, "price"),
+        "outside": hasattr(env, "robot"),
+        "random": [env.np_random is env.unwrapped.np_random, env.np_random_seed],
+    }
+
+
+def test_attributes_and_methods_of_an_environment_are_reached_as_through_gymnasium_s_wrappers(make_players):
+    """A program that was written for `gymnasium.make` works with `make_env`."""
+    member = Seated(environment="Painted-v0")
+    plain = gymnasium.make("Painted-v0", robot=member.robot, scene=member.scene)
+
+    ours = seen_from_outside(TolerantEnv(make_players(member)))
+
+    assert ours == seen_from_outside(plain)
+    assert ours["robot"]
+    assert ours["colors"] == ["painted blue", {"color": "blue"}, True, {"color": "green"}, "green"]
+
+
+def test_a_standby_that_takes_over_has_the_attributes_that_were_set(make_players):
+    """Its environment is another object, which the wrapper shows from the next episode on."""
+    member = Seated(environment="Painted-v0")
+    env = TolerantEnv(make_players(member))
+    env.reset()
+    env.set_wrapper_attr("color", "green")
+    member.env = Seated(environment="Painted-v0").env
+
+    env.reset()
+
+    assert env.unwrapped is member.env.unwrapped
+    assert env.unwrapped.color == "green"
+
+
+@pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
 @pytest.mark.parametrize("check", [check_env, check_env_for_sb3], ids=["gymnasium", "sb3"])
 def test_the_checkers_of_other_projects_have_nothing_to_object_to(make_players, check):
     """Seeds, spaces, types and determinism; every warning is an error in these tests."""

@@ -319,6 +319,7 @@ class Attempt:
         reason = f"resumed at step {found.manifest.step}" if found else "new run"
         text = dump(self._configuration)
         replace_file(self._directory.configuration, lambda path: _write_text(path, text))
+        self._directory.summary.unlink(missing_ok=True)  # that of a run which is now prolonged
         algorithms.keep(self._algorithm, self._directory)
         pod = self._around.environment.get("PALAESTRA_POD_UID", "")
         self._progress.attempt = attempt = self._directory.begin_attempt(pod, reason)

@@ -80,6 +80,7 @@ _WORLDS: dict[str, tuple[str, str]] = {
     "arena": ("robotino", DEFAULT_ROBOT),
     "seeing": ("robotino", DEFAULT_ROBOT),
     "court": ("burger", "TurtleBot3Burger"),
+    "pen": ("epuck", "EPuck"),
 }
 
 

@@ -5,6 +5,7 @@ They are shipped, not kept among the tests, because authors of environments, rob
 
 from palaestra_trainer.testing.conformance import NotConforming, check_robot, check_scene
 from palaestra_trainer.testing.fake_burger import FakeBurger, fake_court
+from palaestra_trainer.testing.fake_epuck import FakeEPuck, fake_pen
 from palaestra_trainer.testing.fake_robotino import (
     FakeRobotino,
     FakeSeeingRobotino,
@@ -16,6 +17,7 @@ from palaestra_trainer.testing.fake_task import FakeTask
 
 __all__ = [
     "FakeBurger",
+    "FakeEPuck",
     "FakeRobotino",
     "FakeScene",
     "FakeSeeingRobotino",
@@ -25,5 +27,6 @@ __all__ = [
     "check_scene",
     "fake_arena",
     "fake_court",
+    "fake_pen",
     "fake_seeing",
 ]

@@ -1,28 +1,56 @@
-"""One member as a gymnasium.Env that tolerates faults."""
+"""One member as a gymnasium wrapper that tolerates faults."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import gymnasium
+from gymnasium.envs.registration import EnvSpec
 
 from palaestra_trainer.simulators.member import Step
 from palaestra_trainer.tolerant.players import Players
 
 
-class TolerantEnv(gymnasium.Env[Any, Any]):
+class TolerantEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
     """The environment of one simulator; a fault truncates an episode, and the next reset waits for it.
+
+    As behind other wrappers of gymnasium, `unwrapped` is the environment itself, and `get_wrapper_attr` finds
+    its attributes and methods.
 
     Args:
         players: a single one.
+
+    Attributes:
+        env: the environment of the episode; another object after a standby took over.
     """
 
     def __init__(self, players: Players) -> None:
         self._players = players
         [self._player] = players.all
-        inner = self._player.env
-        self.observation_space, self.action_space = inner.observation_space, inner.action_space
-        self.metadata, self.render_mode = inner.metadata, inner.render_mode
+        self._spec: EnvSpec | None = None
+        super().__init__(self._player.env)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """None unless it was set, since no second environment can be made from a spec with this robot.
+
+        The environment's own is `unwrapped.spec`.
+        """
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec
+
+    def set_wrapper_attr(self, name: str, value: Any, *, force: bool = True) -> bool:
+        """Set an attribute where it is defined, else in this wrapper if `force`; return whether it was set.
+
+        One of the environment is set again after a restart and after a standby took over.
+        """
+        if hasattr(self, name) or not self.env.has_wrapper_attr(name):
+            return super().set_wrapper_attr(name, value, force=force)
+        self._player.keeper.set_attribute(name, value)
+        return True
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -32,8 +60,8 @@ class TolerantEnv(gymnasium.Env[Any, Any]):
         Raises:
             As `Players.begin`.
         """
-        super().reset(seed=seed)
         self._players.begin([seed], [options])
+        self.env = self._player.env
         return self._player.observation, self._player.reset_info
 
     def step(self, action: Any) -> Step:
@@ -43,10 +71,6 @@ class TolerantEnv(gymnasium.Env[Any, Any]):
             As `Players.step`.
         """
         return self._players.step(action).step
-
-    def render(self) -> Any:
-        """Return what the environment's `render` returns."""
-        return self._player.env.render()
 
     def close(self) -> None:
         """Stop the simulator and release it; safe to repeat."""

@@ -1,0 +1,101 @@
+"""A robot on two wheels, computed in this process.
+
+It drives without slip and at once as commanded; walls and things stop it and let it slide. A subclass senses.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Collection
+from typing import ClassVar
+
+import numpy as np
+
+from palaestra_trainer.robots.base import RobotAbc
+from palaestra_trainer.robots.capabilities import Localization, Steering
+from palaestra_trainer.robots.geometry import Point, Pose
+from palaestra_trainer.robots.layout import Layout
+from palaestra_trainer.testing.fake_robotino import wrapped
+from palaestra_trainer.testing.mortal import Mortal
+
+PERIOD_S = 0.192
+
+
+class FakeWheels(Mortal, RobotAbc, Steering, Localization):
+    """A robot on two wheels; a subclass has `floor`, sizes and speeds, and implements `_look`.
+
+    Args:
+        deaths: numbers of the `advance` calls, counted from 1 over its whole life, at which it dies; every
+            call raises `SimulatorDead` from then until `restart`.
+        name: its name in faults.
+
+    Attributes:
+        floor: the floor that it stands on at first.
+        axle_m: from one wheel to the other.
+        layout: the floor and what stands on it.
+        target: x, y in meters of the mark.
+    """
+
+    floor: ClassVar[Layout]
+    axle_m: ClassVar[float]
+
+    def __init__(self, deaths: Collection[int] = (), name: str = "fake") -> None:
+        super().__init__(deaths, name)
+        self.layout = self.floor
+        self.target: Point = (0.0, 0.0)
+        self._heading_rad = 0.0
+        self.place(Pose(0.0, 0.0, 0.0), seed=0)
+
+    @property
+    def period_s(self) -> float:
+        """Six basic steps of 32 ms."""
+        return PERIOD_S
+
+    def steer(self, forward: float, turn: float) -> None:
+        """Set the wanted velocity; slower along the same curve if a wheel cannot run so fast."""
+        self._live()
+        rim = abs(forward) + 0.5 * abs(turn) * self.axle_m
+        slower = min(1.0, self.speed_m_s / max(rim, self.speed_m_s))
+        self._wanted = slower * forward, slower * turn
+
+    def pose(self) -> Pose:
+        """Return the pose after the last step."""
+        self._live()
+        return Pose(self._x_m, self._y_m, self._heading_rad)
+
+    def advance(self) -> int:
+        """Simulate one control period; there are never extra ones."""
+        self._live_a_step()
+        forward, turn = self._wanted
+        middle = self._heading_rad + 0.5 * turn * PERIOD_S
+        self._x_m += forward * math.cos(middle) * PERIOD_S
+        self._y_m += forward * math.sin(middle) * PERIOD_S
+        self._heading_rad = wrapped(self._heading_rad + turn * PERIOD_S)
+        self._slide()
+        self._look()
+        return 0
+
+    def place(self, pose: Pose, seed: int) -> None:
+        """Put the robot at rest at `pose`, with fresh readings; `seed` decides the noise."""
+        self._live()
+        self._x_m, self._y_m, self._heading_rad = pose.x_m, pose.y_m, pose.heading_rad
+        self._wanted = (0.0, 0.0)
+        self._random = np.random.default_rng(seed)
+        self._look()
+
+    @abstractmethod
+    def _look(self) -> None:
+        """Let the sensors measure from the pose of now."""
+
+    def _slide(self) -> None:
+        """Push the robot out of the walls and of the things that it hit."""
+        (low_x, low_y), (high_x, high_y) = self.layout.low, self.layout.high
+        for thing in self.layout.obstacles:
+            inside = self.radius_m - thing.gap(self._x_m, self._y_m)
+            if thing.standing and inside > 0.0:
+                away = thing.away(self._x_m, self._y_m)
+                self._x_m += inside * away[0]
+                self._y_m += inside * away[1]
+        self._x_m = min(max(self._x_m, low_x + self.radius_m), high_x - self.radius_m)
+        self._y_m = min(max(self._y_m, low_y + self.radius_m), high_y - self.radius_m)

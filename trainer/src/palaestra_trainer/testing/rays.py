@@ -1,0 +1,64 @@
+"""Rays of the fakes: meters to the nearest thing on a floor of walls, rectangles and circles."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from palaestra_trainer.robots.layout import Layout, Obstacle
+
+_LEAST_SLOPE = 1e-9
+Rays = NDArray[np.float64]
+Eye = tuple[float, float] | tuple[Rays, Rays]
+
+
+def nearest(layout: Layout, eye: Eye, angles: NDArray[np.floating[Any]]) -> Rays:
+    """Return meters along each ray to the walls and to what stands on the floor.
+
+    Args:
+        layout: the floor; its walls are at its edges.
+        eye: x, y in meters of the place from which the rays go; one for all, or arrays of one for each.
+        angles: directions of the rays in the world, in radians.
+    """
+    way = np.cos(angles), np.sin(angles)
+    seen = _to_edges(layout, eye, way)
+    for thing in layout.obstacles:
+        if thing.standing:
+            seen = np.minimum(seen, _to_thing(thing, eye, way))
+    return seen
+
+
+def _to_edges(layout: Layout, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
+    """Return meters along each ray to the walls at the edges of the floor."""
+    seen = np.full(len(way[0]), math.inf)
+    for axis in (0, 1):
+        slope = _sloping(way[axis])
+        edge = np.where(slope > 0.0, layout.high[axis], layout.low[axis])
+        seen = np.minimum(seen, (edge - eye[axis]) / slope)
+    return seen
+
+
+def _to_thing(thing: Obstacle, eye: Eye, way: tuple[Rays, Rays]) -> Rays:
+    """Return meters along each ray to a circle or a rectangle; infinite beside it."""
+    c, s = math.cos(thing.heading_rad), math.sin(thing.heading_rad)
+    dx, dy = eye[0] - thing.x_m, eye[1] - thing.y_m
+    x, y = dx * c + dy * s, dy * c - dx * s
+    ux, uy = way[0] * c + way[1] * s, way[1] * c - way[0] * s
+    if thing.radius_m:
+        along = -(x * ux + y * uy)
+        inside = thing.radius_m**2 - (x * uy - y * ux) ** 2
+        near = along - np.sqrt(np.maximum(inside, 0.0))
+        return np.where((inside > 0.0) & (near > 0.0), near, math.inf)
+    enter, leave = np.full(len(ux), -math.inf), np.full(len(ux), math.inf)
+    for place, slope, half in ((x, _sloping(ux), thing.half_m[0]), (y, _sloping(uy), thing.half_m[1])):
+        one, other = (-half - place) / slope, (half - place) / slope
+        enter, leave = np.maximum(enter, np.minimum(one, other)), np.minimum(leave, np.maximum(one, other))
+    return np.where((enter < leave) & (enter > 0.0), enter, math.inf)
+
+
+def _sloping(slope: Rays) -> Rays:
+    """Return slopes by which can be divided."""
+    return np.copysign(np.maximum(np.abs(slope), _LEAST_SLOPE), slope)
