@@ -92,9 +92,12 @@ class RunDirectory:
 
 def append_line(path: Path, content: dict[str, Any]) -> None:
     """Append `content` as one JSON line that survives a crash of the machine."""
-    torn = path.exists() and path.stat().st_size > 0 and not path.read_bytes().endswith(b"\n")
-    with path.open("a", encoding="utf-8") as file:
-        file.write(("\n" if torn else "") + json.dumps(content) + "\n")
+    with path.open("ab+") as file:
+        torn = False
+        if file.tell():
+            file.seek(-1, os.SEEK_END)
+            torn = file.read(1) != b"\n"
+        file.write((b"\n" if torn else b"") + json.dumps(content).encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from palaestra_trainer.run_directory import sync
 log = structlog.get_logger(__name__)
 
 MODEL = "model.zip"
+_NUMBER = re.compile(r"[0-9]{1,18}")
 
 
 class Saver:
@@ -103,15 +105,16 @@ class Saver:
 
 
 def newest(folder: Path) -> Checkpoint | None:
-    """Return the newest checkpoint that is undamaged; None if there is none. Nothing is changed.
+    """Return the newest checkpoint that is undamaged; None if the folder has none. Nothing is changed.
 
     Where chunks of experience are shared, damage to one may be damage to all: then the
     newest is returned whose other files are whole.
 
     Raises:
-        ConfigurationError: it is of a format that this release does not read.
+        ConfigurationError: it is of a format that this release does not read, or none can be read: a run
+            that began anew would replace them.
     """
-    rest = None
+    rest, damage = None, ""
     for path in sorted(_steps(folder), key=_step, reverse=True):
         try:
             found = manifest.read(path)
@@ -119,6 +122,7 @@ def newest(folder: Path) -> Checkpoint | None:
             raise
         except (OSError, ValueError, TypeError) as error:
             log.warning("damaged checkpoint skipped", path=str(path), fact=str(error))
+            damage = damage or f"{path.name}: {error}"
             continue
         if not found.lost:
             return found
@@ -128,6 +132,11 @@ def newest(folder: Path) -> Checkpoint | None:
         rest = rest or found
     if rest:
         log.warning("no checkpoint is whole: going on without the lost experience", path=str(rest.path))
+    elif damage:
+        raise ConfigurationError(
+            f"{folder}: no checkpoint in it can be read ({damage}); restore one from a copy, or move the run "
+            "directory away to begin anew"
+        )
     return rest
 
 
@@ -175,7 +184,7 @@ def tidy(folder: Path) -> None:
 
 def _steps(folder: Path) -> Iterator[Path]:
     if folder.is_dir():
-        yield from (path for path in folder.iterdir() if path.is_dir() and path.name.isdigit())
+        yield from (path for path in folder.iterdir() if path.is_dir() and _NUMBER.fullmatch(path.name))
 
 
 def _step(path: Path) -> int:

@@ -56,7 +56,7 @@ class Journal:
         try:
             content = json.loads(self._path.read_text(encoding="utf-8"))
             reached, later = int(content["step"]), Counters.from_json(content["counters"])
-        except (OSError, ValueError, TypeError, KeyError):
+        except (OSError, ValueError, TypeError, KeyError, OverflowError):
             return saved
         if later.seconds <= saved.seconds:
             return saved

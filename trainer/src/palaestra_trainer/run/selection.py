@@ -32,7 +32,7 @@ from palaestra_trainer.telemetry.progress import Progress
 
 log = structlog.get_logger(__name__)
 
-_BEST = "evaluation.json"  # a member of model.zip
+BEST = "evaluation.json"  # a member of model.zip
 
 
 class Enough(TrainerError):
@@ -187,7 +187,7 @@ class Selection:
         def write(path: Path) -> None:
             checkpoint.save_tensors(path, self._model)
             with zipfile.ZipFile(path, "a") as archive:
-                archive.writestr(_BEST, json.dumps(asdict(best)))
+                archive.writestr(BEST, json.dumps(asdict(best)))
 
         replace_file(self._directory.model, write)
 
@@ -216,8 +216,8 @@ def best_of(directory: RunDirectory) -> Best | None:
     if not directory.model.exists():
         return None
     with zipfile.ZipFile(directory.model) as archive:
-        if _BEST in archive.namelist():
-            return Best(**json.loads(archive.read(_BEST)))
+        if BEST in archive.namelist():
+            return Best(**json.loads(archive.read(BEST)))
     lines = map(Best.of_line, read_lines(directory.evaluations))
     return max(lines, key=lambda line: line.score, default=None)
 

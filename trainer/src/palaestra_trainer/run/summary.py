@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from palaestra_protocol.pod.status import SuccessInterval, Termination
 from palaestra_trainer.configuration import Configuration
 from palaestra_trainer.run.selection import best_of, confirmation_of
 from palaestra_trainer.run_directory import RunDirectory, read_lines, replace_file
@@ -66,7 +67,18 @@ def finished(directory: RunDirectory, configuration: Configuration) -> dict[str,
         return None
     if content["target"] < configuration.steps:
         return None
-    return content
+    return {name: value for name, value in content.items() if name != "event"}  # structlog's own word
+
+
+def last_word_of(summary: dict[str, Any]) -> Termination:
+    """Return the termination message of an attempt that finds its run finished."""
+    interval = summary.get("success_interval")  # absent in one of a release up to a5276f3
+    return Termination(
+        step=summary["steps"],
+        reason="Completed: before",
+        success_rate=summary["success_rate"],
+        success_interval=None if interval is None else SuccessInterval.from_json(interval),
+    )
 
 
 def measured(directory: RunDirectory) -> dict[str, Any]:

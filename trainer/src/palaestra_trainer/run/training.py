@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import structlog
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch.optim.optimizer import register_optimizer_step_pre_hook
 
-from palaestra_protocol.pod.status import Cause, ExitCode, SuccessInterval, Termination
+from palaestra_protocol.pod.status import Cause, ExitCode, Termination
 from palaestra_trainer import algorithms, checkpoint
 from palaestra_trainer.algorithms import her
 from palaestra_trainer.algorithms.divergence import Learner
@@ -33,11 +33,12 @@ from palaestra_trainer.run.callbacks import JobCallbacks, make_callbacks
 from palaestra_trainer.run.capacity import capacity_now, refuse_what_does_not_fit
 from palaestra_trainer.run.conductor import Conductor, Resumed
 from palaestra_trainer.run.curves import Curves, hide_points
+from palaestra_trainer.run.inspecting import inspect
 from palaestra_trainer.run.journal import Journal
 from palaestra_trainer.run.judging import make_judge
 from palaestra_trainer.run.rejoining import rejoin
 from palaestra_trainer.run.selection import Enough, forget_after
-from palaestra_trainer.run.summary import finished, summarise, write_summary
+from palaestra_trainer.run.summary import finished, last_word_of, summarise, write_summary
 from palaestra_trainer.run.tensorboard_link import link_curves
 from palaestra_trainer.run.termination import End, end_of, write_last_word
 from palaestra_trainer.run.watchdog import Watchdog, stalled
@@ -103,23 +104,24 @@ def run(
         must_resume=must_resume,
         environment=os.environ,
     )
-    before = finished(directory, configuration)
-    if before is not None:
-        log.info("already finished", **before)
-        write_last_word(
-            Termination(
-                step=before["steps"],
-                reason="Completed: before",
-                success_rate=before["success_rate"],
-                success_interval=_interval(before),
-            )
-        )
-        return ExitCode.DONE
     progress = Progress(
         configuration.steps, [(simulator.name, simulator.role) for simulator in configuration.simulators]
     )
     attempt = Attempt(configuration, directory, progress, around)
-    end = attempt.play()
+    try:
+        inspect(directory)
+    except ConfigurationError as error:
+        return _reported(end_of(error), attempt)
+    before = finished(directory, configuration)
+    if before is not None:
+        log.info("already finished", **before)
+        write_last_word(last_word_of(before))
+        return ExitCode.DONE
+    return _reported(attempt.play(), attempt)
+
+
+def _reported(end: End, attempt: Attempt) -> int:
+    """Log how an attempt ended, write its termination message, and return its exit code."""
     for line in end.message.splitlines():
         log.log(logging.INFO if end.code == ExitCode.DONE else logging.ERROR, line, reason=end.reason)
     write_last_word(attempt.last_word(end))
@@ -373,12 +375,6 @@ class Attempt:
                 lambda: write_last_word(self.last_word(stalled(self._progress))),
             )
         )
-
-
-def _interval(summary: Mapping[str, Any]) -> SuccessInterval | None:
-    """Return the interval in the summary of a finished run; None in one of a release up to a5276f3."""
-    interval = summary.get("success_interval")
-    return None if interval is None else SuccessInterval.from_json(interval)
 
 
 def use_threads(environment: Mapping[str, str] = os.environ) -> None:
