@@ -182,6 +182,16 @@ def test_a_misspelled_class_with_its_module_has_the_nearest_one_named():
 
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_every_algorithm_takes_a_schedule_of_its_learning_rate(name):
+    """TQC's signature has a bare Callable, where others have one with arguments."""
+    for schedule in ("lin_7.3e-4", [[0, 0.001], [1, 0.0001]]):
+        assert check(Algorithm(name=name, hyperparameters={"learning_rate": schedule}))
+
+    with pytest.raises(ConfigurationError, match=r"give a number or a schedule such as lin_0\.001"):
+        check(Algorithm(name=name, hyperparameters={"learning_rate": "quick"}))
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_defaults_have_the_types_of_the_signature(name):
     """A whole number stands for a number with a fraction, as everywhere in YAML."""
     check(Algorithm(name=name, hyperparameters=ALGORITHMS[name].defaults))
