@@ -37,6 +37,7 @@
     ├── NotLeading                   this operator may have lost its lease (operator.writing)
     ├── Outdated                     the cluster has changed since the decision (operator.confirming)
     ├── TooLarge                     a file is larger than what it should be can be (reading)
+    ├── ZooError                     a file of RL-Baselines3-Zoo cannot be converted (zoo.reading)
     └── TrialFailed                  the trial's job did not succeed in time (trial)
 
 A message names the field, the fact and the remedy: `spec.steps: 0 is less than 1; use 1 or more`.
